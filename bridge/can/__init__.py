@@ -8,12 +8,13 @@ from bridge.can.interface import Bus
 from bridge.errors import Unavailable
 
 
-def open_bus(name: str, interface: str, channel: str, bitrate: int) -> Bus:
-    """The bus behind ``interface``, not opened yet. ``virtual`` is made by whoever holds its wire."""
+def open_bus(name: str, interface: str, channel: str, bitrate: int, *, at_least: int = 0) -> Bus:
+    """The bus behind ``interface``, not opened yet. ``virtual`` is made by whoever holds its wire. On
+    SocketCAN one slower than ``at_least`` (bit/s), which is assumed as nobody said it, is not opened."""
     if interface == "socketcan":
         from bridge.can.socketcan import SocketCanBus
 
-        return SocketCanBus(name, channel, bitrate)
+        return SocketCanBus(name, channel, bitrate, at_least=at_least)
     from bridge.can.pythoncan import PythonCanBus
 
     return PythonCanBus(name, interface, channel, bitrate)

@@ -16,9 +16,20 @@ class WrongBitrate(OSError):
         )
 
 
+class TooSlow(OSError):
+    """The interface is slower than was assumed, as nobody has said its bit rate."""
+
+    def __init__(self, channel: str, actual: int, assumed: int) -> None:
+        super().__init__(
+            errno.EINVAL,
+            f"{channel} runs at {actual} bit/s, and requests at the pace of the assumed {assumed} would "
+            f"flood it: give --bitrate {actual}",
+        )
+
+
 def explain(error: OSError, channel: str) -> str:
     """What helps against ``error`` on ``channel``."""
-    if isinstance(error, WrongBitrate):
+    if isinstance(error, WrongBitrate | TooSlow):
         return error.strerror or str(error)
     match error.errno:
         case errno.ENODEV | errno.ENXIO:

@@ -19,7 +19,7 @@ from bridge.can import bcm
 from bridge.can.burstend import Burst
 from bridge.can.cansockets import CanSockets
 from bridge.can.errorframe import judge
-from bridge.can.explain import WrongBitrate, explain
+from bridge.can.explain import TooSlow, WrongBitrate, explain
 from bridge.can.foreignwatch import ForeignWatch
 from bridge.can.interface import BusStatus, ControllerState
 from bridge.can.kernelbursts import KernelBursts
@@ -41,12 +41,19 @@ class SocketCanBus:
     """One SocketCAN interface."""
 
     def __init__(
-        self, name: str, channel: str, bitrate: int | None = None, sockets: CanSockets | None = None
+        self,
+        name: str,
+        channel: str,
+        bitrate: int | None = None,
+        sockets: CanSockets | None = None,
+        *,
+        at_least: int = 0,
     ) -> None:
-        """``bitrate`` (bit/s) is compared with the interface's own, where it says one. ``sockets`` are those
-        of ``channel``, unless given."""
+        """``bitrate`` (bit/s) is compared with the interface's own, where it says one; so is ``at_least``.
+        ``sockets`` are those of ``channel``, unless given."""
         self._name = name
         self._bitrate = bitrate
+        self._at_least = at_least
         self._channel = channel
         self._status = BusStatus()
         self._raw: socket.socket | None = None
@@ -108,6 +115,8 @@ class SocketCanBus:
             raise OSError(errno.ENETDOWN, "the interface is down")
         if self._bitrate and link.bitrate and link.bitrate != self._bitrate:
             raise WrongBitrate(self._channel, link.bitrate, self._bitrate)
+        if link.bitrate and link.bitrate < self._at_least:
+            raise TooSlow(self._channel, link.bitrate, self._at_least)
         self._passed = link.frames, link.data_bytes
 
     def accept(self, can_ids: list[int]) -> None:

@@ -135,3 +135,17 @@ def decode(kind: str, data: bytes) -> Plain:
 def text(data: bytes) -> str:
     """A VISIBLE_STRING, up to its first zero byte. Devices send ISO 8859-1 in it."""
     return data.split(b"\0", 1)[0].decode("latin-1")
+
+
+def readable(data: bytes) -> str:
+    """A VISIBLE_STRING as people read it: many devices send UTF-8. What is written back goes by ``text``,
+    which loses no byte."""
+    plain = data.split(b"\0", 1)[0]
+    try:
+        return plain.decode("utf-8")
+    except UnicodeDecodeError as error:
+        # A text that was cut within a letter ends in one that is none; what came before has to be UTF-8.
+        whole = plain[: error.start]
+        if error.end == len(plain) and error.reason == "unexpected end of data" and not whole.isascii():
+            return whole.decode("utf-8")
+        return text(data)

@@ -187,6 +187,7 @@ async def run_errand(bus: Bus, errand: Errand, watch: Callable[[], None] = lambd
                 errand.on_frame(frame)
             errand.on_time(now)
             for frame in errand.take_frames():
+                errand.sent += 1
                 bus.send(frame, now, now + _SEND_WITHIN_S)
             bus.on_time(now)
             watch()
@@ -205,14 +206,29 @@ async def run_errand(bus: Bus, errand: Errand, watch: Callable[[], None] = lambd
 
 
 def carry_out(
-    line: Line, make: Callable[[float], _E], watch: Callable[[_E], None] = lambda errand: None
+    line: Line,
+    make: Callable[[float], _E],
+    watch: Callable[[_E], None] = lambda errand: None,
+    *,
+    paced: bool = False,
 ) -> _E:
-    """Make an errand of now and run it on the bus; returns it when it is finished or was interrupted."""
+    """Make an errand of now and run it on the bus; returns it when it is finished or was interrupted.
+
+    One that is ``paced`` sends as much as a bus of this bit rate bears: a slower one is refused with
+    ``Unavailable``.
+    """
     table = line.table
     assumed = table.interface == "socketcan" and not line.states_bitrate
-    bus = open_bus(table.name, table.interface, table.channel or "", 0 if assumed else table.bitrate)
+    bus = open_bus(
+        table.name,
+        table.interface,
+        table.channel or "",
+        0 if assumed else table.bitrate,
+        at_least=table.bitrate if assumed and paced else 0,
+    )
     errand = make(clock.now())
     until_stopped(run_errand(bus, errand, lambda: watch(errand)))
+    errand.unsent = bus.status.frames_expired
     if bus.status.state is not ControllerState.OK:
         state = bus.status.state.name.lower().replace("_", "-")
         tell(f"warning: bus {table.channel} is {state}")

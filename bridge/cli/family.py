@@ -42,6 +42,8 @@ def new(
     path = output or _FOLDER / f"{derived.name}.toml"
     family = _written(path, derived.text)
     print(printable(f"{path}: {family.family.name}, {derived.base}, {_count(family.parameter)}"))
+    if derived.read_only:
+        print(printable(f"{file}: only read: {derived.read_only}"))
     for one in told:
         print(printable(f"{file}:{one.line}: {one.text}"))
 

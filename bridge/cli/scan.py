@@ -14,6 +14,7 @@ from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, prin
 from bridge.cli.scan_site import write_site
 from bridge.cli.terminal import progress
 from bridge.errands.scan import FoundNode, Scanner
+from bridge.errors import OperationFailed
 from bridge.mapping import Family, family_names, load_family
 from bridge.mapping.loader import mapping_folders
 from bridge.mapping.match import Found, Match, best_match
@@ -48,6 +49,8 @@ def scan(
     line = choose_line(site, which)
     listen_s = seconds or (_PASSIVE_S if passive else _ACTIVE_S)
     scanner = _run(line, passive=passive, listen_s=listen_s, timeout_s=timeout_ms / 1000)
+    if not passive:
+        _tell_requests(scanner)
     folders = mapping_folders(write or site)
     families = {name: load_family(name, folders) for name in family_names(folders)}
     found = [_row(node, line, families) for node in scanner.nodes()]
@@ -75,9 +78,20 @@ def _run(line: Line, *, passive: bool, listen_s: float, timeout_s: float) -> Sca
 
     if passive or not sys.stderr.isatty():
         tell(f"listening for {listen_s:g} s" if passive else "asking all 127 ids")
-        return carry_out(line, make)
+        return carry_out(line, make, paced=not passive)
     with progress("asking all 127 ids") as show:
-        return carry_out(line, make, lambda s: show(s.done, s.total, ""))
+        return carry_out(line, make, lambda s: show(s.done, s.total, ""), paced=True)
+
+
+def _tell_requests(scanner: Scanner) -> None:
+    """Say how many requests went out: silence says nothing of what was never asked. Raises
+    ``OperationFailed`` where none did and nobody was heard."""
+    went = max(0, scanner.sent - scanner.unsent)
+    if scanner.sent and not went and not scanner.nodes():
+        raise OperationFailed(
+            f"none of {scanner.sent} requests went out: the bus takes no frames; is another node on?"
+        )
+    tell(f"{went} of {scanner.sent} requests went out")
 
 
 @dataclass(frozen=True, slots=True)

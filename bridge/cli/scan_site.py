@@ -9,6 +9,7 @@ from typing import Final
 
 from bridge.config import BusTable
 from bridge.derive import Derived, ProposedBus, ProposedNode, derive_family, describe, propose_site
+from bridge.derive.device import is_of
 from bridge.derive.toml import file_name
 from bridge.eds import Description, read_device_file, read_whole_device_file
 from bridge.errands.scan import FoundNode
@@ -47,11 +48,15 @@ def write_site(
     for node, match in found:
         mapping, why = (match.mapping, "") if match else (None, "no mapping fits")
         if match is None or match.by == _PROFILE_ONLY:
-            file = next((one for one in files if _is_of(one.description, node)), None)
+            file = next((one for one in files if is_of(one.description, node.vendor, node.product)), None)
+            if files and file is None and not node.vendor and not node.product:
+                why = f"{why or 'known by its profile alone'}: it says neither vendor nor product (0/0), by "
+                why += "which its file would be found"
             if file is not None:
                 try:
                     derived = derive_family(read_whole_device_file(file.path), file.path.name)
-                    mapping, why = _name(path, file, derived), ""
+                    mapping = _name(path, file, derived)
+                    why = f"only read: {derived.read_only}" if derived.read_only else ""
                     if mapping not in known and mapping.startswith(DESCRIBED):
                         known[mapping] = describe(file.path)
                     elif mapping not in known:
@@ -87,13 +92,6 @@ def _files(folder: Path) -> Iterator[_File]:
                 yield _File(path, read_device_file(path))
             except BridgeError:
                 continue
-
-
-def _is_of(description: Description, node: FoundNode) -> bool:
-    """Whether vendor and product are those of the node."""
-    vendor = description.number(0x1018, 1) or description.device.vendor_id
-    product = description.number(0x1018, 2) or description.device.product_code
-    return bool(vendor and product) and (vendor, product) == (node.vendor, node.product)
 
 
 def _says(node: FoundNode) -> str:

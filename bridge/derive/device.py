@@ -26,11 +26,11 @@ _ERROR_OBJECTS: Final = {
 _DUMMIES: Final = range(0x0001, 0x0008)
 
 
-def device_lines(description: Description, source: str) -> Iterator[str]:
-    """The mapping, line by line."""
+def device_lines(description: Description, source: str, read_only: str = "") -> Iterator[str]:
+    """The mapping, line by line; ``read_only`` is why nothing is written into the device."""
     device = description.device
     inputs = dict(_signals(description, receives=False))
-    outputs = dict(_signals(description, receives=True))
+    outputs = {} if read_only else dict(_signals(description, receives=True))
     yield f"# Made of {one_line(source)} by `drivebridge family new`. A key behind a # is what the file does"
     yield "# not say: fill it in from the manual, and compare the rest with the device."
     yield f"extends = {string(GENERIC)}"
@@ -41,6 +41,8 @@ def device_lines(description: Description, source: str) -> Iterator[str]:
     yield f"source = {string(source)}"
     profile = _profile(description)
     yield f"profile = {profile}" if profile else "# profile = "
+    if read_only:
+        yield f"read_only = {string(read_only)}"
     yield ""
     yield from identity_lines(description)
     for name, (entry, kind, title) in inputs.items():
@@ -109,19 +111,48 @@ def _profile(description: Description) -> int:
     return (description.number(0x1000) or 0) & 0xFFFF
 
 
-def identity_lines(description: Description) -> Iterator[str]:
-    """1000h and 1018h as far as the file has them; 0 is what a file has that does not say."""
+def wanted_identity(description: Description) -> tuple[int | None, int | None]:
+    """Vendor and product that a node of this file has to have, None where it need not say: what 1018h does
+    not describe the device does not have, whatever stands in [DeviceInfo]. 0 is what a file has that does not
+    say."""
     device = description.device
+    vendor, product = (
+        (description.number(0x1018, sub) or other or None) if description.entry(0x1018, sub) else None
+        for sub, other in ((1, device.vendor_id), (2, device.product_code))
+    )
+    return vendor, product
+
+
+def is_of(description: Description, vendor: int | None, product: int | None) -> bool:
+    """Whether a node with this vendor and product is the device; None is what it does not say. A device whose
+    numbers are 0 cannot be told from others."""
+    device = description.device
+    own = description.number(0x1018, 1) or device.vendor_id
+    wanted = description.number(0x1018, 2) or device.product_code
+    if not own or own != vendor:
+        return False
+    if product is None:
+        return description.entry(0x1018, 1) is not None and description.entry(0x1018, 2) is None
+    return bool(wanted) and wanted == product
+
+
+def identity_lines(description: Description) -> Iterator[str]:
+    """1000h and 1018h as far as the file has them."""
+    device = description.device
+    vendor, product = wanted_identity(description)
     facts = (
-        ("vendor_id", description.number(0x1018, 1), device.vendor_id),
-        ("product_code", description.number(0x1018, 2), device.product_code),
+        ("vendor_id", 1, vendor, device.vendor_id),
+        ("product_code", 2, product, device.product_code),
     )
     yield "[identity]"
-    for key, counts, other in facts:
-        if counts and other and counts != other:
+    if not (vendor or product or device.vendor_id or device.product_code):
+        yield "# The file has neither vendor nor product (0/0): any node is taken for this device."
+    for key, sub, wanted, other in facts:
+        if wanted and other and wanted != other:
             yield f"# The file contradicts itself: [DeviceInfo] has {key} {word(other, 4)}, 1018h counts."
-        number = counts or other
-        yield f"{key} = {word(number, 4)}" if number else f"# {key} = 0x"
+        if other and not wanted:
+            yield f"# [DeviceInfo] has {key} {word(other, 4)}, and the device no 1018h:{sub:02X} to compare."
+        yield f"{key} = {word(wanted, 4)}" if wanted else f"# {key} = 0x"
     revision = description.number(0x1018, 3) or device.revision
     # Another firmware is the same device.
     yield f"# revision = {word(revision, 8)}" if revision else "# revision = 0x"

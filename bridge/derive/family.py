@@ -42,6 +42,8 @@ _VALUE_TYPES: Final = {
     DataType.REAL32: "real32",
 }
 """The types of values in words; a signed byte fills its word with its sign (``signed`` of the PDO)."""
+_HAVE_OWN_WORDS: Final = (408,)
+"""Profiles with a control and a status word of their own at 6040h and 6041h."""
 _INTERPOLATION: Final = 0x60C2
 _CYCLIC: Final = (8, 9)
 
@@ -49,11 +51,12 @@ _CYCLIC: Final = (8, 9)
 @dataclass(frozen=True, slots=True)
 class Derived:
     """``name`` is what the mapping may be called, such as ``acme/spin-3000``; ``base`` is the mapping that it
-    extends, ``text`` is the file."""
+    extends, ``text`` is the file. ``read_only`` is why nothing is written into the device; mostly empty."""
 
     name: str
     base: str
     text: str
+    read_only: str = ""
 
     @property
     def is_drive(self) -> bool:
@@ -67,9 +70,10 @@ def derive_family(description: Description, source: str, mode: str | None = None
 
     Raises ``OperationFailed`` for a drive that has not that mode, or of which half is missing.
     """
-    if not is_drive(description) and mode is None and not _claims_drive(description):
-        text = "\n".join(device_lines(description, source))
-        return Derived(_name(description, source), GENERIC, text)
+    if not is_drive(description) and mode is None and not _is_half_a_drive(description):
+        read_only = _why_read_only(description)
+        text = "\n".join(device_lines(description, source, read_only))
+        return Derived(_name(description, source), GENERIC, text, read_only)
     if not is_drive(description):
         raise OperationFailed(
             f"{source} describes no drive that follows CiA 402 ({_why_not(description)}): its mapping has to "
@@ -92,19 +96,37 @@ def derive_family(description: Description, source: str, mode: str | None = None
     raise OperationFailed(f"{source}: the device has not the mode {mode or 'asked for'}; it has {what}")
 
 
-def _claims_drive(description: Description) -> bool:
-    """It says that it is one, or has one of its words."""
-    profile = (description.number(0x1000) or 0) & 0xFFFF
-    words = [
-        word for word in (CONTROL_WORD, STATUS_WORD) if description.entry(word) or _carrier(description, word)
-    ]
-    return profile == PROFILE_402 or bool(words)
+def _is_half_a_drive(description: Description) -> bool:
+    """Its number does not speak against a drive, and it has the control word: who made it can be asked for
+    the rest."""
+    return _profile(description) in (0, PROFILE_402) and _has(description, CONTROL_WORD)
+
+
+def _why_read_only(description: Description) -> str:
+    """Why nothing is written into a device that is no drive; empty where it is one of its own kind. What may
+    be a drive moves by objects that nobody knows, without a control word that would stop it."""
+    profile = _profile(description)
+    if profile in (0, PROFILE_402):
+        seems_drive = profile == PROFILE_402 or _has(description, STATUS_WORD)
+    else:
+        words = bits_of(description, CONTROL_WORD), bits_of(description, STATUS_WORD)
+        seems_drive = profile not in _HAVE_OWN_WORDS and words == (16, 16)
+    return f"it seems to be a drive, and does not follow CiA 402: {_why_not(description)}" * seems_drive
+
+
+def _profile(description: Description) -> int:
+    return (description.number(0x1000) or 0) & 0xFFFF
+
+
+def _has(description: Description, word: int) -> bool:
+    """A word of a drive is described, or a PDO carries it."""
+    return description.entry(word) is not None or bool(_carrier(description, word))
 
 
 def _why_not(description: Description) -> str:
     """What is there instead of a drive, and what would be one."""
     device_type = description.entry(0x1000)
-    profile = (description.number(0x1000) or 0) & 0xFFFF
+    profile = _profile(description)
     if device_type and profile and profile != PROFILE_402:
         return f"1000h in line {device_type.line} has the profile {profile}, not {PROFILE_402}"
     wrong = [word for word in (CONTROL_WORD, STATUS_WORD) if bits_of(description, word) != 16]

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.derive.toml import one_line, string, value
+from bridge.derive.toml import ascii_words, one_line, string, value
 from bridge.mapping import Family
 
 _PORT: Final = 1502
@@ -108,8 +108,7 @@ def _node(node: ProposedNode, name: str, family: Family | None) -> Iterator[str]
 
 def _name(node: ProposedNode) -> str:
     """A name in lower_snake_case, of what the device calls itself."""
-    text = "".join(one if one.isascii() and one.isalnum() else " " for one in node.device_name.lower())
-    words = "_".join(text.split())[:24].strip("_")
+    words = "_".join(ascii_words(node.device_name))[:24].strip("_")
     if not words or not words[0].isalpha():
         words = f"node_{words}".strip("_")
     return words if words != "node" else f"node_{node.id}"

@@ -4,9 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+import unicodedata
 from collections.abc import Sequence
+from typing import Final
 
 from bridge.canopen.datatypes import Plain
+
+_LETTERS: Final = {
+    "ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "æ": "ae", "œ": "oe", "ø": "oe", "å": "aa", "đ": "d",
+    "ł": "l", "ı": "i",
+}  # fmt: skip
+"""How letters are written that no accent makes of others, or that a tongue writes as two."""
 
 
 def one_line(text: str) -> str:
@@ -47,5 +55,13 @@ def word(number: int, digits: int = 4) -> str:
 
 def file_name(text: str) -> str:
     """``text`` as part of a mapping's name: lower case, words joined by hyphens."""
-    letters = "".join(one if one.isascii() and one.isalnum() else " " for one in text.lower())
-    return "-".join(letters.split())
+    return "-".join(ascii_words(text))
+
+
+def ascii_words(text: str) -> list[str]:
+    """The words of ``text`` in lower case and in ASCII: ü becomes ue, é becomes e."""
+    # One character for a letter with its dots, so that it is found; then the other accents by themselves.
+    composed = unicodedata.normalize("NFC", text.lower())
+    written = unicodedata.normalize("NFD", "".join(_LETTERS.get(one, one) for one in composed))
+    plain = (one for one in written if not unicodedata.combining(one))
+    return "".join(one if one.isascii() and one.isalnum() else " " for one in plain).split()

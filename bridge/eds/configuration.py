@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, TypeGuard
 
 from bridge.canopen.sdo import COMMANDS
 from bridge.config.download import Download
-from bridge.eds.model import Description, Entry, Report
+from bridge.eds.model import Description, Entry, Plain, Report
 from bridge.eds.values import BadValue, encode
 
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _MAPPINGS: Final = (range(0x1600, 0x1800), range(0x1A00, 0x1C00))
+_EMCY_ID: Final = (0x1014, 0)
+_COB_IDS: Final = (
+    (range(0x1200, 0x1300), (1, 2)),
+    (range(0x1400, 0x1600), (1,)),
+    (range(0x1800, 0x1A00), (1,)),
+)
+"""Where a node has identifiers that may be made of its number: of SDO and PDOs (CiA 301 §7.5.2.33 … 37)."""
+_NODE_BITS: Final = 0x7F
 
 
 def configuration(
@@ -20,14 +28,17 @@ def configuration(
     communication objects; sub 0 of a mapping last. Only entries that can be written, have a ParameterValue
     and differ from their default. The boot-up switches PDOs off before and on after it (CiA 301 §7.5.2.36).
 
-    ``node_id`` replaces $NODEID; by default it is that of the file. What cannot be encoded is reported.
+    ``node_id`` replaces $NODEID; by default it is that of the file. What cannot be encoded is reported, and
+    so is an identifier of another node that the file was made for. What is its default stays the default.
     """
+    own = description.commissioning.node_id
     if node_id is None:
-        node_id = description.commissioning.node_id
+        node_id = own
+    other = None if own == node_id else own
     found: list[Download] = []
     for one in description.objects:
         for entry in one.entries:
-            data = _data(entry, node_id, report or Report())
+            data = _data(entry, node_id, report or Report(), other)
             if data is not None:
                 found.append(Download(entry.index, entry.sub, data, entry.access.readable))
     return tuple(sorted(found, key=_order))
@@ -39,7 +50,8 @@ def _order(download: Download) -> tuple[bool, int, int]:
     return (download.index in _COMMUNICATION, download.index, 0x100 if last else download.sub)
 
 
-def _data(entry: Entry, node_id: int | None, report: Report) -> bytes | None:
+def _data(entry: Entry, node_id: int | None, report: Report, other: int | None) -> bytes | None:
+    """``other`` is the node that the file was made for, where that is not the one it is for now."""
     value = entry.parameter_value
     if value is None or value == entry.default or not entry.access.writable:
         return None
@@ -55,8 +67,26 @@ def _data(entry: Entry, node_id: int | None, report: Report) -> bytes | None:
         return None
     if entry.default and entry.default.at(node_id) == plain:
         return None
+    if other is not None and not value.plus_node_id:
+        if entry.default and entry.default.plus_node_id and entry.default.at(other) == plain:
+            return None
+        if _is_identifier_of(other, entry, plain):
+            report.error(
+                entry.line,
+                f"{where} = {plain:X}h is an identifier of node {other}, which the file was made for, and "
+                f"not of node {node_id}: it takes a file of node {node_id}, or $NODEID in its place",
+            )
+            return None
     try:
         return encode(plain, entry.data_type)
     except BadValue as error:
         report.error(entry.line, f"{where}: {error}: not configured")
         return None
+
+
+def _is_identifier_of(node_id: int, entry: Entry, plain: Plain) -> TypeGuard[int]:
+    """Whether the entry holds a COB-ID that ends with the number of the node."""
+    holds_one = (entry.index, entry.sub) == _EMCY_ID or any(
+        entry.index in indices and entry.sub in subs for indices, subs in _COB_IDS
+    )
+    return holds_one and isinstance(plain, int) and plain & _NODE_BITS == node_id

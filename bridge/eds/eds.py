@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Final
 
 from bridge.eds.fields import Fields
-from bridge.eds.ini import Section, read_sections, shown, stripped
+from bridge.eds.ini import SPELLING, Section, read_sections, shown, stripped
 from bridge.eds.model import Commissioning, Description, Device, Object, Report
 from bridge.eds.objects import ObjectReader
 from bridge.eds.pdos import add_compact_pdos
@@ -15,6 +16,8 @@ from bridge.eds.text import lines
 _INDEX: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})")
 _SUB: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})sub(?:0x)?([0-9a-f]{1,2})")
 _TABLE: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})(name|value)")
+_OF_OBJECT: Final = re.compile(r"(?:0x)?[0-9a-f]{1,4}(?:sub|name|value|denotation|objectlinks|$)")
+"""Names of the sections that an object has."""
 _FIRST_OBJECT: Final = 0x1000
 """Lower indices are data types, not objects of the device."""
 _LISTS: Final = ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")
@@ -29,8 +32,7 @@ def read_eds(text: str, report: Report) -> Description:
     sections = read_sections(all_lines, report)
     reader = _EdsReader(sections, report)
     objects = reader.objects()
-    last = stripped(all_lines[-1])
-    if last and (lost := reader.lost(last)):
+    if stripped(all_lines[-1]) and (lost := reader.lost(all_lines)):
         report.breaks_off(len(all_lines), f"it ends within a line, and {lost}")
     commissioning = reader.commissioning()
     return Description(
@@ -44,6 +46,19 @@ def read_eds(text: str, report: Report) -> Description:
 def _index(text: str) -> int | None:
     match = _INDEX.fullmatch(text.lower())
     return int(match[1], 16) if match else None
+
+
+def _is_end(all_lines: Sequence[str]) -> bool:
+    """Whether the last line may well be the end of the file: other sections end in the same, or no object
+    is described there."""
+    before, name, ends = "", "", set[str]()
+    for line in map(stripped, all_lines):
+        if line.startswith("["):
+            ends.add(before)
+            name = re.sub(r"\s+", "", line[1:].partition("]")[0]).lower()
+        before = line if line and line[0] not in ";#" else before
+    is_of_objects = _OF_OBJECT.match(name) is not None or name in (one.lower() for one in _LISTS)
+    return before in ends or not is_of_objects
 
 
 class _EdsReader:
@@ -65,10 +80,16 @@ class _EdsReader:
             elif match := _TABLE.fullmatch(key):
                 self._tables[int(match[1], 16), match[2]] = section
 
-    def lost(self, last: str) -> str:
-        """What shows that a file that ends within the line ``last`` went on; empty where nothing does."""
-        if "=" not in last and not last.startswith(("[", ";", "#")):
+    def lost(self, all_lines: Sequence[str]) -> str:
+        """What shows that a file whose last line has no end went on; empty where nothing does: editors leave
+        that end out."""
+        last = stripped(all_lines[-1])
+        if last.startswith("[") and "]" not in last:
+            return f"{shown(last)} has no closing bracket"
+        if "=" not in last and not last.startswith(("[", ";", "#")) and self._begins_key(last):
             return f"{shown(last)} is no key with a value"
+        if _is_end(all_lines):
+            return ""
         for name in _LISTS:
             section = self._sections.get(name.lower())
             listed = [_index(text.text) for _, text in section.numbered()] if section else []
@@ -76,6 +97,12 @@ class _EdsReader:
             if index is not None and index not in self._roots:
                 return f"{index:04X}h, the last of [{name}], is not described"
         return ""
+
+    def _begins_key(self, text: str) -> bool:
+        """Whether it is how a key begins, and no remark."""
+        begin = text.lower()
+        keys = (key for section in self._sections.values() for key in section.keys)
+        return begin.isdigit() or any(key.startswith(begin) for key in (*keys, *SPELLING))
 
     def _once(self, place: dict[int, Section], number: int, section: Section) -> None:
         """[1018sub1] and [1018sub01] are the same entry."""

@@ -9,7 +9,7 @@ from typing import Final
 
 from bridge.eds.model import Report
 
-_SPELLING: Final = {
+SPELLING: Final = {
     name.lower(): name
     for name in (
         *("ParameterName", "ObjectType", "DataType", "AccessType", "DefaultValue", "PDOMapping"),
@@ -77,7 +77,7 @@ class _Reader:
             self._report.warning(
                 number,
                 f"{count} key{'s are' if count > 1 else ' is'} not spelt as CiA 306 has it, "
-                f"such as {key}: taken as {_SPELLING[key.lower()]}",
+                f"such as {key}: taken as {SPELLING[key.lower()]}",
             )
         return self._sections
 
@@ -113,7 +113,7 @@ class _Reader:
 
     def _assign(self, section: Section, key: str, value: str, number: int) -> None:
         name = key.lower()
-        if name in _SPELLING and key != _SPELLING[name]:
+        if name in SPELLING and key != SPELLING[name]:
             self._other_spelling.append((number, key))
         first = section.keys.get(name)
         if first and first.text:

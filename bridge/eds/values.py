@@ -107,13 +107,15 @@ def encode(plain: int | float | str | bytes, data_type: DataType) -> bytes:
     """A value as an SDO transfers it. Raises BadValue if it does not fit its type."""
     if isinstance(plain, bytes):
         return plain
-    if isinstance(plain, str):
-        return plain.encode("utf-16-le" if data_type is DataType.UNICODE_STRING else "latin-1", "replace")
     try:
+        if isinstance(plain, str):
+            return plain.encode("utf-16-le" if data_type is DataType.UNICODE_STRING else "latin-1")
         if data_type in _REALS:
             return _REALS[data_type].encode(plain)
         if data_type in _INTEGERS and isinstance(plain, int):
             return _INTEGERS[data_type].encode(plain)
+    except UnicodeEncodeError:
+        raise BadValue(f"{shown(str(plain))} has characters beyond ISO 8859-1") from None
     except ValueError:
         raise BadValue(f"{plain} is beyond {data_type.name}") from None
     raise BadValue(f"{plain} is no {data_type.name}")

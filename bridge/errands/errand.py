@@ -14,7 +14,14 @@ NOTHING_KNOWN: Final[Mapping[int, str]] = MappingProxyType({})
 
 
 class Errand(ABC):
-    """Times are monotonic seconds. What is to be sent is put into ``_frames``."""
+    """Times are monotonic seconds. What is to be sent is put into ``_frames``.
+
+    Whoever runs it counts the frames: ``sent`` are all that it has given, ``unsent`` those that the bus did
+    not take in time.
+    """
+
+    sent: int = 0
+    unsent: int = 0
 
     def __init__(self) -> None:
         self._frames: list[Frame] = []

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.canopen import cobid, nmt, width
-from bridge.canopen.datatypes import text
+from bridge.canopen.datatypes import readable
 from bridge.canopen.dialogue import Dialogue, Read, ask, attempt
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
@@ -95,7 +95,7 @@ def _interview(node: FoundNode) -> Interview:
         setattr(node, name, _number(answer))
     answer = yield from attempt(0x1008)
     if isinstance(answer, bytes):
-        node.name = text(answer).strip()
+        node.name = readable(answer).strip()
     node.first_channel = _number((yield from attempt(0x1200, 1)))
     node.emcy_id = _number((yield from attempt(0x1014)))
     for index in _OTHER_CHANNELS:

@@ -17,7 +17,7 @@ from bridge.lint.interface import check_interface
 from bridge.lint.intruder import Exposure, exposure
 from bridge.lint.load import BusLoad, check_load
 from bridge.lint.moving import check_moving
-from bridge.lint.outputs import check_outputs, output_cases
+from bridge.lint.outputs import check_outputs, check_read_only, output_cases
 from bridge.lint.own import WorstCase, check_own_supervision, worst_cases
 from bridge.lint.pdos import check_pdos
 from bridge.lint.report import LintFinding, LintReport, Severity
@@ -91,6 +91,7 @@ def lint(
         check_own_supervision(bus, report)
         check_contradictions(bus, report)
         check_outputs(bus, report)
+        check_read_only(bus, report)
         check_moving(bus, report)
         check_cable(bus, report)
         cases += [*worst_cases(bus), *output_cases(bus)]

@@ -55,6 +55,13 @@ def check_outputs(bus: BusView, report: LintReport) -> None:
             )
 
 
+def check_read_only(bus: BusView, report: LintReport) -> None:
+    """Nodes that somebody may take for drives, and that nobody can command."""
+    for node in bus.nodes:
+        if why := node.family.family.read_only:
+            report.warning((*node.key, "mapping"), f"{node.table.name} is only read: {why}")
+
+
 def judged_outputs(bus: BusView, node: NodeView) -> OwnJudgement:
     """What the node does with its outputs by itself, by site file and factory settings."""
     raw = {**_factory(node), **offline(node.family, node.settings.values, bus.table, node.table, None)}

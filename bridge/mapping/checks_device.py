@@ -28,12 +28,18 @@ def check_kind(family: Family, file: MergedFile) -> None:
                 file.fault(
                     (key,), "is missing", "a family of drives has it; a device without [[slot]] has not"
                 )
+        if family.family.read_only:
+            file.fault(
+                ("family", "read_only"), "is of a device without drives", 'control = "none" of the site'
+            )
         for key in ("input", "output"):
             if key in file.data:
                 file.fault(
                     (key,), "has no effect beside [[slot]]", "what drives take and tell is in [[value]]"
                 )
         return
+    if family.family.read_only and family.output:
+        file.fault(("family", "read_only"), "is of a device without outputs", "leave out [[output]]")
     for key in _OF_DRIVES:
         if key in file.data:
             file.fault((key,), "has no effect without a [[slot]]", "it is of drives")

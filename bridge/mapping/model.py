@@ -39,6 +39,11 @@ class FamilyTable(Table):
         description="number of the device profile, such as 401: what its objects do when they are written. "
         "Left out: 402 for drives, elsewhere what `device_type` says; else an object is protected as in any",
     )
+    read_only: str = Field(
+        "",
+        description="why the bridge writes nothing into such a device, neither outputs nor parameters: what "
+        "`check` says of it and a refused write is told. Left out: it is written like any other",
+    )
     template: bool = Field(False, description="true: it can only be extended, no site can use it")
     preferred: bool = Field(
         False, description="true: `scan` names it where other mappings fit equally well; not inherited"

@@ -9,26 +9,35 @@ from bridge.ratelimit import Pauses
 
 _MANY: Final = 4
 _WITHIN_S: Final = 20.0
+_ROW_GAP_S: Final = 0.2
+"""Some devices say several times that they have started; none starts twice so soon."""
+_LONGEST_ROW_S: Final = 1.0
+"""Beyond that it is no row: the device is reset faster than it can start."""
 _FIRST_PAUSE_S: Final = 2.0
 _LAST_PAUSE_S: Final = 60.0
 
 
 class BootLoop:
-    """Counts the boot-up messages of one node."""
+    """Counts the restarts of one node by its boot-up messages."""
 
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=_MANY)
+        self._last = float("-inf")
         self._pause_s = 0.0
         self._pauses = Pauses()
         self._since_told = 0
 
     def on_boot_up(self, now: float) -> float:
-        """A boot-up message; returns the seconds to wait before the node is booted, 0 if all is well."""
+        """A boot-up message; returns the seconds to wait before the node is booted, 0 if all is well. Those
+        of a row are one restart."""
+        self._since_told += 1
+        gap_s, self._last = now - self._last, now
+        if self._times and gap_s < _ROW_GAP_S and now - self._times[-1] < _LONGEST_ROW_S:
+            return self._pause_s
         if self._times and now - self._times[-1] > max(_WITHIN_S, 2 * self._pause_s):
             self._pause_s = 0.0
             self._times.clear()
         self._times.append(now)
-        self._since_told += 1
         if len(self._times) < _MANY or now - self._times[0] > max(_WITHIN_S, _MANY * self._pause_s):
             return self._pause_s
         self._times.clear()

@@ -52,6 +52,7 @@ class Protection:
         rule = family.parameter_names
         self._is_device = family.is_device
         self._profile = _profile_of(family)
+        self._read_only = family.family.read_only
         self._commands = [indices(one) for one in rule.protected] if rule else []
         self._own = {place.ref.index for place in places(family, link=True)}
         self._names_objects = rule is None or (rule.hexadecimal and not rule.index)
@@ -89,7 +90,8 @@ class Protection:
         protected like it."""
         index = address.index
         if (
-            address in self._process
+            self._read_only
+            or address in self._process
             or index in self._outputs
             or any(index in span for span in self._commands)
         ):
@@ -135,6 +137,8 @@ class Protection:
     def why_never(self, entry: Entry) -> str:
         """Why nobody writes it as a parameter; empty where somebody may."""
         address, effect = entry.address, self.effect(entry.address)
+        if self._read_only:
+            return f"{entry.name} is not written, the device is only read: {self._read_only}"
         where = "belongs to the communication that the bridge supervises: set it in the site file"
         if effect is Effect.BUS and (objects := self.stands_for(address)):
             names = ", ".join(str(ref) for ref in objects)

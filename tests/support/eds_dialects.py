@@ -240,12 +240,43 @@ def no_values(text: str, chance: Random) -> bytes:
     return _keys(text, change).encode()
 
 
+def no_last_line_end(text: str, chance: Random) -> bytes:
+    """The last line has no end, or is a remark of a kind that CiA 306 does not have."""
+    return (text.rstrip() + chance.choice(("", "\n// end", "\n-- end --", "\n*** EOF ***"))).encode()
+
+
+def joined_encodings(text: str, chance: Random) -> bytes:
+    """Lines in UTF-8 among lines in Windows-1252, as of two files that were joined."""
+    encodings = ("utf-8", "cp1252")
+
+    def change(section: str, key: str, value: str) -> str:
+        return f"{key}={value} Größe" if key.lower() == "parametername" else f"{key}={value}"
+
+    lines = _keys(text, change).splitlines()
+    return b"\n".join(line.encode(chance.choice(encodings), "replace") for line in lines) + b"\n"
+
+
+def vendor_alone(text: str, chance: Random) -> bytes:
+    """1018h has the vendor alone, and [DeviceInfo] a product number all the same."""
+    del chance
+    further = ("1018sub2", "1018sub3", "1018sub4")
+    parts = [part for part in sections(text) if part[0].lower() not in further]
+    for name, lines in parts:
+        if name.lower() == "deviceinfo":
+            lines[:] = [line for line in lines if not line.lower().startswith("productnumber")]
+            lines.append("ProductNumber=1")
+        elif name.lower() == "1018":
+            lines[:] = [line for line in lines if not line.lower().startswith("subnumber")]
+            lines.append("SubNumber=2")
+    return joined(parts).encode()
+
+
 DIALECTS: Final[dict[str, Dialect]] = {
     one.__name__: one
     for one in (
         cp1252, byte_order_mark, lower_case, line_ends, spaces, duplicate_keys, duplicate_sections,
         missing_keys, no_types, node_id_forms, no_sub_0, wrong_counts, compact, noise, shuffled, odd_numbers,
-        no_values,
+        no_values, no_last_line_end, joined_encodings, vendor_alone,
     )
 }  # fmt: skip
 

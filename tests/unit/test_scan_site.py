@@ -25,7 +25,7 @@ from bridge.sim.device import SimulatedDevice
 from bridge.sim.generic_eds import plan_of_description
 from bridge.sim.generic_node import GenericNode
 from tests.support.devices import DEVICES
-from tests.support.invented_eds import BASIC, SPIN, U8, U16, U32, described, eds, var
+from tests.support.invented_eds import BASIC, SPIN, U8, U16, U32, described, eds, identity, var
 
 BUS = BusTable.model_validate({"name": "can0", "interface": "virtual", "bitrate": 500_000})
 FAMILIES = {name: load_family(name) for name in family_names()}
@@ -110,6 +110,18 @@ def test_half_an_eds_says_why_it_does_not_help(tmp_path: Path) -> None:
     (node,) = load_project(tmp_path / "hall.toml").site.bus[0].node
     assert node.mapping.startswith("cia402/")
     assert not (tmp_path / "mappings").exists()
+
+
+def test_a_node_that_says_nobody_and_nothing_is_told_why_no_file_is_its(tmp_path: Path) -> None:
+    folder = tmp_path / "eds"
+    folder.mkdir()
+    (folder / "spin.eds").write_bytes(eds())
+    nobody = {**SPIN, **identity("0", "0")}
+    written(tmp_path, scanned(GenericNode(3, plan_of_description(described(nobody), 3))), folder)
+    text = (tmp_path / "hall.toml").read_text("utf-8")
+    assert re.search(
+        r"\n# .*it says neither vendor nor product \(0/0\), by which its file would be found\n", text
+    )
 
 
 def test_nodes_that_are_no_drives_name_their_eds_where_it_lies_with_the_site(tmp_path: Path) -> None:

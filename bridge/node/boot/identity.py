@@ -114,7 +114,7 @@ def _text(
     """A text of the node, in which the regular expression ``wanted``, if there is one, has to be found."""
     yield Step("reading name and version", letter, needed_by="" if wanted is None else key)
     data = yield from (wish(result, index) if wanted is None else optional(index))
-    text = datatypes.text((data or b"")[:_LONGEST_TEXT]).strip()
+    text = datatypes.readable((data or b"")[:_LONGEST_TEXT]).strip()
     if wanted is not None and not re.search(wanted, text, re.IGNORECASE):
         found = f"the node has no {index:04X}h" if data is None else f"{index:04X}h is {text!r}"
         raise BootError(letter, f"{found}, expected {wanted!r} by the site file")

@@ -10,7 +10,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Integer, Plain, TypeName, decode, encode, text
+from bridge.canopen.datatypes import (
+    INTEGERS,
+    NUMBERS,
+    REALS,
+    Integer,
+    Plain,
+    TypeName,
+    decode,
+    encode,
+    readable,
+    text,
+)
 
 CODES = {
     "bool": "?", "int8": "b", "int16": "h", "int32": "i", "int64": "q",
@@ -113,6 +124,32 @@ def test_examples() -> None:
 def test_a_text_ends_with_its_first_zero(data: bytes) -> None:
     assert text(data).encode("latin-1") == data.partition(b"\0")[0]
     assert decode("string", data) == text(data)
+
+
+@pytest.mark.parametrize(
+    ("data", "shown"),
+    [
+        (b"SK TU4-CAO\0\0", "SK TU4-CAO"),
+        ("Förderband".encode(), "Förderband"),
+        ("Förderband".encode("latin-1"), "Förderband"),
+        ("Förderband Süd".encode()[:-2], "Förderband S"),
+        ("GR\u00c4".encode("latin-1"), "GR\u00c4"),
+        ("5 \u00b5m \u03a9".encode(), "5 \u00b5m \u03a9"),
+        (b"", ""),
+    ],
+)
+def test_a_text_is_shown_in_the_encoding_that_it_is_in(data: bytes, shown: str) -> None:
+    assert readable(data) == shown
+
+
+@given(st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"])))
+def test_a_text_in_utf_8_is_shown_as_it_is(text: str) -> None:
+    assert readable(text.encode()) == text
+
+
+@given(st.binary())
+def test_any_bytes_can_be_shown(data: bytes) -> None:
+    assert "\0" not in readable(data)
 
 
 @given(st.integers(1, 8), st.booleans(), st.data())

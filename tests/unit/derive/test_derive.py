@@ -17,7 +17,6 @@ from bridge.parameter import Names, ObjectRef
 from bridge.parameter.effect import Effect
 from tests.support.bench import PLC
 from tests.support.invented_eds import (
-    BASIC,
     FIXED,
     I8,
     I32,
@@ -160,11 +159,6 @@ def test_another_mode_can_be_asked_for(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("sections", "message"),
     [
-        (
-            {**SPIN, "1000": var("device type", U32, "ro", "0x191")},
-            "1000h in line [0-9]+ has the profile 401, not 402",
-        ),
-        (BASIC, "6040h and 6041h are not described"),
         (
             without("6041"),
             "6041h is not described, though 1A00h:01 in line [0-9]+ maps it: it is a UNSIGNED16",

@@ -148,3 +148,64 @@ def test_a_bad_line_of_a_configuration_file_is_named(tmp_path: Path) -> None:
         load_project(tmp_path / "site.toml")
     [fault] = caught.value.faults
     assert (Path(fault.file).name, fault.line) == ("conveyor.dcf", 8)
+
+
+def of_another_node(*entries: tuple[str, str, str]) -> str:
+    """A DCF of node 20h; of each entry the section, the default and the value."""
+    text = "[DeviceComissioning]\nNodeID=0x20\n"
+    for section, default, value in entries:
+        text += f"[{section}]\nParameterName=x\nDataType=7\nAccessType=rw\n"
+        text += f"DefaultValue={default}\nParameterValue={value}\n"
+    return text
+
+
+@pytest.mark.parametrize(
+    ("section", "value"),
+    [
+        ("1014", "0xA0"),
+        ("1200sub1", "0x620"),
+        ("1201sub2", "0x5A0"),
+        ("1400sub1", "0x220"),
+        ("15FFsub1", "0x40000520"),
+        ("1800sub1", "0x800001A0"),
+    ],
+)
+def test_an_identifier_of_another_node_is_refused_by_name(tmp_path: Path, section: str, value: str) -> None:
+    file = tmp_path / "a.dcf"
+    file.write_text(of_another_node((section, "", value)))
+    assert len(shown(file)) == len(shown(file, 0x20)) == 1
+    with pytest.raises(FileFaults) as caught:
+        read_configuration(file, 10)
+    [fault] = caught.value.faults
+    assert fault.line == 3
+    assert f"= {int(value, 16):X}h is an identifier of node 32" in fault.message
+    assert "not of node 10" in fault.message
+
+
+@pytest.mark.parametrize(
+    ("section", "default", "value", "downloads"),
+    [
+        pytest.param("1400sub1", "$NODEID+0x200", "0x220", [], id="its default there"),
+        pytest.param("2001", "$NODEID", "0x20", [], id="the number itself"),
+        pytest.param("1400sub1", "", "$NODEID+0x200", ["1400h:01=0a020000"], id="any node"),
+        pytest.param("1400sub1", "", "0x18A", ["1400h:01=8a010000"], id="what node 10 sends"),
+        pytest.param("1400sub2", "", "0x20", ["1400h:02=20000000"], id="no identifier"),
+        pytest.param("2001", "", "0x220", ["2001h:00=20020000"], id="a number of the maker"),
+    ],
+)
+def test_what_does_not_tell_the_nodes_apart_is_taken(
+    tmp_path: Path, section: str, default: str, value: str, downloads: list[str]
+) -> None:
+    file = tmp_path / "a.dcf"
+    file.write_text(of_another_node((section, default, value)))
+    assert shown(file, 10) == downloads
+
+
+def test_a_text_that_no_device_can_hold_is_refused_and_not_replaced(tmp_path: Path) -> None:
+    file = tmp_path / "a.dcf"
+    text = "[2003]\nParameterName=Label\nDataType=9\nAccessType=rw\nParameterValue={}\n"
+    file.write_text(text.format("Lüfter µ"), encoding="utf-8")
+    assert shown(file) == [f"2003h:00={'Lüfter µ'.encode('latin-1').hex()}"]
+    file.write_text(text.format("10 kΩ"), encoding="utf-8")
+    with pytest.raises(FileFaults, match="beyond ISO 8859-1"):
+        read_configuration(file)

@@ -73,10 +73,16 @@ def _drive(one: DropOutcome) -> dict[str, Any]:
     return {
         "drive": one.drive,
         "settings": [
-            {"watches": watch.watches, "setting": watch.setting, "reaction": watch.reaction}
+            {
+                "watches": watch.watches,
+                "setting": watch.setting,
+                "time_ms": watch.time_ms,
+                "reaction": watch.reaction,
+            }
             for watch in one.own.watches
         ],
         "own_ms": one.own_ms,
+        "own": one.own_text,
         "bound_ms": one.bound_ms,
         "worst_case_bridge_ms": one.own.bridge_ms,
         "reacted_ms": one.reacted_ms,
@@ -138,7 +144,7 @@ def _drive_lines(drive: dict[str, Any]) -> Iterator[str]:
     for setting in drive["settings"]:
         reaction = f", {setting['reaction']}" if setting["reaction"] else ""
         yield f"| setting read | {setting['setting']}{reaction} |"
-    yield f"| own time-out | {drive['own_ms']:g} ms |"
+    yield f"| own time-out | {drive['own']} |"
     yield f"| bound from the last frame | {_ms(drive['bound_ms'] or None)} |"
     yield f"| reaction after the last frame | {_ms(drive['reacted_ms'])} |"
     yield f"| node left Operational after | {_ms(drive['noticed_ms'])} |"

@@ -182,6 +182,8 @@ def _carry_out(project: Project, site: Site, families: dict[str, Family], plant:
             if test.phase not in (told[0], Phase.DONE):
                 told[0] = test.phase
                 long = f" for {test.silent_s:g} s" if test.phase is Phase.SILENT else ""
+                for outcome in test.outcomes if test.phase is Phase.SILENT else ():
+                    tell(f"{outcome.drive}: own time-out {outcome.own_text}")
                 tell(f"{node.name}: {test.phase}{long}")
 
         master = Master([(bus, network)], plant, clock.now, on_round)

@@ -219,11 +219,14 @@ def _facts(restored: backups.Restored) -> dict[str, Any]:
 
 
 def _save(target: Target, done: Exchange) -> None:
-    """Have the node keep what was written, where its family has a command for that."""
-    eeprom = target.family.eeprom
-    if eeprom is None or not eeprom.can_save or not done.is_unsaved:
+    """Have the node keep what was written; one that has no command for that may keep it by itself."""
+    if not done.is_unsaved:
         return
     # Written is written: only a drive that is known to be enabled does not save it now.
-    gate = target.alone(force=True).gate
-    warning = target.run(lambda now: target.access.save(now, gate), writes=True)
-    done.saved(warning)
+    saved = target.save(target.alone(force=True).gate)
+    if saved.why_not:
+        lack = f"not saved: {saved.why_not}; switch it off and on, and compare it with the backup"
+        tell(f"{target.node.name}: {lack}")
+        done.saved(lack)
+        return
+    done.saved(saved.warning)

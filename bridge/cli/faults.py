@@ -14,7 +14,7 @@ import typer
 from bridge.cli.parameter_drive import find
 from bridge.cli.terminal import printable
 from bridge.drive import FaultWords
-from bridge.drive.fault_words import Explained, Language, listed_faults
+from bridge.drive.fault_words import Explained, Language, emergency_codes, listed_faults
 from bridge.errands.fault_memory import fault_memory
 from bridge.errors import OperationFailed
 from bridge.mapping import load_family
@@ -52,7 +52,7 @@ def faults(
             )
         _show_memory(Path(site), drive, tongue, as_json=as_json)
         return
-    found = {name: _matching(family, fault, tongue) for name, family in _families(site).items()}
+    found = {name: matching(family, fault, tongue) for name, family in _families(site).items()}
     if fault and not any(found.values()):
         raise OperationFailed(f"{', '.join(found)}: no fault {fault!r}")
     if as_json:
@@ -95,11 +95,14 @@ def _families(site: str) -> dict[str, Family]:
     return load_project(Path(site)).families
 
 
-def _matching(family: Family, wanted: str, language: Language) -> list[Explained]:
-    """The fault with this number, in any of its forms; else those with ``wanted`` in number or text."""
+def matching(family: Family, wanted: str, language: Language) -> list[Explained]:
+    """The fault with this number, in any of its forms, or the emergency code; else those with ``wanted`` in
+    number or text."""
     words = FaultWords(family, language)
     every = {name: words.listed(name) for name in listed_faults(family)}
-    exact = [one for name, one in every.items() if wanted and _is_number(wanted, name, one.number)]
+    # Codes for which the drive has numbers of its own are not listed twice.
+    codes = {name: words.listed(name) for name in emergency_codes(family)}
+    exact = [one for name, one in (codes | every).items() if wanted and _is_number(wanted, name, one.number)]
     part = wanted.lower()
     return exact or [one for one in every.values() if part in one.number.lower() or part in one.text.lower()]
 
@@ -107,5 +110,7 @@ def _matching(family: Family, wanted: str, language: Language) -> list[Explained
 def _is_number(wanted: str, name: str, number: str) -> bool:
     """``number`` may have x for digits that depend on how the drive is set."""
     asked = wanted.lower()
+    if name.endswith("h"):
+        return asked.removeprefix("0x").removesuffix("h") == name.lower().removesuffix("h")
     pattern = re.escape(number.lower()).replace("x", "[x0-9]")
     return asked in (name.lower(), number.lower().rpartition("/")[2]) or bool(re.fullmatch(pattern, asked))

@@ -20,8 +20,9 @@ from bridge.errands.parameter import ParameterErrand
 from bridge.errors import OperationFailed
 from bridge.mapping.model import Family, Slot
 from bridge.node.parameters.run import Procedure
-from bridge.parameter import DriveParameters, Entry, Ledger, Names, ParameterError
+from bridge.parameter import DriveParameters, Entry, Ledger, Names, ParameterError, Why
 from bridge.parameter.ledger_file import LedgerFile
+from bridge.parameter.protection import Gate
 from bridge.project import load_project
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
@@ -39,6 +40,14 @@ Force = Annotated[
 _LISTEN_S: Final = 1.0
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """Outcome of a save: the guard's ``warning``, or ``why_not`` where nothing can be saved on command."""
+
+    warning: str = ""
+    why_not: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +116,16 @@ class Target:
         if isinstance(result, ParameterError):
             raise OperationFailed(f"{self.name}: {result}") from None
         return result
+
+    def save(self, gate: Gate) -> Saved:
+        """Have the node keep its parameters. Raises ``OperationFailed``, but not where it has no command for
+        that: it may keep them by itself."""
+        result = self.attempt(lambda now: self.access.save(now, gate), writes=True)
+        if not isinstance(result, ParameterError):
+            return Saved(warning=result)
+        if result.why is Why.NOT_CONFIGURED:
+            return Saved(why_not=str(result))
+        raise OperationFailed(f"{self.name}: {result}") from None
 
     def attempt(
         self,

@@ -136,10 +136,14 @@ def save(
     if not yes and sys.stdin.isatty() and not typer.confirm(question, err=True):
         raise OperationFailed("nothing saved")
     gate = target.alone(force=force).gate
-    warning = target.run(lambda now: target.access.save(now, gate), writes=True)
-    if warning:
-        tell(f"warning: {warning}")
-    print(json.dumps({"ok": True}) if as_json else f"{target.node.name}: saved")
+    saved = target.save(gate)
+    if saved.warning:
+        tell(f"warning: {saved.warning}")
+    if as_json:
+        print(json.dumps({"ok": True, "saved": not saved.why_not, "message": saved.why_not}))
+    else:
+        told = f"nothing saved: {saved.why_not}" if saved.why_not else "saved"
+        print(f"{target.node.name}: {told}")
 
 
 def _resolve(access: DriveParameters, name: str) -> Entry:

@@ -91,6 +91,7 @@ def _message(
         family.control_word.bits if view.receives else family.status_word.bits,
         default_codecs(family, slot, group, process, drive.table.parameters),
         drive.table.parameters,
+        node.dictionary,
     )
     signals = tuple(found.words() if words else found.values())
     period_s = bus.table.rpdo_period_s if view.receives else view.period_s(bus.sync_s)

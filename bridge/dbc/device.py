@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
+from bridge.dbc.kinds import kind_of
 from bridge.dbc.model import BRIDGE, Message, Signal
+from bridge.eds import Description
 from bridge.eds.pdos import MappedObject, pdos
 from bridge.lint.bus import BusView, NodeView
 from bridge.mapping.device import Signal as DeviceSignal
@@ -18,7 +20,9 @@ def device_messages(bus: BusView, node: NodeView, *, words: bool) -> Iterator[Me
     if node.dictionary is None:
         return
     views = {(view.receives, view.number): view for view in node.pdos}
-    known = {signal.object: signal for signal in node.family.input}
+    family, dictionary = node.family, node.dictionary
+    signals = {True: family.output, False: family.input}
+    known = {receives: {one.object: one for one in listed} for receives, listed in signals.items()}
     name = node.table.name
     for pdo in pdos(node.dictionary, node.table.id):
         view = views.get((pdo.receives, pdo.number))
@@ -31,14 +35,18 @@ def device_messages(bus: BusView, node: NodeView, *, words: bool) -> Iterator[Me
             (sum(one.bits for one in pdo.mapped) + 7) // 8,
             sender,
             (receiver,),
-            tuple(_signals(pdo.mapped, known, words=words)),
+            tuple(_signals(pdo.mapped, known[pdo.receives], dictionary, words=words)),
             f"{pdo.name} of {name}: mapping as the factory has it; the node's own counts",
             0 if pdo.receives else round(1000 * (view.period_s(bus.sync_s) or 0)),
         )
 
 
 def _signals(
-    mapped: Sequence[MappedObject], known: dict[ObjectRef, DeviceSignal], *, words: bool
+    mapped: Sequence[MappedObject],
+    known: Mapping[ObjectRef, DeviceSignal],
+    dictionary: Description,
+    *,
+    words: bool,
 ) -> Iterator[Signal]:
     begin = 0
     for one in mapped:
@@ -49,7 +57,9 @@ def _signals(
         where = f"{one.index:04X}h:{one.sub:02X}"
         if signal is None:
             label = f"object_{one.index:04x}_{one.sub:02x}"
-            yield Signal(label, start, one.bits, comment=f"{where} {one.name}".rstrip())
+            kind = kind_of(dictionary, one.index, one.sub, one.bits)
+            comment = f"{where} {one.name}".rstrip()
+            yield Signal(label, start, one.bits, kind.is_signed, is_float=kind.is_float, comment=comment)
         elif signal.bits and not words:
             for bit, text in enumerate(signal.bits[: one.bits]):
                 bit_name = f"{signal.name}_{text or f'bit_{bit}'}"

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from bridge.canopen.pdo import PdoEntry
 from bridge.dbc.fields import Field, Layout
+from bridge.dbc.kinds import kind_of
 from bridge.dbc.model import Signal
 from bridge.drive import ValueCodec
+from bridge.eds import Description
 from bridge.node.process.words import WORD_BITS
 
 Groups = dict[str, tuple[str, ...]]
@@ -18,7 +21,8 @@ Groups = dict[str, tuple[str, ...]]
 
 class PdoSignals:
     """``process`` are the names of all words of the drive, ``bits`` the names of the bits of its control or
-    status word, ``codecs`` its values with their scales, ``given`` what the site file says of them."""
+    status word, ``codecs`` its values with their scales, ``given`` what the site file says of them,
+    ``dictionary`` the device description, if there is one."""
 
     def __init__(
         self,
@@ -27,12 +31,14 @@ class PdoSignals:
         bits: Sequence[str],
         codecs: Sequence[ValueCodec],
         given: Mapping[str, float],
+        dictionary: Description | None = None,
     ) -> None:
         self._layout = layout
         self._process = process
         self._bits = bits
         self._codecs = codecs
         self._given = given
+        self._dictionary = dictionary
         self._taken: set[int] = set()
         self.groups: Groups = {}
 
@@ -160,13 +166,16 @@ class PdoSignals:
         ]
 
     def _others(self) -> list[Signal]:
-        return [
-            Signal(
-                f"object_{entry.index:04x}_{entry.sub:02x}",
-                field.start,
-                field.length,
-                field.is_signed,
-                comment=f"{entry.index:04X}h:{entry.sub:02X}, no word that the mapping file knows",
-            )
-            for entry, field in self._layout.others
-        ]
+        return [self._other(entry, field) for entry, field in self._layout.others]
+
+    def _other(self, entry: PdoEntry, field: Field) -> Signal:
+        kind = kind_of(self._dictionary, entry.index, entry.sub, field.length)
+        title = f" {kind.title}" if kind.title else ""
+        return Signal(
+            f"object_{entry.index:04x}_{entry.sub:02x}",
+            field.start,
+            field.length,
+            field.is_signed or kind.is_signed,
+            is_float=kind.is_float,
+            comment=f"{entry.index:04X}h:{entry.sub:02X}{title}, no word that the mapping file knows",
+        )

@@ -53,7 +53,8 @@ def _signal(signal: Signal, receivers: tuple[str, ...]) -> DbcSignal:
         signal.start,
         signal.length,
         "little_endian",
-        signal.is_signed,
+        # A real number has a sign: tools that overlook SIG_VALTYPE_ show it at least.
+        signal.is_signed or signal.is_float,
         conversion=BaseConversion.factory(
             _number(signal.factor), _number(signal.offset), choices or None, signal.is_float
         ),

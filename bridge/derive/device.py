@@ -23,6 +23,8 @@ _ERROR_OBJECTS: Final = {
     **dict.fromkeys((0x6410, 0x6411, 0x6412), (0x6443, 0x6444)),
 }
 """CiA 401: error mode and error value of digital outputs in groups of 8, 16 and 32, and of analogue ones."""
+_SAVES_BY_ITSELF: Final = 2
+"""Bit of 1010h:01."""
 _DUMMIES: Final = range(0x0001, 0x0008)
 
 
@@ -45,6 +47,7 @@ def device_lines(description: Description, source: str, read_only: str = "") -> 
         yield f"read_only = {string(read_only)}"
     yield ""
     yield from identity_lines(description)
+    yield from _eeprom_lines(description)
     for name, (entry, kind, title) in inputs.items():
         yield "[[input]]"
         yield from _signal_lines(description, name, entry, kind)
@@ -62,6 +65,19 @@ def device_lines(description: Description, source: str, read_only: str = "") -> 
         yield from parameter_lines(
             name, entry, title_of(description, entry), {}, commanded | told, profile or None
         )
+
+
+def _eeprom_lines(description: Description) -> Iterator[str]:
+    """How its parameters are saved, where it saves them on command (CiA 301 §7.5.2.13)."""
+    entry = description.entry(0x1010, 1)
+    if entry is None or not entry.access.writable:
+        return
+    told = entry.default.at(None) if entry.default else None
+    by_itself = isinstance(told, int) and told & _SAVES_BY_ITSELF
+    yield "[eeprom]"
+    yield 'save = "1010:01"'
+    yield f"written_on_save_only = {'false' if by_itself else 'true'}"
+    yield ""
 
 
 def _signal_lines(description: Description, name: str, entry: Entry, kind: str) -> Iterator[str]:

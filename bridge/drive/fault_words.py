@@ -23,6 +23,10 @@ _GENERAL: Final[dict[Language, tuple[str, str, str]]] = {
 """How general advice is marked: its cause, its remedy, and the manual behind it."""
 
 
+_NUMBERS: Final = re.compile(r"(\d+\.\d)[\d./… ]*")
+"""The drive's own numbers before the text of a code: 20.1 … 21.3."""
+
+
 @dataclass(frozen=True, slots=True)
 class Explained:
     """``number`` is in the maker's form; a text is empty where nobody says anything."""
@@ -80,7 +84,7 @@ class FaultWords:
     def listed(self, name: str) -> Explained:
         """A fault by the name that the mapping file has for it: ``10.3``, ``41``, ``52.1``, ``8130h``."""
         if name.endswith("h"):
-            return self._explained(name, name, self._german.get(name) or self._emcy.codes.get(name[:-1], ""))
+            return self._explained(name, name, self._german.get(name) or self._code_text(name[:-1]))
         number = self._decimal(name) if "." in name else self._whole(int(name), self._mask)
         return self._explained(number, name, self._text(name))
 
@@ -100,6 +104,13 @@ class FaultWords:
         if name.endswith("h"):
             return self._emcy.text(int(name[:-1], 16))
         return self._faults.texts.get(name) or self._emcy.events.get(name) or ""
+
+    def _code_text(self, code: str) -> str:
+        """Text of an emergency code. One that begins with the drive's own numbers has their German."""
+        text = self._emcy.codes.get(code, "")
+        numbers = _NUMBERS.match(text)
+        german = self._german.get(numbers[1]) if numbers else None
+        return f"{numbers[0]}{german}" if numbers and german else text
 
     def _decimal(self, name: str) -> str:
         highest = self._faults.form_to
@@ -172,6 +183,12 @@ def listed_faults(family: Family) -> list[str]:
     none = no_faults(family)
     names = dict.fromkeys([*faults.texts, *emcy.events, *codes, *explained])
     return [name for name in names if name not in none]
+
+
+def emergency_codes(family: Family) -> list[str]:
+    """The names of all emergency codes that the mapping file lists one by one: ``4210h``."""
+    none = no_faults(family)
+    return [f"{code}h" for code in family.emcy.codes if "xx" not in code and f"{code}h" not in none]
 
 
 def no_faults(family: Family) -> frozenset[str]:

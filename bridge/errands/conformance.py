@@ -18,6 +18,8 @@ from bridge.canopen.sdo_transfer import ABORT, MUX, U32
 from bridge.errands.errand import Errand
 
 _SDO_BYTES: Final = 8
+_NOT_THERE: Final = (0x0602_0000, 0x0609_0011, abort.UNKNOWN_COMMAND)
+"""Abort codes: no such object, no such sub-index, no such service."""
 
 
 class Verdict(StrEnum):
@@ -125,6 +127,12 @@ def expedited_bytes(answer: bytes) -> int | None:
 def aborted(answer: bytes) -> int | None:
     """The code with which a request was aborted; None for every other answer."""
     return U32.unpack_from(answer, 4)[0] if len(answer) == _SDO_BYTES and answer[0] == ABORT else None
+
+
+def lacking(answer: bytes) -> Verdict:
+    """Verdict on a question without a good answer: only a node that says so does not offer it. One that is
+    silent, or refuses for another reason, has shown nothing."""
+    return Verdict.NOT_OFFERED if aborted(answer) in _NOT_THERE else Verdict.NOT_SEEN
 
 
 def shown(answer: bytes) -> str:

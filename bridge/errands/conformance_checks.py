@@ -18,6 +18,7 @@ from bridge.errands.conformance import (
     Verdict,
     aborted,
     expedited_bytes,
+    lacking,
     plain,
     shown,
 )
@@ -133,37 +134,38 @@ def unknown_requests(slave: Slave) -> Check:
     slave.found("§7.2.4.3", "after all this it still answers", plain(answer) is not None, shown(answer))
 
 
-def _whole(slave: Slave, index: int) -> Generator[Step, Answers, tuple[bytes | None, int | None, str]]:
-    """An object of any length by segments: what came, how much was announced, and what went wrong."""
+def _whole(slave: Slave, index: int) -> Generator[Step, Answers, tuple[bytes | None, int | None, str, bytes]]:
+    """An object of any length by segments: what came, how much was announced, what went wrong, and the last
+    answer."""
     answer = yield from slave.ask(b"\x40" + MUX.pack(index, 0))
     size = expedited_bytes(answer)
     if size is not None:
-        return answer[4 : 4 + size], None, "expedited"
+        return answer[4 : 4 + size], None, "expedited", answer
     if not answer or answer[0] & 0xE2 != 0x40:
-        return None, None, shown(answer)
+        return None, None, shown(answer), answer
     announced = U32.unpack_from(answer, 4)[0] if answer[0] & 1 else None
     data, toggle = b"", 0
     for _ in range(_MOST_SEGMENTS):
         answer = yield from slave.ask(bytes((0x60 | toggle,)))
         if not answer or answer[0] & 0xE0:
-            return None, announced, f"segment {len(data) // SEGMENT + 1}: {shown(answer)}"
+            return None, announced, f"segment {len(data) // SEGMENT + 1}: {shown(answer)}", answer
         if answer[0] & 0x10 != toggle:
             yield from slave.break_off(index, 0)
-            return None, announced, f"segment {len(data) // SEGMENT + 1} has the wrong toggle bit"
+            return None, announced, f"segment {len(data) // SEGMENT + 1} has the wrong toggle bit", answer
         data += answer[1 : 8 - (answer[0] >> 1 & 7)]
         if answer[0] & 1:
-            return data, announced, ""
+            return data, announced, "", answer
         toggle ^= 0x10
     yield from slave.break_off(index, 0)
-    return None, announced, "no end"
+    return None, announced, "no end", answer
 
 
 def segmented(slave: Slave) -> Check:
     """The device name by segments, and the toggle bit."""
     clause, rule = "§7.2.4.3.6", "1008h is read by segments, with alternating toggle bit"
-    data, announced, why = yield from _whole(slave, _NAME)
+    data, announced, why, answer = yield from _whole(slave, _NAME)
     if data is None and announced is None:
-        slave.skipped(clause, rule, why)
+        slave.skipped(clause, rule, why, lacking(answer))
         return
     if why == "expedited":
         slave.skipped(clause, rule, "1008h is no longer than four bytes", Verdict.NOT_SEEN)
@@ -183,15 +185,15 @@ def segmented(slave: Slave) -> Check:
 def block(slave: Slave) -> Check:
     """The device name as a block upload with CRC, against what came by segments."""
     clause, rule = "§7.2.4.3.12", "1008h is read as a block"
-    wanted, _, _ = yield from _whole(slave, _NAME)
+    wanted, _, _, last = yield from _whole(slave, _NAME)
     if wanted is None:
-        slave.skipped(clause, rule, "1008h cannot be read")
+        slave.skipped(clause, rule, "1008h cannot be read", lacking(last))
         return
     answer = yield from slave.ask(b"\xa4" + MUX.pack(_NAME, 0) + bytes((127, 0)))
     if not answer or answer[0] & 0xF9 != 0xC0:
         if answer and aborted(answer) is None:
             yield from slave.break_off(_NAME, 0)
-        slave.skipped(clause, rule, shown(answer))
+        slave.skipped(clause, rule, shown(answer), lacking(answer))
         return
     has_crc = bool(answer[0] & 4)
     data, number, is_last = b"", 0, False
@@ -219,15 +221,18 @@ def block(slave: Slave) -> Check:
 def emergency(slave: Slave) -> Check:
     """Where emergency messages come, and the history of errors."""
     rule = "1014h is a COB-ID for emergency messages"
-    cob_id = yield from slave.number(0x1014)
+    answer = yield from slave.read(0x1014)
+    cob_id = plain(answer)
     if cob_id is None:
-        slave.skipped("§7.5.2.17", rule, "no 1014h")
+        slave.skipped("§7.5.2.17", rule, f"1014h: {shown(answer)}", lacking(answer))
     else:
         ok = bool(cob_id & cobid.PDO_DISABLED) or cobid.is_for_emcy(cob_id & cobid.COB_ID_MASK)
         slave.found("§7.5.2.17", rule, ok, f"{cob_id:08X}h")
-    count = yield from slave.number(0x1003)
+    answer = yield from slave.read(0x1003)
+    count = plain(answer)
     if count is None:
-        slave.skipped("§7.5.2.4", "1003h has as many errors as 1003h:00 says", "no 1003h")
+        rule = "1003h has as many errors as 1003h:00 says"
+        slave.skipped("§7.5.2.4", rule, f"1003h: {shown(answer)}", lacking(answer))
         return
     for sub in range(1, min(count, 254) + 1):
         answer = yield from slave.read(0x1003, sub)
@@ -242,9 +247,11 @@ def pdo(slave: Slave, number: int, *, sent: bool) -> Check:
     """One PDO of the node's: its COB-ID, and that its mapped objects exist and fit into a frame."""
     name, of_mapping = (f"TPDO {number + 1}", "§7.5.2.38") if sent else (f"RPDO {number + 1}", "§7.5.2.36")
     parameter, mapping = (0x1800, 0x1A00) if sent else (0x1400, 0x1600)
-    cob_id = yield from slave.number(parameter + number, 1)
+    answer = yield from slave.read(parameter + number, 1)
+    cob_id = plain(answer)
     if cob_id is None:
-        slave.skipped("§7.5.2.37" if sent else "§7.5.2.35", f"{name} has a COB-ID", "no such PDO")
+        clause = "§7.5.2.37" if sent else "§7.5.2.35"
+        slave.skipped(clause, f"{name} has a COB-ID", shown(answer), lacking(answer))
         return
     if cob_id & cobid.PDO_DISABLED:
         return
@@ -298,9 +305,10 @@ def _send(*frames: Frame) -> Step:
 def heartbeat(slave: Slave) -> Check:
     """A period set in 1017h is kept. It stays set for the checks of the NMT states."""
     clause, rule = "§7.2.8.3.2.2", f"the heartbeat comes every {_BEAT_MS} ms where 1017h says so"
-    before = yield from slave.number(0x1017)
+    answer = yield from slave.read(0x1017)
+    before = plain(answer)
     if before is None:
-        slave.skipped(clause, rule, "no 1017h")
+        slave.skipped(clause, rule, f"1017h: {shown(answer)}", lacking(answer))
         return
     slave.heartbeat_ms = before
     answer = yield from slave.write(0x1017, 0, _BEAT_MS.to_bytes(2, "little"))
@@ -325,10 +333,13 @@ def guarding(slave: Slave) -> Check:
     if (yield from slave.number(0x1017)):
         slave.skipped(clause, rule, "it has a heartbeat", Verdict.NOT_SEEN)
         return
-    guard, factor = (yield from slave.number(0x100C)), (yield from slave.number(0x100D))
-    if guard is None or factor is None or guard * factor:
-        why = "no 100Ch and 100Dh" if guard is None or factor is None else "life guarding would begin"
-        slave.skipped(clause, rule, why, Verdict.NOT_SEEN if guard else Verdict.NOT_OFFERED)
+    times = (yield from slave.read(0x100C)), (yield from slave.read(0x100D))
+    for index, answer in zip((0x100C, 0x100D), times, strict=True):
+        if plain(answer) is None:
+            slave.skipped(clause, rule, f"{index:04X}h: {shown(answer)}", lacking(answer))
+            return
+    if all(plain(answer) for answer in times):
+        slave.skipped(clause, rule, "life guarding would begin", Verdict.NOT_SEEN)
         return
     question = Frame(cobid.ERROR_CONTROL + slave.id | REMOTE)
     seen: list[int] = []

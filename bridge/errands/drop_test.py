@@ -78,6 +78,18 @@ class DropOutcome:
         return self.own.process_data_ms if self.rpdos_alone else self.own.own_ms
 
     @property
+    def own_text(self) -> str:
+        """The time-out that counts, or why there is none, and the settings that were read."""
+        if self.own_ms:
+            told = f"{self.own_ms:g} ms"
+        elif self.own.first is not None:
+            told = "none without RPDOs alone: heartbeat, guarding and SYNC go on"
+        else:
+            told = f"none that stops it: {self.own.reason}"
+        settings = ", ".join(one.setting for one in self.own.watches)
+        return f"{told} (read: {settings})" if settings else told
+
+    @property
     def bound_ms(self) -> float:
         """Within which time of the last frame the reaction has to show; 0 where there is none to come."""
         return self.own_ms + MESSAGE_MS if self.own_ms else 0.0

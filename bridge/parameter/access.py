@@ -237,7 +237,8 @@ class DriveParameters:
 
     def save(self, now: float, gate: Gate) -> Saves:
         """The parameters of the node go to its EEPROM. What the gate lets in is judged by the parameter that
-        the family saves by; 1010h does nothing but save."""
+        the family saves by; 1010h does nothing but save, and a node need not have it: that is
+        ``Why.NOT_CONFIGURED``, as a family without a command is."""
         entry, eeprom = self.saving, self._eeprom
         if entry is None or eeprom is None:
             raise ParameterError(Why.NOT_CONFIGURED, f"{self.name} has no command that saves its parameters")
@@ -257,6 +258,9 @@ class DriveParameters:
         except TransferFailed as failure:
             if not failure.by_drive:
                 self._count(key, entry.name, now)
+            if command is None and failure.abort_code in MISSING:
+                lack = f"the node has no {_address(entry)}, and saves nothing on command"
+                raise ParameterError(Why.NOT_CONFIGURED, lack, failure.abort_code) from None
             raise self._error(entry, failure) from None
         return self._count(key, entry.name, now)
 
@@ -313,6 +317,10 @@ class DriveParameters:
             hint += self.names.set_hint(entry.name)
         why = Why.REFUSED if failure.by_drive else Why.NO_ANSWER
         return ParameterError(why, f"{entry.name}: {failure}{hint}", failure.abort_code)
+
+
+def _address(entry: Entry) -> str:
+    return f"{entry.address.index:04X}h:{entry.address.sub:02X}"
 
 
 def _is_of_node(entry: Entry) -> bool:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 
 import pytest
 from typer.testing import CliRunner
 
 from bridge.cli.app import make_app
+from bridge.cli.faults import matching
+from bridge.drive.fault_words import Language
 from bridge.errors import OperationFailed
+from bridge.mapping import load_family
+from bridge.mapping.loader import family_names
 
 DEMO = "bridge/demo/site.toml"
 
@@ -36,6 +41,26 @@ def test_a_number_is_found_as_the_display_shows_it(family: str, asked: str, firs
     assert name == family
     assert found.strip().startswith(first)
     assert all(line.startswith("      ") for line in rest), "it is the only one"
+
+
+@pytest.mark.parametrize("name", sorted(set(family_names()) - {"generic/device"}))
+def test_every_code_of_an_emergency_message_is_known(name: str) -> None:
+    """As the bus and the manual have it, also where the drive's own number says more (BU 2500 §8.3.3)."""
+    family = load_family(name)
+    codes = [code for code in family.emcy.codes if "xx" not in code and int(code, 16)]
+    lost: list[str] = []
+    forms = itertools.cycle((str, "{}h".format, lambda code: f"0x{code.lower()}"))
+    languages: itertools.cycle[Language] = itertools.cycle(("en", "de"))
+    for code, form, language in zip(codes, forms, languages, strict=False):
+        found = matching(family, form(code), language)
+        known = [one for one in found if one.number == f"{code}h" and one.text and one.cause]
+        lost += [] if len(found) == len(known) == 1 else [f"{form(code)} {language}: {found}"]
+    assert not lost
+
+
+def test_a_code_is_in_german_where_the_drives_number_is() -> None:
+    assert "4310h 2.0/2.1 Übertemperatur Motor" in run("nord/sk-tu4-cao", "4310", "--language", "de")
+    assert "4310h 2.0/2.1 overtemperature of the motor, I²t" in run("nord/sk-tu4-cao", "4310")
 
 
 def test_a_part_of_a_text_finds_all_that_have_it() -> None:

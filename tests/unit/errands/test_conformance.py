@@ -185,3 +185,36 @@ def test_a_node_that_is_silent_ends_it_all_the_same() -> None:
     device = SmallSlave()
     device.on_frame = lambda frame, now: []  # type: ignore[method-assign]
     assert failures(tried(device))
+
+
+_MUTE = {
+    "1014h is a COB-ID for emergency messages": (0x1014, 0),
+    "1003h has as many errors as 1003h:00 says": (0x1003, 0),
+    "TPDO 2 has a COB-ID": (0x1801, 1),
+    "RPDO 1 has a COB-ID": (0x1400, 1),
+    "1008h is read by segments, with alternating toggle bit": (0x1008, 0),
+    "1008h is read as a block": (0x1008, 0),
+    "the heartbeat comes every 100 ms where 1017h says so": (0x1017, 0),
+    "guarding is answered, with alternating toggle bit": (0x100C, 0),
+}
+NO_OBJECT, NO_SUB, GENERAL, LOCAL = 0x0602_0000, 0x0609_0011, 0x0800_0000, 0x0800_0021
+
+
+@pytest.mark.parametrize("code", [NO_OBJECT, NO_SUB, GENERAL, LOCAL, None])
+@pytest.mark.parametrize("rule", _MUTE)
+def test_only_a_node_that_says_so_does_not_offer_it(rule: str, code: int | None) -> None:
+    """One that is silent at this object, or refuses it for another reason, has shown nothing."""
+    device = SmallSlave()
+    whole = device.on_frame
+
+    def on_frame(frame: Frame, now: float) -> list[Frame]:
+        is_question = frame.can_id == 0x600 + NODE and frame.data[0] & 0xE0 in (0x40, 0xA0)
+        if not is_question or _MUX.unpack_from(frame.data, 1) != _MUTE[rule]:
+            return whole(frame, now)
+        if code is None:
+            return []
+        return [Frame(0x580 + NODE, b"\x80" + frame.data[1:4] + struct.pack("<I", code))]
+
+    device.on_frame = on_frame  # type: ignore[method-assign]
+    verdicts = {one.rule: one.verdict for one in tried(device).findings}
+    assert verdicts[rule] is (Verdict.NOT_OFFERED if code in (NO_OBJECT, NO_SUB) else Verdict.NOT_SEEN)

@@ -53,5 +53,7 @@ def test_the_report_says_what_was_tried(tmp_path: Path, more: str) -> None:
     assert facts["ok"] is bool(more)
     assert (facts["node"]["vendor"], facts["node"]["product"]) == (0xACE, 0x401)
     text = drop_report.markdown(facts)
+    assert f"| own time-out | {test.outcomes[0].own_text} |" in text
+    assert all(setting["setting"] in text for setting in facts["drives"][0]["settings"])
     assert "leaves Operational" in text
     assert "drives stood still" not in text

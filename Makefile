@@ -136,7 +136,7 @@ PROOF ?= 12
 proof: compiled packages ## inject every fault 12 times, write docs/explanation/proof.md (an hour)
 	@$(ON_VCAN) tests/proof/run-proof -j $(FEW_JOBS) -n $(PROOF) -o build/proof.json docs/explanation/proof.md
 
-proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (20 minutes)
+proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (half an hour)
 	@$(ON_VCAN) tests/proof/run-proof -m -j $(FEW_JOBS) -o build/mutants.json docs/explanation/proof.md
 
 mutants: compiled ## change the code and see whether unit tests notice: hours, or ARGS='bridge/canopen/sdo.py'

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -126,6 +127,8 @@ def try_unchanged(rig: Rig, share: Share, say: Say) -> list[str]:
         if share.take(f"none, {fault.name}") and (found := judge(rig, fault, say)):
             alarms.append(f"{fault.name}: {found}")
             say(f"FALSE ALARM: {alarms[-1]}")
-            rig.mend()
-            rig.run_all()
+            # What does not come back has a second chance in the next round.
+            with suppress(Stuck, AssertionError):
+                rig.mend()
+                rig.run_all()
     return alarms

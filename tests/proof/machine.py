@@ -44,9 +44,16 @@ _NUMBER_AT: Final = 8 * 15
 _SETITIMER: Final = 38
 _WALL: Final = 0x4000_0000
 
-TO_DRIVES: Final = ("-s", BRIDGE_SIDE, "-d", DRIVE_SIDE, "-e")
-FROM_DRIVES: Final = ("-s", DRIVE_SIDE, "-d", BRIDGE_SIDE, "-e", "-f", "000~7FF")
-"""Everything but NMT commands, so that one that is sent here looks to the bridge like a drive's own reset."""
+_EVERYTHING: Final = struct.pack("=II", 0, 0)
+_BUT_NMT: Final = struct.pack("=II", 0x2000_0000, 0x7FF)
+"""So that an NMT command that is sent on the drives' side looks to the bridge like a drive's own reset."""
+_NETLINK: Final = struct.Struct("=IHHII")
+_NEW, _DELETE = 24, 25
+_ACKNOWLEDGED: Final = 0x5
+"""NLM_F_REQUEST | NLM_F_ACK."""
+_CAN_TO_CAN: Final = struct.pack("=BBH", socket.AF_CAN, 1, 1)
+"""struct rtcanmsg of <linux/can/gw.h>, with CGW_FLAGS_CAN_ECHO."""
+_SOURCE, _DESTINATION, _FILTER = 9, 10, 11
 
 
 def call(*command: str) -> None:
@@ -61,26 +68,43 @@ def is_user_mode() -> bool:
 
 
 class Gateway:
-    """The wire between bridge and drives."""
+    """The wire between bridge and drives: jobs of the kernel's gateway (can-gw). They are given to it without
+    a process of their own, which would take so long that a silence of some milliseconds loses every node."""
 
     def open(self) -> None:
-        call("cangw", "-F")
-        call("cangw", "-A", *TO_DRIVES)
-        call("cangw", "-A", *FROM_DRIVES)
+        self.close()
+        _gateway_job(_NEW, BRIDGE_SIDE, DRIVE_SIDE, _EVERYTHING)
+        self.restore()
 
     def close(self) -> None:
-        call("cangw", "-F")
+        _gateway_job(_DELETE, "", "", b"")
 
     def silence_drives(self) -> None:
-        call("cangw", "-D", *FROM_DRIVES)
+        _gateway_job(_DELETE, DRIVE_SIDE, BRIDGE_SIDE, _BUT_NMT)
 
     def restore(self) -> None:
-        call("cangw", "-A", *FROM_DRIVES)
+        _gateway_job(_NEW, DRIVE_SIDE, BRIDGE_SIDE, _BUT_NMT)
 
     def pass_only(self, can_id: int) -> None:
         """Of what the drives' side sends."""
-        call("cangw", "-D", *FROM_DRIVES)
-        call("cangw", "-A", "-s", DRIVE_SIDE, "-d", BRIDGE_SIDE, "-e", "-f", f"{can_id:03X}:7FF")
+        self.silence_drives()
+        _gateway_job(_NEW, DRIVE_SIDE, BRIDGE_SIDE, struct.pack("=II", can_id, 0x7FF))
+
+
+def _gateway_job(what: int, source: str, destination: str, can_filter: bytes) -> None:
+    """Raises ``OSError``. Without a source all jobs are meant."""
+    ends = [(_SOURCE, source), (_DESTINATION, destination)]
+    attributes = [
+        (kind, struct.pack("=I", socket.if_nametoindex(name) if name else 0)) for kind, name in ends
+    ]
+    if can_filter:
+        attributes.append((_FILTER, can_filter))
+    body = _CAN_TO_CAN + b"".join(struct.pack("=HH", 4 + len(data), kind) + data for kind, data in attributes)
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as link:
+        link.send(_NETLINK.pack(_NETLINK.size + len(body), what, _ACKNOWLEDGED, 1, 0) + body)
+        (number,) = struct.unpack_from("=i", link.recv(4096), _NETLINK.size)
+    if number:
+        raise OSError(-number, f"can-gw: {os.strerror(-number)}")
 
 
 def send(channel: str, can_id: int, data: bytes) -> float:
@@ -120,7 +144,7 @@ def repeat(channel: str, can_id: int, data: bytes, period_s: float) -> socket.so
 
 def reset_nodes(node_id: int = 0) -> float:
     """NMT reset node, to all or to one: as if it were switched off and on. The bridge does not see it
-    (``FROM_DRIVES``). Gives the time before it."""
+    (``_BUT_NMT``). Gives the time before it."""
     return send(DRIVE_SIDE, 0x000, bytes((0x81, node_id)))
 
 

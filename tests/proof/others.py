@@ -172,7 +172,9 @@ def let_hear(rig: Rig) -> None:
 def start_second_bridge(rig: Rig) -> None:
     """On the same bus, for the same drives, with ports of its own."""
     second = rig.guests.enter_context(rig.another_bridge(write_second_site(rig.folder, rig.other_nodes)))
-    second.wait_output("OPC UA on", _STARTS_S)
+    # It gives way, or it does not.
+    said = ("another bridge is in charge", "node operational")
+    rig.wait(lambda: any(text in second.output() for text in said), _STARTS_S, "the second bridge listens")
 
 
 def end_second_bridge(rig: Rig) -> None:

@@ -192,8 +192,10 @@ class Rig:
             follow(self.watched, FRONTS[protocol], front)
 
     def another_bridge(self, site: Path) -> AbstractContextManager[Process]:
-        """Beside the first one, on the same bus. On a box of its own it would take no time from anybody."""
-        command = ("env", f"PYTHONPATH={self.tree}", *_LAST, sys.executable, "-m", "bridge", "run", str(site))
+        """Beside the first one, on the same bus; without fronts, which know of no bus. On a box of its own it
+        would take no time from anybody."""
+        source = ("env", f"PYTHONPATH={self.tree}", *_LAST)
+        command = (*source, sys.executable, "-m", "bridge", "run", str(site), "--role", "bus")
         return running(self.folder, "second", *command)
 
     def send_guests_away(self) -> None:

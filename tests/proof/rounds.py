@@ -188,9 +188,12 @@ def _hung(rig: Rig, drive: Drive | None, since: float) -> bool:
 
 
 def _all_move(rig: Rig, say: Callable[[str], None]) -> None:
-    """A slow machine may have stopped some of them before: they are brought back, and it is told."""
-    still = [drive for drive in DRIVES if not rig.moves(drive)]
-    if still:
+    """A slow machine may have stopped some of them before, and others while these came back: they are brought
+    back, and it is told."""
+    for _ in range(_LOOKS):
+        still = [drive for drive in DRIVES if not rig.moves(drive)]
+        if not still:
+            return
         say(f"stopped by themselves: {', '.join(drive.path for drive in still)}")
         rig.by_themselves += len(still)
         rig.run_all()

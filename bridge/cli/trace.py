@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 import can
+from can.io.blf import BLFParseError
 
 from bridge.can.pythoncan import frame_of
 from bridge.canopen.frame import Frame
@@ -18,6 +19,7 @@ from bridge.errors import OperationFailed
 SUFFIXES: Final = (".log", ".asc", ".blf", ".trc")
 _UNREADABLE: Final = (
     can.CanError,
+    BLFParseError,
     ValueError,
     LookupError,
     TypeError,
@@ -49,7 +51,7 @@ class Trace:
         """Raises ``OperationFailed`` where the file cannot be read, or it has several channels."""
         is_empty = True
         for message in self._messages():
-            if not self._is_meant(str(message.channel)):
+            if message.channel is not None and not self._is_meant(str(message.channel)):
                 self._left_out["frames of other channels"] += 1
             elif message.is_error_frame:
                 self._left_out["error frames"] += 1

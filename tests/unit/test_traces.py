@@ -71,7 +71,7 @@ def test_every_format_is_shown_with_the_sites_names_and_judged_by_its_bounds(
     assert done.exit_code == 1, (done.output, done.exception)
     lines = done.stdout.splitlines()
     assert len(lines) == len(traffic())
-    assert any("TPDO1 conveyor/fu1" in line and "ready to switch on" in line for line in lines)
+    assert any("TPDO1 conveyor/fu1" in line and "0B31h ready" in line for line in lines)
     said = done.stderr.splitlines()
     assert said == [
         "SYNC: silent for 350 ms from 0.302 s on, deadman_ms allows 100 ms",

@@ -40,12 +40,12 @@ _PDOS: Final = {
 
 
 _OTHERS: Final = (
-    (0x001, 0x001, "global fail-safe command", "CiA 304"),
-    (0x071, 0x076, "flying master", "CiA 302-2"),
-    (0x101, 0x180, "SRDO", "CiA 304"),
-    (0x6E0, 0x6E0, "SDO manager", "CiA 302-5"),
+    (0x001, 0x001, "global fail-safe command"),
+    (0x071, 0x076, "flying master"),
+    (0x101, 0x180, "SRDO"),
+    (0x6E0, 0x6E0, "SDO manager"),
 )
-"""First and last COB-ID of services that the bridge has no part in, by CiA 301 §7.3.5 and these."""
+"""First and last COB-ID of services that the bridge has no part in (CiA 301 §7.3.5)."""
 
 
 class Kind(StrEnum):
@@ -146,10 +146,9 @@ class Decoder:
         raw = data.hex(" ").upper()
         if node_id and base in _PDOS:
             return Meaning(Kind.PDO, node_id, f"{_PDOS[base]} {self.name(node_id)}", raw)
-        for first, last, label, document in _OTHERS:
+        for first, last, label in _OTHERS:
             if first <= base + node_id <= last:
-                text = f"{raw} ({document}: the bridge has no part in it)".lstrip()
-                return Meaning(Kind.OTHER, 0, label, text)
+                return Meaning(Kind.OTHER, 0, label, f"{raw} (the bridge has no part in it)".lstrip())
         return Meaning(Kind.OTHER, 0, "unknown", raw)
 
     def _remote(self, cob_id: int) -> Meaning:

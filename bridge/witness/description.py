@@ -79,11 +79,16 @@ def describe(content: bytes, node_id: int) -> Description:
 
 
 def _decoded(content: bytes) -> str:
-    """UTF-8, UTF-16 with its mark, else Windows-1252."""
+    """UTF-8, UTF-16 with its mark; a line that is no UTF-8 is Windows-1252."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", "replace")
+    lines = content.removeprefix(b"\xef\xbb\xbf").splitlines(keepends=True)
+    return "".join(map(_line, lines))
+
+
+def _line(content: bytes) -> str:
     try:
-        return content.decode("utf-8-sig")
+        return content.decode("utf-8")
     except UnicodeDecodeError:
         return content.decode("cp1252", "replace")
 

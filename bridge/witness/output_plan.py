@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import struct
 import tomllib
+import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,10 @@ _MOST_MAPPED: Final = 64
 _OFF, _LONG = 0x8000_0000, 0x2000_0000
 """Flags of a COB-ID: the PDO is not used; 29 bits (CiA 301 §7.5.2.35)."""
 _DUMMIES: Final = range(0x0001, 0x0020)
+_SPELT: Final = str.maketrans(
+    {"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "æ": "ae", "œ": "oe", "ø": "oe", "å": "aa"}
+    | {"đ": "d", "ł": "l", "ı": "i"}
+)
 _TYPES: Final = {
     0x01: "bool",
     0x02: "int8",
@@ -185,8 +190,11 @@ def _described_outputs(description: Description, node: NodeTable) -> dict[At, _O
 
 
 def _name(title: str, at: At) -> str:
-    """As docs/how-to/generic-nodes.md shows it: the title's words in lower case."""
-    words = "_".join(re.findall("[a-z0-9]+", title.lower()))
+    """As docs/how-to/generic-nodes.md shows it: the title's words in lower case, umlauts written as two
+    letters, accents left out."""
+    spelt = unicodedata.normalize("NFC", title.lower()).translate(_SPELT)
+    plain = re.sub("[\u0300-\u036f]", "", unicodedata.normalize("NFD", spelt))
+    words = "_".join(re.findall("[a-z0-9]+", plain))
     return words if words[:1].isalpha() else f"object_{at[0]:04x}_{at[1]:02x}"
 
 

@@ -86,6 +86,7 @@ ODD_TITLES = (
     EDS,
     EDS.replace(DIGITAL_TITLE, "ParameterName=Out"),
     EDS.replace(DIGITAL_TITLE, "ParameterName=1. Ausgänge (A-1)"),
+    EDS.replace(DIGITAL_TITLE, "ParameterName=Größe, Ventilé, Łódź"),
     EDS.replace("Digital outputs 9 to 16", "Digital outputs 1 to 8"),
     EDS.replace("ParameterName=Digital outputs\n", "ParameterName=8 Relais\n"),
 )

@@ -39,7 +39,7 @@ class Hall:
             node.start(time.monotonic())
             # It stays switched on from one command to the next.
             monkeypatch.setattr(node, "start", lambda now: None)
-        monkeypatch.setattr(cli_bus, "open_bus", lambda *_: self._bus(monkeypatch))
+        monkeypatch.setattr(cli_bus, "open_bus", lambda *_, **__: self._bus(monkeypatch))
         monkeypatch.setattr(drop_test, "make_bus", lambda _: self._bus(monkeypatch))
 
     @staticmethod

@@ -30,7 +30,7 @@ _UNREADABLE: Final = (
     struct.error,
     zlib.error,
 )
-"""What python-can's readers raise for files that are not what their names say."""
+"""Exceptions of python-can's readers for files that are not what their names say."""
 
 
 class Trace:
@@ -78,7 +78,7 @@ class Trace:
 
     @property
     def left_out(self) -> str:
-        """What has not been shown, in words; empty where that is nothing."""
+        """The kinds of frames that were not shown, with their counts; empty where there are none."""
         return ", ".join(f"{count} {what}" for what, count in sorted(self._left_out.items()))
 
     def _messages(self) -> Iterator[can.Message]:

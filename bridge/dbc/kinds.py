@@ -16,7 +16,7 @@ _REALS: Final = {DataType.REAL32: 32, DataType.REAL64: 64}
 
 
 class Kind(NamedTuple):
-    """How the bits of an object are to be read; ``title`` is empty where nothing describes it."""
+    """Reading of the bits of an object; ``title`` is empty where nothing describes it."""
 
     is_signed: bool = False
     is_float: bool = False

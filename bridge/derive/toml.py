@@ -14,7 +14,7 @@ _LETTERS: Final = {
     "ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "æ": "ae", "œ": "oe", "ø": "oe", "å": "aa", "đ": "d",
     "ł": "l", "ı": "i",
 }  # fmt: skip
-"""How letters are written that no accent makes of others, or that a tongue writes as two."""
+"""Spellings of letters that no accent makes of others, or that a language writes as two."""
 
 
 def one_line(text: str) -> str:

@@ -85,7 +85,7 @@ def _data(entry: Entry, node_id: int | None, report: Report, other: int | None) 
 
 
 def _is_identifier_of(node_id: int, entry: Entry, plain: Plain) -> TypeGuard[int]:
-    """Whether the entry holds a COB-ID that ends with the number of the node."""
+    """True where the entry holds a COB-ID that ends with the number of the node."""
     holds_one = (entry.index, entry.sub) == _EMCY_ID or any(
         entry.index in indices and entry.sub in subs for indices, subs in _COB_IDS
     )

@@ -126,7 +126,7 @@ class Decoder:
         return view.codec.length if view is not None and view.label.startswith("TPDO") else None
 
     def rpdos(self) -> dict[int, str]:
-        """What stands for each RPDO of the site's drives, by COB-ID."""
+        """Labels of the RPDOs of the site's drives, by COB-ID."""
         return {can_id: view.label for can_id, view in self._pdos.items() if view.label.startswith("RPDO")}
 
     def name(self, node_id: int) -> str:

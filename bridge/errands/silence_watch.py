@@ -1,4 +1,4 @@
-"""How long the bridge and its nodes may be silent by a site file, judged by what was heard. Sans-IO."""
+"""Silences of the bridge and its nodes beside what the site file allows. Sans-IO."""
 
 from __future__ import annotations
 

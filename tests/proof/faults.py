@@ -83,7 +83,7 @@ FAULTS: Final = (
         others.let_hear,
         None,
         others.jogged,
-        # Its owner's words have to be as short as that; those by OPC UA may be late by a third of a stop.
+        # Each stop is short: the owner's words have to come at once for it.
         protocols=("modbus",),
         nodes=(others.VICTIM.node,),
         steady=others.make_deaf,

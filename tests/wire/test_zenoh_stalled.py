@@ -20,8 +20,12 @@ CROWD = Path(__file__).parents[1] / "peers" / "zenoh_crowd.py"
 MORE_NODES = 6
 """So that all values together are more than a connection and its queue hold."""
 LASTS_S = 4.0
-LATEST_S = 0.1
-"""Within which 99 of 100 answers come."""
+WORKED_OFF_S = 5.0
+"""Within which all is answered that the clients asked before they stopped: work that others wait for."""
+USUAL_S = 0.1
+LATEST_S = 0.5
+"""Within which half and 99 of 100 of the answers come then, on a machine that does other things, too. Who
+waits for one client that does not read waits for all of them, one after the other."""
 
 
 @asynccontextmanager
@@ -79,6 +83,7 @@ async def test_stopped_clients_do_not_hold_up_the_commands_of_others(count: int)
         changing = asyncio.create_task(values_change(r))
         try:
             async with stopped_clients(r.endpoint, count):
+                await asyncio.wait_for(r.peer.do("get", f"{FU3}/actual/frequency"), WORKED_OFF_S)
                 commands, values, refused = await asyncio.gather(
                     answers_of(r, f"{FU3}/command/keep_alive", "{}"),
                     answers_of(r, f"{FU3}/actual/frequency", None),
@@ -88,4 +93,5 @@ async def test_stopped_clients_do_not_hold_up_the_commands_of_others(count: int)
             changing.cancel()
         for took in (commands, values, refused):
             assert len(took) > 50
+            assert took[len(took) // 2] <= USUAL_S, took
             assert took[int(len(took) * 0.99)] <= LATEST_S, took[-10:]

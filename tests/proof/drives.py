@@ -48,8 +48,9 @@ class Drive:
     emcy: int | None
     """Where the emergency messages of the node are about this drive alone."""
     reaction: str = "disable_voltage"
-    is_synchronous: bool = False
-    """Its RPDO counts with the next SYNC (CiA 301 §7.2.2.2)."""
+    syncs: int = 0
+    """Its RPDO is sent for every so many SYNCs, and counts with the next one (CiA 301 §7.2.2.2); 0 where it
+    does not wait for them."""
     settings: str = ""
     """Of its RPDOs, in the site file."""
     setpoint_rpdo: int = 0
@@ -63,6 +64,11 @@ class Drive:
     def unit(self) -> int:
         """Its Modbus unit id."""
         return self.place + 1
+
+    @property
+    def way_ms(self) -> int:
+        """How long the bridge allows its RPDO to the drive."""
+        return max(1, self.syncs) * PLANT.rpdo_period_ms
 
     @property
     def family_name(self) -> str:
@@ -105,9 +111,10 @@ class Drive:
 _SPLIT_ID: Final = 0x300
 _ELSEWHERE: Final = 0x400
 """Not the factory's."""
+_CIA402_SYNCS: Final = {"modbus": 1, "opcua": 3}
 _CIA402_RPDOS: Final = {
-    "modbus": "rpdo = {{ transmission_type = 1, cob_id = {rpdo} }}",
-    "opcua": "rpdo = {{ transmission_type = 3, cob_id = {rpdo} }}",
+    "modbus": "rpdo = {{ transmission_type = {syncs}, cob_id = {rpdo} }}",
+    "opcua": "rpdo = {{ transmission_type = {syncs}, cob_id = {rpdo} }}",
     "zenoh": "rpdo = [{{ number = 1, transmission_type = 255 }}, {{ number = 2, cob_id = {split} }}]",
 }
 _SPLIT: Final = """
@@ -156,8 +163,8 @@ _REACTIONS: Final = {
 def _single(place: int, family: Family, protocol: str, name: str, node_id: int) -> Drive:
     split = _SPLIT_ID + node_id
     is_fan = family is CIA402
-    is_synchronous = is_fan and protocol != "zenoh"
-    rpdo = (_ELSEWHERE if is_synchronous else 0x200) + node_id
+    syncs = _CIA402_SYNCS.get(protocol, 0) if is_fan else 0
+    rpdo = (_ELSEWHERE if syncs else 0x200) + node_id
     return Drive(
         place,
         family,
@@ -169,8 +176,8 @@ def _single(place: int, family: Family, protocol: str, name: str, node_id: int) 
         tpdo=0x180 + node_id,
         emcy=0x080 + node_id,
         reaction=_REACTIONS.get(f"{name}_{protocol}", "disable_voltage"),
-        is_synchronous=is_synchronous,
-        settings=_CIA402_RPDOS[protocol].format(rpdo=rpdo, split=split) if is_fan else "",
+        syncs=syncs,
+        settings=_CIA402_RPDOS[protocol].format(syncs=syncs, rpdo=rpdo, split=split) if is_fan else "",
         setpoint_rpdo=split if is_fan and protocol == "zenoh" else 0,
     )
 

@@ -83,8 +83,6 @@ FAULTS: Final = (
         others.let_hear,
         None,
         others.jogged,
-        # Each stop is short: the owner's words have to come at once for it.
-        protocols=("modbus",),
         nodes=(others.VICTIM.node,),
         steady=others.make_deaf,
         is_long=True,

@@ -47,7 +47,7 @@ _NEVER_SENT: Final = 0x7FF
 _JOG_STOPS_S: Final = 1.0
 _JOG_RUNS_S: Final = 0.8
 """Two TPDOs tell that it runs steadily."""
-_RAMP_SEEN_MS: Final = PLANT.rpdo_period_ms + 100
+_RAMP_SEEN_MS: Final = VICTIM.way_ms + 100
 """From then on a stop counts."""
 _LOOKED_AT_MS: Final = 100
 """The owner hands on a new word so late, at the most."""

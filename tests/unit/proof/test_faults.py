@@ -50,7 +50,7 @@ def test_a_fault_is_judged_by_a_bound_or_by_yes_or_no(fault: Fault) -> None:
 
 def test_every_reaction_and_every_kind_of_rpdo_is_there() -> None:
     assert {drive.reaction for drive in ALL} == set(get_args(Reaction))
-    assert any(drive.is_synchronous for drive in ALL)
+    assert any(drive.syncs for drive in ALL)
     assert any(drive.setpoint_rpdo for drive in ALL)
 
 
@@ -62,7 +62,7 @@ def test_each_half_has_every_protocol_and_both_have_every_drive() -> None:
         assert {drive.protocol for drive in here} == set(PROTOCOLS)
         assert sum(drive.protocol == "modbus" for drive in here) > 1
         # One that can be made deaf: its RPDO waits for SYNC.
-        assert next(drive for drive in here if drive.family is CIA402).is_synchronous
+        assert next(drive for drive in here if drive.family is CIA402).syncs
 
 
 def test_who_judges_imports_nothing_of_what_is_judged() -> None:

@@ -62,7 +62,6 @@ def run(asked: argparse.Namespace) -> int:
         return {
             "date": _today(),
             "machine": _machine(),
-            "machines": 1,
             "plant": PLANT.name,
             "faults": [fault.name for fault in FAULTS],
             "cells": sorted(

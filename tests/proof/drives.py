@@ -210,6 +210,12 @@ def drives_of(protocol: str) -> list[Drive]:
     return [drive for drive in DRIVES if drive.protocol == protocol]
 
 
+SPOKEN: Final = tuple(protocol for protocol in PROTOCOLS if drives_of(protocol))
+"""Those by which this plant's drives are commanded."""
+SERVED: Final = tuple(protocol for protocol in PROTOCOLS if protocol in (*SPOKEN, "zenoh"))
+"""By zenoh the proof itself asks the bridge."""
+
+
 def write_site(path: Path, channel: str, state: Path, run: Path, *, others: Sequence[str] = ()) -> Path:
     """The site file with everything on ``channel``, and its own mapping beside it; ``others`` are the tables
     of further nodes."""
@@ -218,16 +224,19 @@ def write_site(path: Path, channel: str, state: Path, run: Path, *, others: Sequ
     nodes: dict[str, list[Drive]] = {}
     for drive in DRIVES:
         nodes.setdefault(drive.node, []).append(drive)
+    servers = {
+        "modbus": f'[modbus]\nlisten = "{SERVERS["modbus"]}:{PORTS["modbus"]}"',
+        "opcua": f'[opcua]\nlisten = "{SERVERS["opcua"]}:{PORTS["opcua"]}"\n'
+        'no_security = true\nanonymous = "operator"',
+        "zenoh": f'[zenoh]\nlisten = ["tcp/{SERVERS["zenoh"]}:{PORTS["zenoh"]}"]',
+    }
     text = [
         f'[site]\nname = "proof"\nstate_dir = "{state}"\nruntime_dir = "{run}"',
         f'[[bus]]\nname = "can0"\ninterface = "socketcan"\nchannel = "{channel}"\nbitrate = 1000000',
         PLANT.bus,
         *(_node(drives) for drives in nodes.values()),
         *others,
-        f'[modbus]\nlisten = "{SERVERS["modbus"]}:{PORTS["modbus"]}"',
-        f'[opcua]\nlisten = "{SERVERS["opcua"]}:{PORTS["opcua"]}"',
-        'no_security = true\nanonymous = "operator"',
-        f'[zenoh]\nlisten = ["tcp/{SERVERS["zenoh"]}:{PORTS["zenoh"]}"]',
+        *(servers[protocol] for protocol in SERVED),
     ]
     path.write_text("\n".join(text) + "\n", encoding="utf-8")
     return path

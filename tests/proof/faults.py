@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from tests.proof import acts, bounds, examine, machine, others
-from tests.proof.drives import DRIVES, PROTOCOLS
+from tests.proof.drives import DRIVES, SPOKEN
 from tests.proof.fault import Fault
 from tests.proof.rig import Rig
 from tests.proof.settings import PLANT
@@ -16,7 +16,7 @@ _OF_OWNERS: Final = (bounds.controller, bounds.controller_drive)
 _DEAD: Final = (bounds.dead, bounds.dead_drive)
 _GONE: Final = (bounds.at_once, bounds.gone_drive)
 _ENDING: Final = (bounds.at_once, bounds.at_once_drive)
-_OWNERS: Final = len(PROTOCOLS)
+_OWNERS: Final = len(SPOKEN)
 _NODES: Final = len({drive.node for drive in DRIVES})
 _NOBODY: Final = ("",)
 _SILENT: Final = tuple(drive.node for drive in DRIVES if drive.reaction == "silence") or _NOBODY

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import statistics
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,7 +103,6 @@ def merge(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     merged["faults_missing"] = sorted({name for part in parts for name in part["faults_missing"]})
     merged["cells"] = sorted({tuple(cell) for part in parts for cell in part["cells"]})
     merged["errors"] = [text for part in parts for text in part["errors"]]
-    merged["machines"] = max(Counter(part["plant"] for part in parts).values())
     order = {name: place for place, name in enumerate(merged["faults"])}
     merged["samples"].sort(key=lambda sample: (order[sample["fault"]], sample["family"], sample["protocol"]))
     return merged
@@ -156,8 +154,8 @@ def markdown(result: dict[str, Any]) -> str:
     lines = [
         BEGIN,
         "",
-        f"{result['date']}, {result['machine']}; {result['machines']} at a time, "
-        f"{result['cycles']} cycles, {result['seconds'] / 60:.0f} min of them together. Times in ms.",
+        f"{result['date']}, {result['machine']}; {result['cycles']} cycles, "
+        f"{result['seconds'] / 60:.0f} min, of all plants together. Times in ms.",
         "",
         f"{len(result['samples']) - void} measurements: {failed} failed. Void, and made again: {void}, in "
         "which a bound was exceeded by no more than the machine stood still, or bridge and drives waited for "

@@ -16,7 +16,17 @@ from typing import Final
 from tests.proof import machine
 from tests.proof.block import BLOCK
 from tests.proof.board import Board
-from tests.proof.drives import BRIDGE_SIDE, DRIVE_SIDE, DRIVES, PORTS, PROTOCOLS, SERVERS, Drive, write_site
+from tests.proof.drives import (
+    BRIDGE_SIDE,
+    DRIVE_SIDE,
+    DRIVES,
+    PORTS,
+    SERVED,
+    SERVERS,
+    SPOKEN,
+    Drive,
+    write_site,
+)
 from tests.proof.recovery import Recovery
 from tests.proof.waits import follow
 from tests.proof.witness import Clock, Witness
@@ -29,9 +39,9 @@ _HOUR_S: Final = 3600.0
 BRIDGE_HEARTBEAT: Final = 0x77F
 BRIDGE: Final = "bridge"
 SIMULATION: Final = "drives"
-FRONTS: Final = {"opcua": "opcua_front", "zenoh": "zenoh_front"}
-"""The process of each protocol that has one of its own."""
 _SERVES: Final = {"opcua": "INFO    OPC UA on", "zenoh": "INFO    zenoh on"}
+FRONTS: Final = {protocol: f"{protocol}_front" for protocol in _SERVES if protocol in SERVED}
+"""The process of each protocol that has one of its own."""
 _MAIN_THREAD: Final = ("chrt", "--reset-on-fork", "--other", "0")
 """What it may do more than others is not handed on to what it starts."""
 _LAST: Final = ("nice", "-n", "15")
@@ -153,7 +163,7 @@ class Rig:
             self._stack.callback(witness.close)
         self.watched.mkdir()
         watch = [sys.executable, "-m", "tests.proof.waits", str(self.watched)]
-        watch += [BRIDGE, *FRONTS.values(), SIMULATION, *PROTOCOLS]
+        watch += [BRIDGE, *FRONTS.values(), SIMULATION, *SPOKEN]
         self._stack.enter_context(running(self.folder, "watch", *watch))
         drives = [sys.executable, "-m", "bridge", "simulate", str(self._drives)]
         simulate = running(self.folder, "simulate", *_DRIVES_AHEAD, *drives)
@@ -162,7 +172,7 @@ class Rig:
         follow(self.watched, SIMULATION, simulation.pid)
         self.owners = {
             protocol: Owner(self.folder, self._stack, protocol, self.folder / "board", self.watched)
-            for protocol in PROTOCOLS
+            for protocol in SPOKEN
         }
         self.start_bridge()
         self._read_bounds()
@@ -177,8 +187,8 @@ class Rig:
         source = ("env", f"PYTHONPATH={self.tree}")
         command = [*source, *_MAIN_THREAD, sys.executable, "-m", "bridge", "run", str(self._site)]
         self.bridge = self._bridges.enter_context(running(self.disk.folder, name, *command))
-        for line in _SERVES.values():
-            self.bridge.wait_output(line, _LIMIT_S)
+        for protocol in FRONTS:
+            self.bridge.wait_output(_SERVES[protocol], _LIMIT_S)
         with suppress(PermissionError):
             os.setpriority(os.PRIO_PROCESS, self.bridge.pid, _AHEAD)
         follow(self.watched, BRIDGE, self.bridge.pid)

@@ -1,6 +1,6 @@
 """The times of the plants: two halves of all drives, slow enough for seven of them and their owners on one
-slow CPU, each with every protocol; and one with what a site file leaves to the program, of which that CPU
-bears three at ten times the frames. PROOF_PLANT says which, for all processes of a run."""
+slow CPU, each with every protocol; and two with what a site file leaves to the program, at ten times the
+frames, of which that CPU bears two drives. PROOF_PLANT says which, for all processes of a run."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ SECOND: Final = replace(
     name="second",
     nodes=("pump_modbus", "pump_zenoh", "lift_modbus", "lift_opcua", "fan_opcua", "fan_zenoh"),
 )
-DEFAULTS: Final = Settings(
-    "defaults",
-    nodes=("pump_zenoh", "lift_modbus", "fan_opcua"),
+FIRST_DEFAULTS: Final = Settings(
+    "first_defaults",
+    nodes=("pump_zenoh", "fan_modbus"),
     bus="",
     rpdo_period_ms=10,
     deadman_ms=100,
@@ -64,5 +64,6 @@ DEFAULTS: Final = Settings(
     label=", default settings",
     share=3,
 )
-PLANTS: Final = {plant.name: plant for plant in (FIRST, SECOND, DEFAULTS)}
+SECOND_DEFAULTS: Final = replace(FIRST_DEFAULTS, name="second_defaults", nodes=("lift_modbus", "fan_opcua"))
+PLANTS: Final = {plant.name: plant for plant in (FIRST, SECOND, FIRST_DEFAULTS, SECOND_DEFAULTS)}
 PLANT: Final = PLANTS[os.environ.get("PROOF_PLANT", FIRST.name)]

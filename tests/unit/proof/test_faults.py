@@ -12,10 +12,10 @@ import pytest
 
 from bridge.config import Reaction
 from tests.proof.drives import ALL, PROTOCOLS
-from tests.proof.families import CIA402
+from tests.proof.families import CIA402, LENZE, STOEBER
 from tests.proof.fault import Fault
 from tests.proof.faults import FAULTS
-from tests.proof.settings import FIRST, SECOND
+from tests.proof.settings import FIRST, FIRST_DEFAULTS, SECOND, SECOND_DEFAULTS, Settings
 from tests.support.process import REPOSITORY
 
 _PROOF = Path(REPOSITORY) / "tests" / "proof"
@@ -54,6 +54,11 @@ def test_every_reaction_and_every_kind_of_rpdo_is_there() -> None:
     assert any(drive.setpoint_rpdo for drive in ALL)
 
 
+def _deaf_is_possible(plant: Settings) -> bool:
+    """Its CiA 402 drive has an RPDO that waits for SYNC."""
+    return bool(next(drive for drive in ALL if drive.family is CIA402 and drive.node in plant.nodes).syncs)
+
+
 def test_each_half_has_every_protocol_and_both_have_every_drive() -> None:
     assert set(FIRST.nodes) | set(SECOND.nodes) == {drive.node for drive in ALL}
     assert not set(FIRST.nodes) & set(SECOND.nodes)
@@ -61,8 +66,17 @@ def test_each_half_has_every_protocol_and_both_have_every_drive() -> None:
         here = [drive for drive in ALL if drive.node in plant.nodes]
         assert {drive.protocol for drive in here} == set(PROTOCOLS)
         assert sum(drive.protocol == "modbus" for drive in here) > 1
-        # One that can be made deaf: its RPDO waits for SYNC.
-        assert next(drive for drive in here if drive.family is CIA402).syncs
+        assert _deaf_is_possible(plant)
+
+
+def test_default_settings_are_tried_with_every_protocol_and_with_outputs() -> None:
+    plants = (FIRST_DEFAULTS, SECOND_DEFAULTS)
+    here = [[drive for drive in ALL if drive.node in plant.nodes] for plant in plants]
+    assert {drive.protocol for drives in here for drive in drives} == set(PROTOCOLS)
+    assert {drive.family for drives in here for drive in drives} == {LENZE, STOEBER, CIA402}
+    # The outputs beside the drives are a Modbus owner's.
+    assert all(any(drive.protocol == "modbus" for drive in drives) for drives in here)
+    assert all(map(_deaf_is_possible, plants))
 
 
 def test_who_judges_imports_nothing_of_what_is_judged() -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Final, Self
 
-from tests.proof.drives import PORTS, SERVERS
+from tests.proof.drives import DRIVES, PORTS, SERVERS
 
 _LIMIT_S: Final = 5.0
 _WHO: Final = json.dumps({"controller": "colleague"})
@@ -38,6 +38,7 @@ class Asker:
             "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         }
         self._session: Any = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
+        self.refusals: list[str] = []
 
     def __enter__(self) -> Self:
         return self
@@ -47,6 +48,14 @@ class Asker:
     ) -> None:
         self._session.close()
 
+    def hear_refusals(self) -> None:
+        """Events of refused requests are kept in ``refusals`` from now on, once the bridge knows of it."""
+        self._refusals = self._session.declare_subscriber(
+            "drives/proof/@/event/refused", lambda sample: self.refusals.append(sample.payload.to_string())
+        )
+        # What it says later comes after what it has said.
+        self._ask(f"drives/proof/{DRIVES[0].path}/supervision/follows", None)
+
     def command(self, path: str, command: str) -> Answer:
         """``path`` is a drive's, or that of a node whose outputs it is."""
         return self._ask(f"drives/proof/{path}/command/{command}", "{}")
@@ -54,7 +63,7 @@ class Asker:
     def set_parameter(self, path: str, name: str, value: int) -> Answer:
         return self._ask(f"drives/proof/{path}/parameter/{name}", json.dumps({"v": value}))
 
-    def _ask(self, key: str, payload: str) -> Answer:
+    def _ask(self, key: str, payload: str | None) -> Answer:
         for reply in self._session.get(key, payload=payload, attachment=_WHO, timeout=_LIMIT_S):
             said = reply.ok or reply.err
             answer = json.loads(said.payload.to_string())

@@ -3,6 +3,7 @@ the owner may do to a drive that runs, or to outputs."""
 
 from __future__ import annotations
 
+import json
 import signal
 import time
 from collections.abc import Callable, Sequence
@@ -29,6 +30,7 @@ _LOOKS_S: Final = _AT_ONCE_MS / 1000 + _BURST_S + PLANT.deadman_ms / 1000
 """After it everything has happened that a request may bring about, the kernel's last burst included."""
 _TURNS: Final = 10
 _TURN_S: Final = 0.05
+_EVENT_S: Final = 2.0
 _CYCLES: Final = 4
 _NOT_ALLOWED: Final = 1
 """Modbus exception "illegal function": docs/reference/outcomes.md."""
@@ -138,19 +140,23 @@ def continue_silent(rig: Rig) -> None:
 
 def alternate(rig: Rig) -> list[Finding]:
     """A second connection of the owner's address stops and runs its drives by turns."""
-    assert rig.bridge
     drives = drives_of("modbus")
     connection = Connection.of_owner()
-    said = rig.bridge.output().count(f"port {connection.port}")
-    since = time.monotonic()
     codes: dict[Drive, list[int]] = {drive: [] for drive in drives}
-    for _ in range(_TURNS):
-        for drive in drives:
-            for word in (drive.family.ready, drive.family.run):
-                codes[drive].append(connection.write(drive, 0, word, drive.family.setpoint + NUMBERS))
-        time.sleep(_TURN_S)
-    time.sleep(_SILENT_S)
-    names_it = rig.bridge.output().count(f"port {connection.port}") > said
+    with Asker() as asker:
+        asker.hear_refusals()
+        since = time.monotonic()
+        for _ in range(_TURNS):
+            for drive in drives:
+                for word in (drive.family.ready, drive.family.run):
+                    codes[drive].append(connection.write(drive, 0, word, drive.family.setpoint + NUMBERS))
+            time.sleep(_TURN_S)
+        time.sleep(_SILENT_S)
+        ends = time.monotonic() + _EVENT_S
+        while len(named := _named(asker.refusals, f"port {connection.port}")) < len(drives):
+            if time.monotonic() > ends:
+                break
+            time.sleep(_TURN_S)
     connection.close()
     return [
         Finding(
@@ -160,12 +166,18 @@ def alternate(rig: Rig) -> list[Finding]:
                     _refused(codes[drive]),
                     measure.held(rig, drive, since),
                     _took_setpoint(rig, drive, since),
-                    "" if names_it else "nothing names the second connection",
+                    "" if drive.path in named else "no event names the second connection",
                 )
             ),
         )
         for drive in drives
     ]
+
+
+def _named(events: list[str], who: str) -> set[str]:
+    """The drives of which an event names ``who``."""
+    told = map(json.loads, list(events))
+    return {event["source"] for event in told if who in event["message"]}
 
 
 def _refused(codes: list[int]) -> str:

@@ -111,9 +111,7 @@ def continue_front(protocol: str) -> Undo:
 
 
 def stop_bridge(rig: Rig) -> float:
-    assert rig.bridge
-    now = time.monotonic()
-    rig.bridge.signal(signal.SIGSTOP)
+    now = rig.stand_still()
     time.sleep(_BLOCKED_S)
     return now
 
@@ -185,8 +183,7 @@ def reboot(rig: Rig) -> float:
 def pause_bridge(rig: Rig) -> float:
     """Stopped and continued before anything but the dead-man time is over."""
     assert rig.bridge
-    now = time.monotonic()
-    rig.bridge.signal(signal.SIGSTOP)
+    now = rig.stand_still()
     time.sleep(PLANT.paused_s)
     rig.bridge.signal(signal.SIGCONT)
     return now

@@ -122,8 +122,7 @@ def pause_beside_twin(rig: Rig) -> float:
     """The bridge stands still, and a frame of a second one waits for it. Its content is none of what the
     bridge itself has sent lately: on this host only that tells it from the bridge's own."""
     assert rig.bridge
-    now = time.monotonic()
-    rig.bridge.signal(signal.SIGSTOP)
+    now = rig.stand_still()
     time.sleep(PLANT.paused_s)
     machine.send(BRIDGE_SIDE, BRIDGE_HEARTBEAT, _PRE_OPERATIONAL)
     rig.bridge.signal(signal.SIGCONT)

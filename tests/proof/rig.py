@@ -211,13 +211,20 @@ class Rig:
     def send_guests_away(self) -> None:
         self.guests.pop_all().close()
 
+    def stand_still(self) -> float:
+        """The bus process is stopped. Gives the time from which it does nothing: it may have had its turn
+        while it was told so, and what it did there is none of the fault's."""
+        assert self.bridge
+        self.bridge.signal(signal.SIGSTOP)
+        return time.monotonic()
+
     def kill_bridge(self) -> float:
         """The bus process dies; its fronts go with it."""
         assert self.bridge
         with suppress(OSError, Stuck):
             self._fronts = tuple(self.front(protocol) for protocol in FRONTS)
-        now = time.monotonic()
         self.bridge.popen.kill()
+        now = time.monotonic()
         self.bridge.popen.wait()
         return now
 

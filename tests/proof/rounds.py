@@ -101,7 +101,7 @@ def _examined(rig: Rig, fault: Fault, examine: Examine, say: Callable[[str], Non
     samples: list[Sample] = []
     for finding in found:
         of, spans = finding.of, finding.spans
-        if finding.wrong and _hung(rig, of if isinstance(of, Drive) else None, began):
+        if finding.wrong and _was_held_up(rig, of if isinstance(of, Drive) else None, began):
             say(f"the machine was slow: {fault.name}: {of.path}: {finding.wrong}")
             rig.by_themselves += 1
             continue
@@ -179,12 +179,17 @@ def _was_slow(rig: Rig, drive: Drive, since: float) -> bool:
     return max(waited, measure.longest_pause(rig, drive, since) * 1000) >= PLANT.deadman_ms
 
 
-def _hung(rig: Rig, drive: Drive | None, since: float) -> bool:
-    """The same at a stretch, in what takes seconds; ``drive``: None for outputs, which say nothing."""
+def _was_held_up(rig: Rig, drive: Drive | None, since: float) -> bool:
+    """The same at a stretch, in what takes seconds, or those who keep the drive moving were; ``drive``: None
+    for outputs, which say nothing."""
     now = time.monotonic()
     hung = longest_wait_ms(rig.watched, BRIDGE, since, now)
-    silent = measure.longest_pause(rig, drive, since) * 1000 if drive else 0.0
-    return max(hung, silent) >= PLANT.deadman_ms
+    if drive is None:
+        return hung >= PLANT.deadman_ms
+    silent = measure.longest_pause(rig, drive, since) * 1000
+    # It may have been silent for a while when this began.
+    since -= PLANT.fieldbus_timeout_ms / 1000
+    return max(hung, silent) >= PLANT.deadman_ms or _was_starved(rig, drive, since)
 
 
 def _all_move(rig: Rig, say: Callable[[str], None]) -> None:

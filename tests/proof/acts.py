@@ -262,8 +262,7 @@ def pause_across_deadline(rig: Rig) -> float:
 def end_bridge(number: signal.Signals) -> Inject:
     def inject(rig: Rig) -> float:
         assert rig.bridge
-        now = time.monotonic()
         rig.bridge.signal(number)
-        return now
+        return time.monotonic()
 
     return inject

@@ -158,14 +158,13 @@ def bus_restarted() -> None:
 
 
 def set_link(channel: str, *, up: bool) -> float:
-    """``ip link set CHANNEL up`` or ``down``; gives the time before it."""
+    """``ip link set CHANNEL up`` or ``down``; gives the time from which it is."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
         name = channel.encode()
         (_, flags) = _IFREQ.unpack(fcntl.ioctl(control, _GET_FLAGS, _IFREQ.pack(name, 0)))
         flags = flags | _IFF_UP if up else flags & ~_IFF_UP
-        now = time.monotonic()
         fcntl.ioctl(control, _SET_FLAGS, _IFREQ.pack(name, flags))
-    return now
+    return time.monotonic()
 
 
 def cut_networks(addresses: Sequence[str]) -> None:
@@ -196,11 +195,11 @@ def _ptrace(request: int, thread: int, address: int = 0, data: int = 0) -> int:
 
 
 def block_thread(thread: int, seconds: float) -> float:
-    """Stop one thread of a child of ours, no other of its process. Gives the time before it."""
+    """Stop one thread of a child of ours, no other of its process. Gives the time from which it stands."""
     _ptrace(_SEIZE, thread)
-    now = time.monotonic()
     _ptrace(_INTERRUPT, thread)
     os.waitpid(thread, _WALL)
+    now = time.monotonic()
     time.sleep(max(0.0, now + seconds - time.monotonic()))
     _ptrace(_DETACH, thread)
     return now

@@ -96,10 +96,12 @@ class Service:
         endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
         period_ms = site.zenoh.period_ms if site.zenoh else _NOBODY_HURRIES_MS
         self.mirror = MirrorPublisher(self.view, endpoint, clock.now, period_ms / 1000)
+        folder = Path(site.site.runtime_dir)
+        taps = {table.name: tap_path(folder, site.site.name, table.name) for table in site.bus}
         self.gateways = {
             table.name: GatewayServer(
                 self.view,
-                net_of(table, number, self.plant.nodes.values()),
+                net_of(table, number, self.plant.nodes.values(), taps[table.name]),
                 Path(site.site.runtime_dir).absolute() / f"{site.site.name}-{table.name}.gateway",
                 None if table.gateway == "socket" else table.gateway,
                 clock.now,
@@ -108,11 +110,11 @@ class Service:
             if table.gateway
         }
         self._taps = [
-            Wiretap(bus, tap_path(Path(site.site.runtime_dir), site.site.name, bus.name))
+            Wiretap(bus, taps[bus.name])
             for bus, _ in networks
-            if site.page and isinstance(bus, SoftBus)
+            if (site.page or bus.name in self.gateways) and isinstance(bus, SoftBus)
         ]
-        """For the page, of buses that no other process can listen to."""
+        """For the page and for clients of the gateway, of buses that no other process can listen to."""
         self._tasks: list[asyncio.Task[None]] = []
         self._ending: Ending | None = None
         drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")

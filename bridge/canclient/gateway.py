@@ -13,11 +13,14 @@ _LONGEST_S: Final = 70.0
 
 
 class GatewayError(Exception):
-    """The gateway has answered with an error. ``code`` is an SDO abort code, or below 1000h its own."""
+    """The gateway has answered with an error. ``code`` is an SDO abort code, or below 1000h its own; ``why``
+    says what was asked for and what is in the way."""
 
-    def __init__(self, code: int) -> None:
-        super().__init__(f"{code:08X}h" if code >= 0x1000 else f"error {code}")
+    def __init__(self, code: int, why: str = "") -> None:
+        said = f"{code:08X}h" if code >= 0x1000 else f"error {code}"
+        super().__init__(f"{why} ({said})" if why else said)
         self.code = code
+        self.why = why
 
 
 class GatewayClient:
@@ -54,7 +57,8 @@ class GatewayClient:
                     break
         answer = line.removeprefix(begin).strip()
         if answer.startswith(_ERROR):
-            raise GatewayError(int(answer.removeprefix(_ERROR), 0))
+            code, _, why = answer.removeprefix(_ERROR).partition("#")
+            raise GatewayError(int(code, 0), why.strip())
         return answer
 
     def close(self) -> None:

@@ -79,6 +79,8 @@ anonymous = "operator"
 listen = ["tcp/127.0.0.1:{zenoh}"]
 """
 HOST = "127.0.0.1"
+_SET = "[5] 5 w 0x2066 1 i16 103"
+"""Carried out by a node in operation alone."""
 TABLE = random.Random(1).randbytes(3000)
 VALUES = {
     "b": "1",
@@ -185,7 +187,7 @@ def test_the_socket_is_its_users_alone(shop: Shop) -> None:
 def test_whoever_comes_by_tcp_reads_and_sets_no_parameters(shop: Shop) -> None:
     with closing(Tool(socket.create_connection((HOST, shop.gateway)))) as tool:
         assert tool.ask("[1] 5 r 0x1001 0 u8") == "[1] 0"
-        assert tool.ask("[2] 5 w 0x2066 1 i16 103") == "[2] ERROR:0x08000021"
+        assert tool.ask("[2] 5 w 0x2066 1 i16 103").startswith("[2] ERROR:0x08000021 #2066h:01: ")
 
 
 def test_nmt_is_a_request_of_the_bridge(tool: Tool) -> None:
@@ -193,9 +195,13 @@ def test_nmt_is_a_request_of_the_bridge(tool: Tool) -> None:
     for command in ("preop", "stop", "reset comm", "reset node"):
         assert tool.ask(f"[2] {command}") == "[2] OK"
         if command in ("preop", "stop"):
-            assert tool.ask("[3] r 0x1000 0 u32") == "[3] ERROR:102"
+            asked = tool.ask("[3] r 0x1000 0 u32")
+            # A node in Stopped answers no SDO (CiA 301 §7.3.2.2.4).
+            assert asked.startswith("[3] ERROR:0x05040000 #") == (command == "stop"), asked
+            assert asked.startswith("[3] ERROR") == (command == "stop"), asked
+            assert tool.ask(_SET).startswith("[5] ERROR:102 #2066h:01: ")
             assert tool.ask("[4] start") == "[4] OK"
-        until(lambda: tool.is_operational(5), 20.0, f"operational after {command}")
+        until(lambda: tool.ask(_SET) == "[5] OK", 20.0, f"operational after {command}")
 
 
 # a session beside a thousand reads
@@ -226,9 +232,9 @@ def errors(tool: Tool) -> None:
         ("5 w 0x3000 1 u16 1151", "0x08000021"),
         ("5 r 0x2066 1 i64", "0x06070010"),
     ):
-        assert tool.ask(f"[7] {line}") == f"[7] ERROR:{code}", line
+        assert tool.ask(f"[7] {line}").partition(" #")[0] == f"[7] ERROR:{code}", line
     tool.say(*(f"[{number}] 5 r 0x2069 1 i16" for number in range(40)))
-    heard = sorted(tool.hear().partition("] ")[2] for _ in range(40))
+    heard = sorted(tool.hear().partition("] ")[2].partition(" #")[0] for _ in range(40))
     assert heard.count("500") >= 8, "as many as may wait"
     assert 0 < heard.count("ERROR:600") == 40 - heard.count("500")
 
@@ -272,6 +278,24 @@ def canopen_session(shop: Shop, is_over: Callable[[], bool]) -> int:
     finally:
         network.disconnect()
     return rounds
+
+
+def test_python_canopen_hears_what_the_nodes_send(shop: Shop, tool: Tool) -> None:
+    network = canopen.Network()
+    network.bus = DrivebridgeBus("shop/can0", runtime_dir=str(shop.folder / "run"))
+    network.connect()
+    try:
+        conveyor, press = (
+            network.add_node(canopen.RemoteNode(n, canopen.ObjectDictionary())) for n in (5, 6)
+        )
+        states: list[int] = []
+        press.nmt.add_heartbeat_callback(states.append)
+        press.nmt.state = "RESET"
+        until(lambda: 0 in states, 20.0, "the boot-up of node 6 is heard")
+        until(lambda: conveyor.nmt.state == press.nmt.state == "OPERATIONAL", 20.0, "both are operational")
+        until(lambda: tool.is_operational(6), 20.0, "the bridge serves node 6 again")
+    finally:
+        network.disconnect()
 
 
 async def read_by_opcua(shop: Shop, times: int) -> None:

@@ -60,6 +60,9 @@ _CODES: Final = {
     Why.NOT_TAKEN: Code.REFUSED_BY_DRIVE,
     Why.NOT_CONFIGURED: Code.NOT_CONFIGURED,
 }
+_ANSWERS: Final = frozenset((NodeState.OPERATIONAL, NodeState.STOPPED, NodeState.CONFIG_ERROR))
+"""Where a node can be asked: it is heard, and its boot-up does not need the channel. One in Pre-operational
+answers (CiA 301 §7.3.2.2.2), one in Stopped does not."""
 Waiting = list[Callable[[Reading | ParameterError], None]]
 
 
@@ -142,7 +145,8 @@ class NodeParameters:
         why = "" if request.action is Action.READ_PARAMETER else _why_not_set(request.identity, drive)
         if why:
             return _no(Code.NOT_ALLOWED, why)
-        if self._state is not NodeState.OPERATIONAL:
+        is_there = request.action is Action.READ_PARAMETER and self._state in _ANSWERS
+        if not (is_there or self._state is NodeState.OPERATIONAL):
             return _no(Code.NOT_READY, f"the drive's node is {self._state.value}")
         if request.action is not Action.SAVE_PARAMETERS and self._channels[drive.name] is None:
             return _no(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Final
 
 from bridge import __version__
@@ -15,14 +16,16 @@ _VERSION: Final = "0 0 {version} 0 1 3.00 {version}"
 implementation (CiA 309-3). The bridge has neither a vendor id nor a serial number."""
 
 
-def net_of(bus: BusTable, number: int, nodes: Iterable[Node]) -> Net:
-    """``number`` is what clients call it; ``nodes`` are those of the site."""
+def net_of(bus: BusTable, number: int, nodes: Iterable[Node], tap: Path) -> Net:
+    """``number`` is what clients call it; ``nodes`` are those of the site; at ``tap`` the bus process passes
+    its frames on where no other process can hear them."""
     version = ".".join(__version__.split(".")[:2])
     return Net(
         number,
         f"bus/{bus.name}",
         {node.table.id: (node.name, _on_first(node)) for node in nodes if node.bus is bus},
         _VERSION.format(version=version),
+        f"socketcan {bus.channel}" if bus.interface == "socketcan" else f"tap {tap}",
     )
 
 

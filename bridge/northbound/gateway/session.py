@@ -13,6 +13,7 @@ from bridge.northbound.gateway.datatypes import BadText, decode
 from bridge.northbound.gateway.syntax import (
     LONGEST_LINE,
     ErrorCode,
+    Frames,
     Nmt,
     Read,
     Refused,
@@ -57,6 +58,9 @@ class Net:
     nodes: Mapping[int, tuple[str, str | None]]
     version: str = "0 0 0 0 0 3.00 0.0"
     """The answer to ``info version``."""
+    frames: str = ""
+    """The answer to ``_frames``: ``socketcan`` with the interface, or ``tap`` with the path of the socket
+    that passes them on."""
 
 
 Submit = Callable[[Request, Reply], None]
@@ -73,6 +77,8 @@ class _Defaults:
 class _Pending:
     sequence: int
     deadline: float
+    asks_for: str
+    """The object, as ``6083h:00``, or the target of an NMT command."""
     is_open: bool = field(default=True)
 
 
@@ -136,18 +142,20 @@ class Session:
                 case Version():
                     self._check_net(found.net)
                     self._say(sequence, self._net.version)
+                case Frames():
+                    self._say(sequence, self._net.frames)
                 case Nmt(action):
                     self._check_net(found.net)
                     target = self._nmt_target(found.node)
-                    self._ask(sequence, Request(self._identity, target, Do(action)), None, now)
+                    self._ask(sequence, Request(self._identity, target, Do(action)), target, now)
                 case Read(index, sub, kind):
                     command = ReadParameter(f"{index:04X}:{sub:02X}", raw=True)
                     request = Request(self._identity, self._drive(found.net, found.node), command)
-                    self._ask(sequence, request, kind, now)
+                    self._ask(sequence, request, f"{index:04X}h:{sub:02X}", now, kind)
                 case Write(index, sub, data):
                     written = WriteParameter(f"{index:04X}:{sub:02X}", data.hex(" ").upper(), raw=True)
                     request = Request(self._identity, self._drive(found.net, found.node), written)
-                    self._ask(sequence, request, None, now)
+                    self._ask(sequence, request, f"{index:04X}h:{sub:02X}", now)
         except Refused as error:
             self._answer(sequence, error.code)
 
@@ -203,10 +211,12 @@ class Session:
 
     # requests and their ends
 
-    def _ask(self, sequence: int, request: Request, kind: str | None, now: float) -> None:
+    def _ask(
+        self, sequence: int, request: Request, asks_for: str, now: float, kind: str | None = None
+    ) -> None:
         if len(self._pending) >= MOST_PENDING:
             raise Refused(ErrorCode.OUT_OF_MEMORY)
-        pending = _Pending(sequence, now + self._defaults.timeout_s)
+        pending = _Pending(sequence, now + self._defaults.timeout_s, asks_for)
         self._pending.append(pending)
         self._submit(request, partial(self._on_outcome, pending, kind, isinstance(request.command, Do)))
 
@@ -215,14 +225,16 @@ class Session:
             return
         self._close(pending)
         if not outcome.ok:
-            self._answer(pending.sequence, _error(outcome, is_nmt=is_nmt))
+            reason = _reason(outcome)
+            why = reason if pending.asks_for in reason else f"{pending.asks_for}: {reason}"
+            self._answer(pending.sequence, _error(outcome, is_nmt=is_nmt), why)
         elif kind is None:
             self._say(pending.sequence, "OK")
         else:
             try:
                 text = decode(kind, bytes.fromhex(str(outcome.value)))
             except BadText:
-                self._answer(pending.sequence, _TYPE_MISMATCH)
+                self._answer(pending.sequence, _TYPE_MISMATCH, f"{pending.asks_for}: no {kind}")
             else:
                 self._say(pending.sequence, text)
         if not self._is_working:
@@ -255,12 +267,18 @@ class Session:
         lines, self._lines = self._lines, []
         return "".join(lines).encode("utf-8")
 
-    def _answer(self, sequence: int, code: int) -> None:
-        is_own = isinstance(code, ErrorCode)
-        self._say(sequence, f"ERROR:{int(code)}" if is_own else f"ERROR:0x{code:08X}")
+    def _answer(self, sequence: int, code: int, why: str = "") -> None:
+        """``why`` goes behind the code as a comment, as gateways of CANopenNode have it."""
+        said = f"ERROR:{int(code)}" if isinstance(code, ErrorCode) else f"ERROR:0x{code:08X}"
+        self._say(sequence, f"{said} #{' '.join(why.split())}" if why else said)
 
     def _say(self, sequence: int, text: str) -> None:
         self._lines.append(f"[{sequence}] {text}\r\n")
+
+
+def _reason(outcome: Outcome) -> str:
+    """The bridge's sentence, or what the code means."""
+    return outcome.message or abort.TEXTS.get(outcome.abort_code or 0) or outcome.code.value
 
 
 def _error(outcome: Outcome, *, is_nmt: bool) -> int:

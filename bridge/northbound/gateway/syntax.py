@@ -81,7 +81,12 @@ class Version:
     """``info version``."""
 
 
-Command = Read | Write | Nmt | Set | Version
+@dataclass(frozen=True, slots=True)
+class Frames:
+    """``_frames``, a command of our own: where the frames of the bus can be heard."""
+
+
+Command = Read | Write | Nmt | Set | Version | Frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +176,8 @@ def _command(words: list[str]) -> Command:
             raise Refused(ErrorCode.NOT_SUPPORTED) from None
     if [first, *(word.lower() for word in rest)] == ["info", "version"]:
         return Version()
+    if words == ["_frames"]:
+        return Frames()
     is_known = first in _OTHERS or first.startswith(("lss_", "_"))
     raise Refused(ErrorCode.NOT_SUPPORTED if is_known else ErrorCode.SYNTAX)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Code
+from bridge.command import Action, Code
 from bridge.image import Quality
 from tests.unit.node.test_parameters import OBSERVER, OPERATOR, READ, WRITE, Parameters
 
@@ -57,3 +57,27 @@ def test_what_is_protected_is_protected_as_bytes(parameters: Parameters, address
 
 def test_rights_are_those_of_a_parameter(parameters: Parameters) -> None:
     assert parameters.write("P102", "67 00", raw=True, identity=OPERATOR).code is Code.NOT_ALLOWED
+
+
+def test_a_node_that_is_held_in_pre_operational_is_asked_and_not_written(parameters: Parameters) -> None:
+    assert parameters.ask(Action.ENTER_PRE_OPERATIONAL, target="conveyor").ok
+    assert parameters.ask(READ, OBSERVER, parameter="1018:00", raw=True).value == "04"
+    assert parameters.write("P102", "67 00", raw=True).code is Code.NOT_READY
+    assert parameters.downloads(0x2066) == []
+
+
+def test_a_node_in_stopped_does_not_answer_and_everybody_is_told(parameters: Parameters) -> None:
+    assert parameters.ask(Action.STOP_NODE, target="conveyor").ok
+    outcomes = parameters.begin(READ, OBSERVER, parameter="1018:00", raw=True)
+    parameters.bench.run(5.0)
+    assert [outcome.code for outcome in outcomes] == [Code.TIMED_OUT]
+
+
+def test_a_question_that_a_boot_up_ends_is_answered(parameters: Parameters) -> None:
+    parameters.ask(Action.STOP_NODE, target="conveyor")
+    outcomes = parameters.begin(READ, OBSERVER, parameter="1018:00", raw=True)
+    parameters.ask(Action.START_NODE, target="conveyor")
+    parameters.bench.run(2.0)
+    assert len(outcomes) == 1
+    assert not outcomes[0].ok
+    assert parameters.ask(READ, OBSERVER, parameter="1018:00", raw=True).value == "04"

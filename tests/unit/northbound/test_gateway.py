@@ -14,7 +14,13 @@ from bridge.northbound.gateway.session import MOST_PENDING, Net, Session
 from bridge.northbound.gateway.syntax import LONGEST_LINE, Refused, parse, split_sequence
 
 TOOL = Identity(Source.LOCAL, "gateway", Role.ENGINEER)
-NET = Net(1, "bus/can0", {5: ("conveyor", "conveyor/fu1"), 6: ("encoder", None)}, "0 0 0.1 0 1 3.00 0.1")
+NET = Net(
+    1,
+    "bus/can0",
+    {5: ("conveyor", "conveyor/fu1"), 6: ("encoder", None)},
+    "0 0 0.1 0 1 3.00 0.1",
+    "tap /run/hall-can0.frames",
+)
 
 
 class Client:
@@ -157,7 +163,7 @@ def test_a_read_without_a_type_gives_bytes(client: Client) -> None:
 
 def test_a_value_of_another_length_is_a_mismatch(client: Client) -> None:
     client.say("[7] 5 r 0x2066 1 i32")
-    assert client.end(Outcome(Code.OK, value="67 00")) == "[7] ERROR:0x06070010\r\n"
+    assert client.end(Outcome(Code.OK, value="67 00")) == "[7] ERROR:0x06070010 #2066h:01: no i32\r\n"
 
 
 def test_a_write_is_a_request_with_the_bytes(client: Client) -> None:
@@ -171,16 +177,26 @@ def test_a_write_is_a_request_with_the_bytes(client: Client) -> None:
 @pytest.mark.parametrize(
     ("outcome", "error"),
     [
-        (Outcome(Code.REFUSED_BY_DRIVE, abort_code=0x0602_0000), "0x06020000"),
-        (Outcome(Code.NOT_ALLOWED), "0x08000021"),
-        (Outcome(Code.READ_ONLY), "0x06010002"),
-        (Outcome(Code.TIMED_OUT), "103"),
-        (Outcome(Code.NOT_READY), "102"),
+        (
+            Outcome(Code.REFUSED_BY_DRIVE, abort_code=0x0602_0000),
+            "0x06020000 #2066h:01: object does not exist in the object dictionary",
+        ),
+        (
+            Outcome(Code.NOT_ALLOWED, "the drive is\r\nsomebody's"),
+            "0x08000021 #2066h:01: the drive is somebody's",
+        ),
+        (Outcome(Code.READ_ONLY), "0x06010002 #2066h:01: read_only"),
+        (Outcome(Code.TIMED_OUT), "103 #2066h:01: timed_out"),
+        (Outcome(Code.NOT_READY, "its node is booting"), "102 #2066h:01: its node is booting"),
     ],
 )
-def test_a_failure_has_its_code(client: Client, outcome: Outcome, error: str) -> None:
+def test_a_failure_has_its_code_with_object_and_reason(client: Client, outcome: Outcome, error: str) -> None:
     client.say("[9] 5 w 0x2066 1 i16 103")
     assert client.end(outcome) == f"[9] ERROR:{error}\r\n"
+
+
+def test_where_the_frames_can_be_heard_is_told(client: Client) -> None:
+    assert client.say("[3] _frames") == "[3] tap /run/hall-can0.frames\r\n"
 
 
 def test_answers_have_the_sequence_of_their_command(client: Client) -> None:
@@ -209,7 +225,7 @@ def test_nmt_is_a_request_like_any_other(
 ) -> None:
     client.say(f"[1] {node} {words}")
     assert client.requests == [Request(TOOL, target, Do(action))]
-    assert client.end(Outcome(Code.NOT_ALLOWED)) == "[1] ERROR:102\r\n"
+    assert client.end(Outcome(Code.NOT_ALLOWED)) == f"[1] ERROR:102 #{target}: not_allowed\r\n"
 
 
 # what is answered at once

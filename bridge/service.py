@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import AsyncExitStack, suppress
 from functools import partial
 from pathlib import Path
@@ -98,17 +98,7 @@ class Service:
         self.mirror = MirrorPublisher(self.view, endpoint, clock.now, period_ms / 1000)
         folder = Path(site.site.runtime_dir)
         taps = {table.name: tap_path(folder, site.site.name, table.name) for table in site.bus}
-        self.gateways = {
-            table.name: GatewayServer(
-                self.view,
-                net_of(table, number, self.plant.nodes.values(), taps[table.name]),
-                Path(site.site.runtime_dir).absolute() / f"{site.site.name}-{table.name}.gateway",
-                None if table.gateway == "socket" else table.gateway,
-                clock.now,
-            )
-            for number, table in enumerate(site.bus, 1)
-            if table.gateway
-        }
+        self.gateways = self._make_gateways(taps)
         self._taps = [
             Wiretap(bus, taps[bus.name])
             for bus, _ in networks
@@ -130,6 +120,22 @@ class Service:
         self._zenoh = site.zenoh if "zenoh" in fronts else None
         if self._zenoh:
             self._add_front("zenoh")
+
+    def _make_gateways(self, taps: Mapping[str, Path]) -> dict[str, GatewayServer]:
+        """By bus; ``taps`` are where the frames of each are passed on."""
+        site = self.project.site
+        folder = Path(site.site.runtime_dir).absolute()
+        return {
+            table.name: GatewayServer(
+                self.view,
+                net_of(table, number, self.plant.nodes.values(), taps[table.name]),
+                folder / f"{site.site.name}-{table.name}.gateway",
+                None if table.gateway == "socket" else table.gateway,
+                clock.now,
+            )
+            for number, table in enumerate(site.bus, 1)
+            if table.gateway
+        }
 
     def _add_front(self, role: str, port: Port | None = None) -> None:
         """``port`` is what this process holds for it."""

@@ -125,14 +125,12 @@ class Line:
     def __post_init__(self) -> None:
         self.repeated = Repeated(self.network, self.plant)
 
-    def receive(self, now: float) -> None:
-        """Take in what has come since the last call."""
+    def receive(self, now: float) -> list[Frame]:
+        """Take in what has come since the last call; gives what others have sent on identifiers of ours."""
         frames = self.bus.drain(now)
         if frames:
             self.network.on_frames(frames, now)
-        foreign = self.bus.take_foreign(now)
-        if foreign:
-            self.network.on_foreign(foreign, now)
+        return self.bus.take_foreign(now)
 
     @property
     def has_news(self) -> bool:

@@ -190,8 +190,7 @@ class Master:
             return
         self._check_gap(now)
         self._last_round = now
-        for line in self._lines:
-            line.receive(now)
+        now = self._receive(now)
         if self._plant.has_news or self._lines_have_news():
             self.pump()
             return
@@ -204,6 +203,17 @@ class Master:
         else:
             self._set_timer_for(due)
 
+    def _receive(self, now: float) -> float:
+        """Take in what has come; gives the time up to which. The process may have been stopped since it
+        looked at the clock: then what others have sent came in the gap, in which one may have taken over."""
+        for line in self._lines:
+            if foreign := line.receive(now):
+                now = self._clock()
+                self._check_gap(now)
+                self._last_round = now
+                line.network.on_foreign(foreign, now)
+        return now
+
     def _lines_have_news(self) -> bool:
         return any(line.has_news for line in self._lines)
 
@@ -214,8 +224,7 @@ class Master:
         if self._due is not None:
             self._lateness.on_round(self._due, now)
             self._due = None
-        for line in self._lines:
-            line.receive(now)
+        now = self._receive(now)
         self._plant.on_time(now, self._enforce)
         for line in self._lines:
             line.network.on_time(now)

@@ -71,6 +71,34 @@ def the_frame_comes_a_round_later(bench: Bench) -> None:
     bench.receive(TWIN)
 
 
+def hangs_in(bench: Bench, name: str) -> None:
+    """The process has looked at the clock, and stands still as it begins to read what has come."""
+    reads = getattr(bench.bus, name)
+
+    def hangs(now: float) -> list[Frame]:
+        setattr(bench.bus, name, reads)
+        bench.hang(HANG_S)
+        bench.receive(TWIN)
+        frames: list[Frame] = reads(now)
+        return frames
+
+    setattr(bench.bus, name, hangs)
+    bench.run(0.0)
+
+
+def it_hangs_as_it_reads(bench: Bench) -> None:
+    hangs_in(bench, "drain")
+
+
+def it_hangs_as_it_reads_what_others_sent(bench: Bench) -> None:
+    hangs_in(bench, "take_foreign")
+
+
+def it_hangs_as_it_reads_in_a_round(bench: Bench) -> None:
+    bench.master._due = None
+    hangs_in(bench, "drain")
+
+
 def the_frame_comes_with_the_bus(bench: Bench) -> None:
     bench.bus.status.state = ControllerState.DOWN
     bench.run(0.05)
@@ -102,6 +130,9 @@ CAUSES: Final[dict[str, Callable[[Bench], None]]] = {
         one_frame_after_a_hang,
         many_frames_after_a_hang,
         the_frame_comes_a_round_later,
+        it_hangs_as_it_reads,
+        it_hangs_as_it_reads_what_others_sent,
+        it_hangs_as_it_reads_in_a_round,
         the_frame_comes_with_the_bus,
         the_frame_comes_after_a_short_outage,
         the_bus_goes_while_it_gives_way,

@@ -41,6 +41,8 @@ from tests.proof.settings import PLANT
 from tests.support.process import REPOSITORY
 
 _MOST_EXTRA_ROUNDS = 3
+_LINES_SHOWN = 20
+"""Of the bridge's log, where the plant was stuck."""
 
 
 def say(text: str) -> None:
@@ -133,7 +135,8 @@ def _round(rig: Rig, fault: Fault, errors: list[str]) -> list[Sample]:
         return run_round(rig, fault, say)
     except Stuck as error:
         errors.append(str(error))
-        say(f"FAILED: {error}")
+        said = rig.bridge.output().splitlines()[-_LINES_SHOWN:] if rig.bridge else []
+        say("\n  ".join([f"FAILED: {error}", *said]))
         rig.mend()
         return []
 

@@ -162,6 +162,21 @@ def test_a_setpoint_that_goes_on_after_the_stop_is_seen() -> None:
     assert not keeps_setpoint(rig, FAN, 12.1)
     rig.told.frames[FAN.setpoint_rpdo] = [Run(9.0, 13.0, b"\xe8\x03")]
     assert keeps_setpoint(rig, FAN, 12.1)
+    assert keeps_setpoint(rig, FAN, 12.0)
+
+
+def test_a_setpoint_with_the_last_enabling_word_goes_before_the_stop() -> None:
+    rig = scene(told=[Run(9.0, 12.0, RUN), Run(12.1, 13.0, QUICK_STOP)], drive=FAN)
+    rig.told.frames[FAN.setpoint_rpdo] = [Run(9.0, 12.001, b"\xe8\x03"), Run(12.1, 13.0, bytes(2))]
+    assert not keeps_setpoint(rig, FAN, 12.0)
+
+
+def test_a_setpoint_falls_silent_in_the_period_of_the_last_enabling_word() -> None:
+    rig = scene(told=[Run(9.0, 12.0, RUN)], drive=FAN)
+    rig.told.frames[FAN.setpoint_rpdo] = [Run(9.0, 12.09, b"\xe8\x03")]
+    assert not keeps_setpoint(rig, FAN, 12.0)
+    rig.told.frames[FAN.setpoint_rpdo] = [Run(9.0, 12.19, b"\xe8\x03")]
+    assert keeps_setpoint(rig, FAN, 12.0)
 
 
 def test_the_reaction_is_the_first_word_that_does_not_enable() -> None:
@@ -202,16 +217,17 @@ SAMPLE = Sample(
     ("change", "verdict"),
     [
         ({}, "ok"),
-        ({"bus_ms": 570.1}, "failed"),
-        ({"drive_ms": 721.0}, "failed"),
+        ({"bus_ms": 570.1}, "void"),
+        ({"bus_ms": 572.1}, "failed"),
+        ({"drive_ms": 723.0}, "failed"),
         ({"bus_ms": 600.0, "paused_ms": 40.0}, "void"),
         ({"bus_ms": 600.0, "paused_ms": 29.0}, "failed"),
         ({"bus_ms": 600.0, "waited_ms": 30.0}, "void"),
         ({"bus_ms": 600.0, "waited_ms": 29.0}, "failed"),
         ({"bus_ms": 600.0, "noise_ms": 150.0}, "ok"),
         ({"wrong": "it is to hold"}, "failed"),
-        ({"way_ms": 251.0}, "failed"),
-        ({"sent_ms": 821.0, "sent_bound_ms": 820.0}, "failed"),
+        ({"way_ms": 253.0}, "failed"),
+        ({"sent_ms": 823.0, "sent_bound_ms": 820.0}, "failed"),
         ({"way_ms": 260.0, "waited_ms": 10.0}, "void"),
         ({"drive_ms": None, "drive_bound_ms": None}, "ok"),
     ],

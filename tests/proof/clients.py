@@ -10,9 +10,11 @@ from typing import Any, Protocol
 
 from tests.proof.board import RELEASE
 from tests.proof.drives import PORTS, SERVERS, Drive, drives_of
+from tests.proof.settings import PLANT
 
-_LIMIT_S = 2.5
-"""Longer than the bridge or the network is held up here: waiting on is quicker than connecting anew."""
+_LIMIT_S = PLANT.fieldbus_timeout_ms / 1000 + 1.5
+"""Longer than the bridge or the network is held up here: waiting on is quicker than connecting anew, which a
+drive that is to hold takes for another owner."""
 _CONNECT_S = 20.0
 _KEEP_ALIVE = 10
 """Holding register (docs/reference/modbus.md): 0 releases the drive."""

@@ -16,6 +16,7 @@ from bridge.errors import OperationFailed
 from bridge.guard import Guard
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
+from bridge.mirror.endpoint import LEASE_MS
 from bridge.mirror.protocol import Answered, Changed, Connected, Counted, Delta, Malformed, Snapshot
 from bridge.mirror.rejections import Rejections
 from bridge.quietlog import about
@@ -205,7 +206,7 @@ class MirrorClient:
             raise
 
     def _new_link(self) -> ZenohLink:
-        return ZenohLink(zenoh_config(connect=[self._endpoint]), "mirror")
+        return ZenohLink(zenoh_config(connect=[self._endpoint], lease_ms=LEASE_MS), "mirror")
 
     async def _connect(self) -> None:
         await self._open(self._link)

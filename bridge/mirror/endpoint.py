@@ -9,6 +9,11 @@ from typing import Final
 
 from bridge.errors import Unavailable
 
+LEASE_MS: Final = 10_000
+"""More than a front or the bus process may hang before it is killed (``bridge/front_process.py``,
+``WatchdogSec``). Where zenoh ends the connection of one that only stood still, what was asked over it is
+lost, and its client waits for its time-out. Who hangs is noticed by the deltas and signs that do not come."""
+
 _LONGEST_PATH: Final = 100
 """A socket's path has room for 107 bytes (``unix(7)``); zenoh puts a lock file beside it."""
 

@@ -16,7 +16,7 @@ from bridge.command.freshness import NEVER, TAKEN_LATE
 from bridge.errors import Unavailable
 from bridge.image import Feed, Point
 from bridge.mirror import protocol
-from bridge.mirror.endpoint import close_to_others, prepare_folder
+from bridge.mirror.endpoint import LEASE_MS, close_to_others, prepare_folder
 from bridge.mirror.protocol import Answered, Changed, Connected, Delta, Malformed, Prompt, Rejected, Snapshot
 from bridge.zenohlink import Asked, Message, Pace, ZenohLink, zenoh_config
 
@@ -61,7 +61,7 @@ class MirrorPublisher:
         self._was_started = False
 
     def _new_link(self) -> ZenohLink:
-        return ZenohLink(zenoh_config(listen=[self._endpoint]), "mirror")
+        return ZenohLink(zenoh_config(listen=[self._endpoint], lease_ms=LEASE_MS), "mirror")
 
     async def start(self) -> None:
         """Open the socket, also again after ``failed``. Raises Unavailable where that cannot be."""

@@ -14,9 +14,9 @@ import zenoh
 from bridge.errors import Unavailable
 from bridge.zenohlink.message import sentence
 
-_LEASE_MS: Final = 1000
-"""A peer that falls silent is noticed within this time, and a connection that does not become a session in it
-is closed; zenoh's default is 10 s for both."""
+LEASE_MS: Final = 1000
+"""A peer that falls silent is noticed within this time, where nothing else is said, and a connection that
+does not become a session in it is closed; zenoh's default is 10 s for both."""
 _MOST_PENDING: Final = 500
 """Connections that are not a session yet; zenoh closes further ones. With its default of 100, a hundred
 silent connections lock everybody out. Each uses a file descriptor of the bus process, which often has no more
@@ -42,8 +42,10 @@ def zenoh_config(
     prompt: Sequence[str] = (),
     waiting: Sequence[str] = (),
     longest: int | None = None,
+    lease_ms: int = LEASE_MS,
 ) -> zenoh.Config:
-    """Settings of a session without discovery that notices a silent peer within a second.
+    """Settings of a session without discovery that ends the connection to a peer which is silent for
+    ``lease_ms``.
 
     ``users`` is our own user, its password, and the path of a file with a line ``user:password`` for each
     user. ``access`` is zenoh's ``access_control``.
@@ -68,8 +70,8 @@ def zenoh_config(
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "timestamping/enabled": True,
-        "transport/link/tx/lease": _LEASE_MS,
-        "transport/unicast/accept_timeout": _LEASE_MS,
+        "transport/link/tx/lease": lease_ms,
+        "transport/unicast/accept_timeout": LEASE_MS,
         "transport/unicast/accept_pending": _MOST_PENDING,
         _WAIT: _STALLED_US,
         "transport/shared_memory/enabled": False,

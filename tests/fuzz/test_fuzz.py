@@ -20,6 +20,9 @@ CASES: Final = ({"opcua": 1600, "can": 1800}, {"modbus": 1300, "zenoh": 18_000})
 SEED: Final = 13
 """The same each time: a test suite that finds something new each day is no test of a change."""
 LIMIT_S: Final = 300.0
+MOST_LOOKS: Final = 10
+"""More than a good client's own patience: zenoh's client now and then loses what it asks in the moment in
+which it gives up a connection."""
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +54,10 @@ def test_fronts_that_stand_still_for_two_seconds_lose_no_good_client(rig: Rig) -
         for pid in fronts:
             os.kill(pid, number)
         time.sleep(2.0)
-    judge.look()  # values that were old by then are said to be
-    for _ in range(5):
+    judge.forgive()  # what was asked meanwhile; values that were old by then are said to be
+    for _ in range(MOST_LOOKS):
         time.sleep(1.0)
         assert not judge.look()
-    assert judge.figures.answers_ms["opcua"]
+        if judge.serves_again():
+            break
+    assert judge.serves_again()

@@ -395,6 +395,19 @@ async def test_a_hung_bus_process_counts_as_gone_after_a_second(endpoint: str) -
         await until(lambda: client.image.read(frequency).quality is Quality.GOOD, "good again", 5)
 
 
+async def test_what_is_asked_of_a_bus_process_that_stands_still_is_answered_when_it_goes_on(
+    endpoint: str,
+) -> None:
+    """For as long as neither systemd nor the bus process ends the one that hangs."""
+    async with bus_process(endpoint) as process, front(endpoint) as client:
+        process.send_signal(signal.SIGSTOP)
+        stop = Request(SCADA, "conveyor/fu1", Do(Action.STOP))
+        asked = asyncio.create_task(client.request(stop, timeout_s=8))
+        await asyncio.sleep(2.5)
+        process.send_signal(signal.SIGCONT)
+        assert (await asyncio.wait_for(asked, 1)).ok
+
+
 class HalfOpen(MirrorPublisher):
     """A bus process as zenoh sometimes leaves it after a pause: sessions of before are told of what it
     declares, and get no answer."""

@@ -22,6 +22,7 @@ from bridge.errors import BridgeError, OperationFailed
 
 SIGN_PERIOD_S: Final = 1.0
 _SILENT_LOOKS: Final = 5
+"""Between more looks than these, and since the last sign, this many seconds have passed for certain."""
 _REASON: Final = b"!"
 """On the pipe of signs: what follows is why the front ends."""
 _LONGEST_REASON: Final = 1000
@@ -118,7 +119,7 @@ class Front:
         # One wait for all looks: of each that is given up, asyncio keeps a future until the process ends.
         ended = asyncio.create_task(process.wait())
         try:
-            while ear is None or ear.silent_looks < _SILENT_LOOKS:
+            while ear is None or ear.silent_looks <= _SILENT_LOOKS:
                 if (await asyncio.wait({ended}, timeout=SIGN_PERIOD_S))[0]:
                     return f"ended ({_how(ended.result())})" + (
                         f": {ear.reason}" if ear and ear.reason else ""

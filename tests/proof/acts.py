@@ -105,6 +105,7 @@ def renew_bridge(rig: Rig) -> None:
 
 def continue_front(protocol: str) -> Undo:
     def go_on(rig: Rig) -> None:
+        """Before the bridge takes it for dead, and kills it."""
         signal_front(protocol, signal.SIGCONT)(rig)
 
     return go_on

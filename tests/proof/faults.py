@@ -169,6 +169,7 @@ FAULTS: Final = (
         acts.continue_front("opcua"),
         *_OF_OWNERS,
         protocols=("opcua",),
+        ends_soon=True,
     ),
     Fault(
         "zenoh front stopped",
@@ -177,6 +178,7 @@ FAULTS: Final = (
         acts.continue_front("zenoh"),
         *_OF_OWNERS,
         protocols=("zenoh",),
+        ends_soon=True,
     ),
     Fault(
         "node silent",

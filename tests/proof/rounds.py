@@ -50,6 +50,8 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     time.sleep(random.uniform(0.0, PLANT.owner_period_s))
     moment = fault.inject(rig)
     _let_pass(rig, fault, concerned, moment)
+    if fault.ends_soon:
+        fault.undo(rig)
     still = [drive for drive in concerned + holding if not moved(rig, drive, moment)]
     rig.by_themselves += len(still)
     stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
@@ -70,7 +72,8 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
             for drive, (bus, _) in stopped.items()
         }
     before = {drive: rig.board.accepted(drive.place)[0] for drive in concerned}
-    fault.undo(rig)
+    if not fault.ends_soon:
+        fault.undo(rig)
     _wait_talking(rig, concerned)
     _wait_writing(rig, before)
     time.sleep(rig.hold_s)

@@ -28,7 +28,7 @@ from tests.support.zenoh_peer import until as until_in_loop
 from tests.wire.test_fronts import children, ports, start, starts, wait_for_front
 
 __all__ = ["ports"]
-HUNG_S = 5.0
+HUNG_S = 6.0
 NOISE_S = 10.0
 
 

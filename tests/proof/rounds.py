@@ -53,6 +53,8 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     if fault.ends_soon:
         fault.undo(rig)
     still = [drive for drive in concerned + holding if not moved(rig, drive, moment)]
+    if still:
+        say(f"stopped by themselves as it began: {', '.join(drive.path for drive in still)}")
     rig.by_themselves += len(still)
     stopped = _wait_stopped(rig, fault, [drive for drive in concerned if drive not in still], moment)
     missing = [drive for drive in concerned if drive not in stopped and drive not in still]
@@ -79,7 +81,8 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     time.sleep(rig.hold_s)
     samples: list[Sample] = []
     for drive, times in stopped.items():
-        if _was_stopped_before(rig, fault, drive, times[0], moment):
+        if _was_stopped_before(rig, fault, drive, times[0], _last_telegram(drive, ways, moment)):
+            say(f"stopped by itself: {drive.path}, before its owner's time was up")
             rig.by_themselves += 1
             continue
         wrong = _wrong(rig, fault, drive, (times[0], ends.get(drive, times[1])), words[drive])
@@ -146,10 +149,16 @@ def _wrong(rig: Rig, fault: Fault, drive: Drive, times: tuple[float, float], wor
     return "its setpoint goes on" if measure.keeps_setpoint(rig, drive, times[0]) else ""
 
 
-def _was_stopped_before(rig: Rig, fault: Fault, drive: Drive, bus: float, moment: float) -> bool:
-    """A slow machine stopped the drive before its controller's time was up: that is no reaction to it."""
-    early = bus < moment + (PLANT.fieldbus_timeout_ms / 1000 - PLANT.owner_period_s) * _SURELY
-    return fault.of_controller and early and _was_slow(rig, drive, moment - PLANT.owner_period_s)
+def _last_telegram(drive: Drive, ways: dict[Drive, tuple[float, float]], moment: float) -> float:
+    """When it was handed on, or at the latest is to have been: a slow owner's may be older."""
+    return ways[drive][1] if drive in ways else moment - PLANT.owner_period_s
+
+
+def _was_stopped_before(rig: Rig, fault: Fault, drive: Drive, bus: float, since: float) -> bool:
+    """A slow machine stopped the drive before its controller's time was up, which counts from ``since``: that
+    is no reaction to it."""
+    early = bus < since + PLANT.fieldbus_timeout_ms / 1000 * _SURELY
+    return fault.of_controller and early and _was_slow(rig, drive, since)
 
 
 def _held(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> list[Sample]:

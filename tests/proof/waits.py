@@ -1,7 +1,7 @@
 """How long bridge and drives waited for the CPU, which they share here with their owners; and how long the
 machine itself stood still.
 
-``python -m tests.proof.waits FOLDER NAME ...`` is a process that only sleeps 20 ms at a time, ahead of all
+``python -m tests.proof.waits FOLDER NAME ...`` is a process that only sleeps 5 ms at a time, ahead of all
 others. To ``FOLDER/pauses`` it appends ``begin end`` for each sleep that took over ``FROM_S`` too long: from
 when it was due until it ended. ``FOLDER/NAME.pid`` is a link to the folder of a process in /proc; to
 ``FOLDER/NAME.waits`` it appends ``begin end waited`` where from one look to the next, ``LOOK_S`` later or
@@ -20,7 +20,10 @@ from pathlib import Path
 from typing import Final
 
 FROM_S: Final = 0.002
-SLEEP_S: Final = 0.02
+SLEEP_S: Final = 0.005
+UNSEEN_S: Final = SLEEP_S + FROM_S
+"""The machine may have stood still for as long and nobody saw it: while the one that watches slept, or just
+before it was to wake."""
 LOOK_S: Final = 0.05
 """A look at the accounts takes a millisecond from everybody else, and is no pause of the machine."""
 _PRIORITY: Final = 90

@@ -31,6 +31,21 @@ _MOST_BATCHES: Final = 16
 """Buffers for what waits to be sent, allocated when needed. With zenoh's default of two, an answer or
 a value would be dropped whenever the machine is busy for a moment."""
 
+_ALWAYS: Final[Mapping[str, object]] = {
+    # A peer keeps trying by itself; this makes a client do so, too.
+    "connect/timeout_ms": -1,
+    "connect/exit_on_failure": False,
+    "connect/retry": {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2},
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": False,
+    "timestamping/enabled": True,
+    "transport/unicast/accept_timeout": LEASE_MS,
+    "transport/unicast/accept_pending": _MOST_PENDING,
+    _WAIT: _STALLED_US,
+    "transport/shared_memory/enabled": False,
+    "transport/link/tx/queue/size/data": _MOST_BATCHES,
+}
+
 
 def zenoh_config(
     *,
@@ -60,22 +75,11 @@ def zenoh_config(
     Raises Unavailable if an endpoint is not valid.
     """
     settings: dict[str, object] = {
+        **_ALWAYS,
         "mode": mode,
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
-        # A peer keeps trying by itself; this makes a client do so, too.
-        "connect/timeout_ms": -1,
-        "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2},
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "timestamping/enabled": True,
         "transport/link/tx/lease": lease_ms,
-        "transport/unicast/accept_timeout": LEASE_MS,
-        "transport/unicast/accept_pending": _MOST_PENDING,
-        _WAIT: _STALLED_US,
-        "transport/shared_memory/enabled": False,
-        "transport/link/tx/queue/size/data": _MOST_BATCHES,
     }
     if access:
         settings["access_control"] = access

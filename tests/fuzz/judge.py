@@ -138,7 +138,8 @@ class Judge:
         self._first_mb = {pid: restart_peak_mb(pid) for pid in self._pids}
         self._heard = dict.fromkeys(GOOD_CLIENTS, self._began)
         self._served = dict.fromkeys(GOOD_CLIENTS, self._began)
-        self._forgiven_until = float("-inf")
+        self._forgiven_until = dict.fromkeys(GOOD_CLIENTS, float("-inf"))
+        self._serves_since = self._began
         self._enabling = {node: load_family(name).control_word.enabling for node, name in _FAMILIES.items()}
         # What went on while this was set up is no matter of ours.
         self._words.take()
@@ -153,14 +154,15 @@ class Judge:
         faults += [*self._look_at_log(), *self._look_at_exchanges(), *self._look_at_words()]
         return faults + self._look_at_audit()
 
-    def forgive(self) -> None:
-        """How exchanges end that have begun by now is no fault."""
+    def forgive(self, *names: str) -> None:
+        """How exchanges of these good clients end that have begun by now is no fault."""
         self.look()
-        self._forgiven_until = time.monotonic()
+        self._serves_since = time.monotonic()
+        self._forgiven_until |= dict.fromkeys(names, self._serves_since)
 
     def serves_again(self) -> bool:
         """Whether every good client has been served since."""
-        return all(served > self._forgiven_until for served in self._served.values())
+        return all(served > self._serves_since for served in self._served.values())
 
     def conclude(self) -> list[str]:
         """What is wrong in the whole."""
@@ -244,7 +246,7 @@ class Judge:
                 self.figures.busy[name] = self.figures.busy.get(name, 0) + 1
             elif verdict == "ok":
                 self._served[name] = now
-            elif began_at > self._forgiven_until:
+            elif began_at > self._forgiven_until[name]:
                 faults.append(f"good client on {name}: {verdict} after {took_ms} ms")
             if began_at >= self._busy_until:
                 is_late = verdict == "busy" or float(took_ms) > LATE_MS

@@ -11,7 +11,7 @@ from tests.proof.board import NUMBERS
 from tests.proof.drives import Drive
 from tests.proof.rig import Rig
 from tests.proof.settings import PLANT
-from tests.proof.waits import UNSEEN_S
+from tests.proof.waits import FROM_S
 from tests.proof.witness import Run
 
 _SILENT_S: Final = max(0.1, 3 * PLANT.rpdo_period_ms / 1000)
@@ -73,7 +73,7 @@ class Sample:
         """``void``: the machine stood still, or bridge and drives waited for its CPU, for as long as the
         bound was exceeded; or that was so short that nobody sees whether they did. It is shown, and made
         again."""
-        excused_ms = max(self.paused_ms, self.waited_ms, UNSEEN_S * 1000) + self.noise_ms
+        excused_ms = max(self.paused_ms, self.waited_ms, FROM_S * 1000) + self.noise_ms
         if self.wrong or self.over_ms > excused_ms:
             return "failed"
         return "void" if self.over_ms > self.noise_ms else "ok"

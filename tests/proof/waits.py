@@ -21,9 +21,6 @@ from typing import Final
 
 FROM_S: Final = 0.002
 SLEEP_S: Final = 0.005
-UNSEEN_S: Final = SLEEP_S + FROM_S
-"""The machine may have stood still for as long and nobody saw it: while the one that watches slept, or just
-before it was to wake."""
 LOOK_S: Final = 0.05
 """A look at the accounts takes a millisecond from everybody else, and is no pause of the machine."""
 _PRIORITY: Final = 90

@@ -13,12 +13,13 @@ from typing import Final
 import pytest
 from pymodbus.client import ModbusTcpClient
 
+from bridge.image import Quality
 from bridge.northbound.modbus.registers import MIRROR, Table
 from bridge.northbound.modbus.units import drive_maps, units_of
 from bridge.sim.catalogue import SIMULATED
 from tests.support.families import FamilyBridge, family_bridge
 from tests.support.modbus_runs import Run, runs_of
-from tests.support.process import REPOSITORY
+from tests.support.process import REPOSITORY, until
 
 HOST: Final = "127.0.0.1"
 NODE: Final = REPOSITORY / "tests" / "wire" / "node"
@@ -47,7 +48,15 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FamilyBridge]:
 
 @pytest.fixture(scope="module")
 def asked(bridge: FamilyBridge) -> list[Asked]:
+    until(lambda: not bridge.call(lambda: _unread(bridge)), 40.0, "every parameter was read once")
     return bridge.call(lambda: list(_runs(bridge)))
+
+
+def _unread(bridge: FamilyBridge) -> list[str]:
+    """Points that have no value yet and no reason why."""
+    image = bridge.service.plant.image
+    states = ((name, image.read(name)) for name in image.index)
+    return [name for name, state in states if state.quality is Quality.WAITING and not state.reason]
 
 
 def _runs(bridge: FamilyBridge) -> Iterator[Asked]:

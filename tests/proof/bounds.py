@@ -79,8 +79,15 @@ def lost_drive(rig: Rig, drive: Drive) -> float:
 
 
 def given_way(seconds: float) -> Bound:
-    """The bridge is back then, stops the drive and its node, whose heartbeat says so, and leaves the bus."""
-    return lambda rig, drive: seconds * 1000 + node_stopped(rig, drive)
+    """The bridge is back then, stops the drive and its node, and leaves the bus. The node's heartbeat says
+    so; a guarded one is not asked any more, and speaks when its own time is up."""
+
+    def bound(rig: Rig, drive: Drive) -> float:
+        stopped_ms = seconds * 1000 + node_stopped(rig, drive)
+        own_ms = drive.family.own_timeout_ms + at_once(rig, drive)
+        return max(stopped_ms, own_ms) if drive.family.is_guarded else stopped_ms
+
+    return bound
 
 
 def after(seconds: float) -> Bound:

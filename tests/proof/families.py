@@ -55,6 +55,11 @@ class Family:
     """When the drive knows that the bridge is silent."""
     reserved: tuple[Reserved, ...] = ()
 
+    @property
+    def is_guarded(self) -> bool:
+        """Its node says in what state it is when it is asked, and not by itself."""
+        return "guarding" in self.supervision
+
 
 _HEARTBEAT_CONSUMER: Final = 0x7F_0000 | OWN_TIMEOUT_MS
 

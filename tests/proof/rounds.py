@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import random
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Final
 
@@ -64,7 +64,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
         )
     ways = _ways(rig, fault, list(stopped), moment)
     words = {drive: measure.stopping(rig, drive, times[0]) for drive, times in stopped.items()}
-    _all_go_on(rig, others, fault, "which it does not concern", began)
+    _all_go_on(rig, others, fault, "which it does not concern", began, say)
     ends: dict[Drive, float] = {}
     if fault.brings_back:
         # Until now it may have turned now and then; from now on it may not.
@@ -103,7 +103,7 @@ def _examined(rig: Rig, fault: Fault, examine: Examine, say: Callable[[str], Non
     began = time.monotonic()
     found = examine(rig)
     others = [drive for drive in DRIVES if not (fault.concerns(drive) or fault.others_may_stop)]
-    _all_go_on(rig, others, fault, "which it does not concern", began)
+    _all_go_on(rig, others, fault, "which it does not concern", began, say)
     samples: list[Sample] = []
     for finding in found:
         of, spans = finding.of, finding.spans
@@ -217,13 +217,19 @@ def _all_move(rig: Rig, say: Callable[[str], None]) -> None:
 
 
 def _all_go_on(
-    rig: Rig, drives: list[Drive] | tuple[Drive, ...], fault: Fault, which: str, since: float
+    rig: Rig,
+    drives: Sequence[Drive],
+    fault: Fault,
+    which: str,
+    since: float,
+    say: Callable[[str], None],
 ) -> None:
-    """One that the machine itself has stopped since then is none of the fault's."""
+    """One that the machine itself has stopped since then is none of the fault's, which is told."""
     for drive in drives:
         if rig.moves(drive):
             continue
         if _was_starved(rig, drive, since):
+            say(f"stopped by itself: {drive.path}, beside {fault.name}")
             rig.by_themselves += 1
         else:
             rig.stopped_in_vain.append(f"{fault.name}: {drive.path} ({drive.protocol}), {which}")
@@ -248,7 +254,7 @@ def _wait_handed_on(rig: Rig, fault: Fault, since: float, say: Callable[[str], N
     be it by a slow machine, gets none: that is told, and it is brought back. So is one that has tripped and
     is to hold: it moves on, and not by its owner."""
     for _ in range(_LOOKS):
-        _all_go_on(rig, DRIVES, fault, "whose owners were there", since)
+        _all_go_on(rig, DRIVES, fault, "whose owners were there", since, say)
         _all_move(rig, say)
         with suppress(Stuck):
             rig.wait(lambda: all(_was_handed_on(rig, drive, since) for drive in DRIVES), _LOOK_S, "telegrams")

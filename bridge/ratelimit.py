@@ -70,6 +70,13 @@ class Pauses:
         self._told[key] = now, 0
         return left_out
 
+    def end(self, key: Hashable = None) -> int:
+        """The one that has just been left out is told after all: how many were left out before it. Another
+        pause does not begin with it."""
+        at, left_out = self._told[key]
+        self._told[key] = at, 0
+        return left_out - 1
+
 
 @dataclass(slots=True)
 class _Kept(Generic[Item]):

@@ -199,14 +199,18 @@ class Intruders:
         *,
         brings_back: bool = False,
     ) -> None:
-        """Count it, answer it, and report it, though not every frame. ``affected``: None if it changes
-        nothing. ``is_worse``: report it even if another one on this identifier has just been reported.
-        ``brings_back``: drives of a node that is held stopped may run by it."""
+        """Count it, answer it, and report it, though not every frame: each that stops a node. ``affected``:
+        None if it changes nothing. ``is_worse``: report it even if another one on this identifier has just
+        been reported. ``brings_back``: drives of a node that is held stopped may run by it."""
         if not self._acts():
             return
         self.count += 1
-        stopped = self._to_be_stopped(affected)
+        # Frames of others come by a way of their own, and later than the boot-up of a node that has started
+        # meanwhile and has forgotten them.
+        stopped = [node for node in self._to_be_stopped(affected) if frame.time >= node.started_at]
         since = self._pauses.take(frame.time, (frame.can_id, is_worse))
+        if since is None and not all(node.is_held or node.is_out_of_service for node in stopped):
+            since = self._pauses.end((frame.can_id, is_worse))
         if since is not None:
             more = f" ({since + 1} frames since the last message)" if since else ""
             self.last = f"{said()}, from somebody else{more}{_answer(stopped, self._nodes)}"

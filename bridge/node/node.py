@@ -68,6 +68,8 @@ class NodeCore:
         """When a boot-up has last reset the node, or its communication."""
         self._back_off = BackOff()
         self._last_boot = float("-inf")
+        self.started_at = float("-inf")
+        """When it has said last that it has started."""
         self._operational_since = 0.0
         if not table.enabled:
             self.boot_at = None
@@ -94,6 +96,7 @@ class NodeCore:
 
     def _on_boot_up(self, now: float) -> None:
         """The node has started: whatever it was told before is forgotten."""
+        self.started_at = now
         self.told = None
         self._memory.may_run = False
         self.leaving.on_restart()

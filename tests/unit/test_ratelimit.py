@@ -48,3 +48,13 @@ def test_one_key_does_not_hide_another() -> None:
     pauses = Pauses(10.0)
     assert [pauses.take(now, "a") for now in (0.0, 1.0, 9.0, 10.0, 19.9, 20.0)] == [0, None, None, 2, None, 1]
     assert pauses.take(1.0, "b") == 0
+
+
+def test_one_that_was_left_out_may_be_told_after_all() -> None:
+    """It counts as told, and the pause goes on."""
+    pauses = Pauses(10.0)
+    assert pauses.take(0.0) == 0
+    assert [pauses.take(now) for now in (1.0, 2.0, 3.0)] == [None] * 3
+    assert pauses.end() == 2
+    assert pauses.take(9.0) is None
+    assert pauses.take(10.0) == 1

@@ -62,6 +62,36 @@ def test_an_enabling_rpdo_of_another_is_told_and_the_node_is_stopped(tmp_path: P
     )
 
 
+def test_a_frame_that_was_there_before_the_node_has_started_does_not_stop_it(tmp_path: Path) -> None:
+    """What others send comes by a socket of its own, and later than the node's boot-up message."""
+    bench = running(tmp_path)
+    bench.receive(Frame(0x205, ENABLE))
+    bench.run(0.5)
+    late = Frame(0x205, ENABLE, bench.now)
+    bench.powered = False
+    bench.power_on()
+    bench.run(0.005)
+    bench.bus.foreign.append(late)
+    bench.run(5.0)
+    assert bench.value("bus/can0/intruders") == 2
+    assert bench.value("conveyor/node/nmt_state") == 5
+
+
+def test_each_stop_of_a_node_is_told(tmp_path: Path) -> None:
+    """Also where the same intruder was told a moment ago, and the node has started since."""
+    bench = running(tmp_path)
+    bench.receive(Frame(0x205, ENABLE))
+    bench.run(0.5)
+    bench.powered = False
+    bench.power_on()
+    bench.run(3.0)
+    assert bench.value("conveyor/node/nmt_state") == 5
+    bench.receive(Frame(0x205, ENABLE), Frame(0x205, ENABLE))
+    bench.run(0.5)
+    assert bench.value("conveyor/node/nmt_state") == 4
+    assert ["NMT stop of conveyor" in event.message for event in told(bench)] == [True, True]
+
+
 def test_it_is_not_started_again_by_itself_but_by_command(tmp_path: Path) -> None:
     bench = running(tmp_path)
     bench.receive(Frame(0x205, ENABLE))

@@ -68,7 +68,8 @@ class Node:
         family = SimpleNamespace(sdo=[SimpleNamespace(request=one) for one in servers])
         self.node = SimpleNamespace(name=f"n{node_id}", family=family, drives=[self.drive])
         self.leaving = SimpleNamespace(is_stopped_by_nmt=False)
-        self.is_held = False
+        self.is_held = self.is_out_of_service = False
+        self.started_at = 0.0
         self.again: list[float] = []
         self.resets: list[float] = []
 
@@ -312,6 +313,32 @@ def test_that_it_enables_is_told_at_once(make: Any) -> None:
     bus.sees(0x205, STOP)
     bus.sees(0x205, RUN, 10.01)
     assert [": run" in event.message for event in bus.events] == [False, True]
+
+
+@pytest.mark.parametrize(("at", "is_stopped"), [(9.9, False), (10.0, True), (10.1, True)])
+def test_a_frame_from_before_the_node_has_started_stops_nothing(
+    make: Any, at: float, is_stopped: bool
+) -> None:
+    bus = make(Node(5, [0x205]))
+    bus.nodes[0].started_at = 10.0
+    bus.sees(0x205, RUN, at)
+    assert bool(bus.stopped) is is_stopped
+    assert ("NMT stop" in bus.said) is is_stopped
+
+
+@pytest.mark.parametrize(
+    ("state", "told"),
+    [({}, [True, True]), ({"is_held": True}, [True]), ({"is_out_of_service": True}, [True])],
+)
+def test_a_stop_is_told_at_once(make: Any, state: dict[str, bool], told: list[bool]) -> None:
+    """Also within the pause of what was told before; not to a node that takes no part."""
+    bus = make(Node(5, [0x205]))
+    bus.sees(0x205, RUN)
+    for name, value in ({"is_held": False} | state).items():
+        setattr(bus.nodes[0], name, value)
+    bus.sees(0x205, RUN, 10.1)
+    bus.sees(0x205, RUN, 10.2)
+    assert ["NMT stop of n5" in event.message for event in bus.events] == told
 
 
 # NMT and SDO

@@ -205,9 +205,9 @@ class Intruders:
         if not self._acts():
             return
         self.count += 1
-        # Frames of others come by a way of their own, and later than the boot-up of a node that has started
-        # meanwhile and has forgotten them.
-        stopped = [node for node in self._to_be_stopped(affected) if frame.time >= node.started_at]
+        # Frames of others come by a way of their own, and later than the boot-up message of a node that has
+        # started meanwhile and has forgotten them.
+        stopped = [node for node in self._to_be_stopped(affected) if frame.time > node.started_at]
         since = self._pauses.take(frame.time, (frame.can_id, is_worse))
         if since is None and not all(node.is_held or node.is_out_of_service for node in stopped):
             since = self._pauses.end((frame.can_id, is_worse))

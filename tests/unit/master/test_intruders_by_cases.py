@@ -315,10 +315,11 @@ def test_that_it_enables_is_told_at_once(make: Any) -> None:
     assert [": run" in event.message for event in bus.events] == [False, True]
 
 
-@pytest.mark.parametrize(("at", "is_stopped"), [(9.9, False), (10.0, True), (10.1, True)])
+@pytest.mark.parametrize(("at", "is_stopped"), [(9.9, False), (10.0, False), (10.001, True)])
 def test_a_frame_from_before_the_node_has_started_stops_nothing(
     make: Any, at: float, is_stopped: bool
 ) -> None:
+    """Nor one that is taken in together with its boot-up message: both count as of the round's begin."""
     bus = make(Node(5, [0x205]))
     bus.nodes[0].started_at = 10.0
     bus.sees(0x205, RUN, at)

@@ -30,8 +30,8 @@ from bridge.project import load_project
 _LSS_S = 0.2
 _FOLDER = "conformance"
 _WHAT = (
-    "is stopped for a moment and gets a heartbeat, which is taken back. It is pre-operational afterwards. "
-    "No drive of it is enabled"
+    "is started and stopped for a moment, SYNC is sent, and it gets a heartbeat, which is taken back. It is "
+    "pre-operational afterwards. No drive of it is enabled"
 )
 
 
@@ -66,7 +66,7 @@ def conformance(
     try:
         _try_out(line, node, slave, reset=reset)
     finally:
-        if slave.heartbeat_ms is not None or slave.is_stopped:
+        if slave.heartbeat_ms is not None or slave.is_displaced:
             carry_out(line, lambda now: Conformance(slave, (), put_back(slave), now))
     _ask_by_lss(targets[0], identity, slave)
     facts = _facts(node, slave, identity, targets[0])

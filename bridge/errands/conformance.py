@@ -1,8 +1,7 @@
 """What CiA 301 asks of a slave, tried on one node that stands still. Sans-IO.
 
 Each check is a generator: it yields what is sent and which frames are waited for, is sent the frames that
-came, and notes its findings. What a check changes it notes in the slave, and the last one puts it back. The
-node is never started.
+came, and notes its findings. What a check changes it notes in the slave, and the last one puts it back.
 """
 
 from __future__ import annotations
@@ -12,11 +11,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from bridge.canopen import abort, cobid
+from bridge.canopen import abort, cobid, nmt
 from bridge.canopen.frame import Frame
+from bridge.canopen.nmt import NmtState
 from bridge.canopen.sdo_transfer import ABORT, MUX, U32
 from bridge.errands.errand import Errand
 
+REACTION_S: Final = 1.0
+"""How long a node may take to do what NMT says."""
 _SDO_BYTES: Final = 8
 _NOT_THERE: Final = (0x0602_0000, 0x0609_0011, abort.UNKNOWN_COMMAND)
 """Abort codes: no such object, no such sub-index, no such service."""
@@ -51,6 +53,21 @@ class Step:
     count: int = 1
 
 
+@dataclass(frozen=True, slots=True)
+class SetPdo:
+    """A PDO as the node's objects have it: ``bits`` are mapped to it; None where that cannot be read."""
+
+    name: str
+    cob_id: int
+    bits: int | None
+    transmission_type: int | None
+    """None: it could not be read."""
+    inhibit_ms: float = 0.0
+    event_ms: int = 0
+    on_request: bool = False
+    """It is sent when it is asked for."""
+
+
 Answers = list[Frame]
 Check = Generator[Step, Answers, None]
 
@@ -62,12 +79,13 @@ class Slave:
         self.id = node_id
         self.timeout_s = timeout_s
         self.findings: list[Finding] = []
-        self.mapped_bits: dict[int, int] = {}
-        """How long the TPDOs are that it sends, by COB-ID."""
+        self.tpdos: list[SetPdo] = []
+        self.rpdos: list[SetPdo] = []
+        """Those that are on."""
         self.heartbeat_ms: int | None = None
         """What 1017h was before it was changed; None where it is as it was."""
-        self.is_stopped = False
-        """A check has stopped it."""
+        self.is_displaced = False
+        """A check has started or stopped it."""
         self.slowest_ms = 0.0
         """The longest that an SDO answer has taken."""
 
@@ -143,6 +161,21 @@ def shown(answer: bytes) -> str:
     if code is not None:
         return f"abort {code:08X}h, {abort.text(code)}"
     return answer.hex(" ").upper() if size is None else f"{plain(answer):0{2 * size}X}h"
+
+
+def is_state(slave: Slave, *states: NmtState) -> Step:
+    """Until the node says in a heartbeat that it is in one of these states."""
+
+    def fits(frame: Frame) -> bool:
+        one = frame.can_id == cobid.ERROR_CONTROL + slave.id and len(frame.data) == 1
+        return one and (not states or nmt.state_of(frame.data[0]) in states)
+
+    return Step((), fits, REACTION_S)
+
+
+def send(*frames: Frame) -> Step:
+    """Nothing is waited for but the bus."""
+    return Step(frames, lambda _: False, 0.05)
 
 
 class Conformance(Errand):

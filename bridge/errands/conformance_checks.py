@@ -9,16 +9,20 @@ from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sdo_transfer import MUX, U32
 from bridge.errands.conformance import (
+    REACTION_S,
     Check,
     Slave,
     Step,
     Verdict,
     aborted,
     expedited_bytes,
+    is_state,
     lacking,
     plain,
+    send,
     shown,
 )
+from bridge.errands.conformance_pdos import operation, settings_of_pdos
 from bridge.errands.conformance_transfers import block, segmented
 
 _NO_OBJECT: Final = 0x0602_0000
@@ -34,11 +38,7 @@ _BEAT_MS: Final = 100
 _BEATS: Final = 5
 _BEAT_SLACK: Final = 0.25
 """How far the mean period may be from what was set, as a share of it: the test's own jitter is in it."""
-_REACTION_S: Final = 1.0
 _BOOT_UP_S: Final = 10.0
-_PDOS: Final = 4
-"""So many of each kind are looked at: those that have a place in the pre-defined connection set."""
-_PDO_BITS: Final = 64
 
 
 def checks(slave: Slave, *, reset: bool) -> list[Check]:
@@ -50,9 +50,10 @@ def checks(slave: Slave, *, reset: bool) -> list[Check]:
         segmented(slave),
         block(slave),
         emergency(slave),
-        *(pdo(slave, number, sent=sent) for sent in (True, False) for number in range(_PDOS)),
+        *settings_of_pdos(slave),
         guarding(slave),
         heartbeat(slave),
+        operation(slave),
         stopping(slave),
     ]
     return [*found, boot_up(slave)] if reset else found
@@ -60,9 +61,9 @@ def checks(slave: Slave, *, reset: bool) -> list[Check]:
 
 def put_back(slave: Slave) -> Check:
     """Undo what the checks have changed: 1017h, and the NMT state."""
-    if slave.is_stopped:
-        yield _send(nmt.command(NmtCommand.ENTER_PRE_OPERATIONAL, slave.id))
-        slave.is_stopped = False
+    if slave.is_displaced:
+        yield send(nmt.command(NmtCommand.ENTER_PRE_OPERATIONAL, slave.id))
+        slave.is_displaced = False
     if slave.heartbeat_ms is not None:
         before = slave.heartbeat_ms
         yield from slave.write(0x1017, 0, before.to_bytes(2, "little"))
@@ -155,65 +156,6 @@ def emergency(slave: Slave) -> Check:
     slave.found("§7.5.2.4", "1003h has as many errors as 1003h:00 says", ok=True, seen=str(count))
 
 
-def pdo(slave: Slave, number: int, *, sent: bool) -> Check:
-    """One PDO of the node's: its COB-ID, and that its mapped objects exist and fit into a frame."""
-    name, of_mapping = (f"TPDO {number + 1}", "§7.5.2.38") if sent else (f"RPDO {number + 1}", "§7.5.2.36")
-    parameter, mapping = (0x1800, 0x1A00) if sent else (0x1400, 0x1600)
-    answer = yield from slave.read(parameter + number, 1)
-    cob_id = plain(answer)
-    if cob_id is None:
-        clause = "§7.5.2.37" if sent else "§7.5.2.35"
-        slave.skipped(clause, f"{name} has a COB-ID", shown(answer), lacking(answer))
-        return
-    if cob_id & cobid.PDO_DISABLED:
-        return
-    ok = bool(cob_id & cobid.PDO_EXTENDED) or cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK)
-    slave.found("§7.5.2.37" if sent else "§7.5.2.35", f"{name} has a COB-ID for PDOs", ok, f"{cob_id:08X}h")
-    count = yield from slave.number(mapping + number, 0)
-    bits = 0
-    for sub in range(1, min(count or 0, 64) + 1):
-        entry = yield from slave.number(mapping + number, sub)
-        if entry is None:
-            rule = f"the mapping of {name} has {count} objects, as its sub-index 0 says"
-            slave.found(of_mapping, rule, ok=False, seen=f"no {mapping + number:04X}h:{sub:02X}")
-            return
-        bits += entry & 0xFF
-        yield from _mapped(slave, name, entry, sent=sent)
-    rule = f"what is mapped to {name} fits into a frame"
-    slave.found(of_mapping, rule, bits <= _PDO_BITS, f"{bits} bits")
-    if sent:
-        slave.mapped_bits[cob_id & cobid.COB_ID_MASK] = bits
-
-
-def _mapped(slave: Slave, name: str, entry: int, *, sent: bool) -> Check:
-    """That one mapped object is there, and as long as it is mapped. Below 0020h it is a gap."""
-    of_mapping = "§7.5.2.38" if sent else "§7.5.2.36"
-    index, sub, bits = entry >> 16, entry >> 8 & 0xFF, entry & 0xFF
-    if index < 0x20:
-        return
-    answer = yield from slave.read(index, sub)
-    place, code, size = f"{index:04X}h:{sub:02X}", aborted(answer), expedited_bytes(answer)
-    if code in (_NO_OBJECT, _NO_SUB) or not answer:
-        slave.found(of_mapping, f"{place}, mapped to {name}, is there", ok=False, seen=shown(answer))
-    elif sent and size is not None and answer[0] & 1 and 8 * size < bits:
-        rule = f"{place} is as long as it is mapped to {name}"
-        slave.found(of_mapping, rule, ok=False, seen=f"{8 * size} bits, mapped with {bits}")
-
-
-def _is_state(slave: Slave, *states: NmtState) -> Step:
-    """Until the node says in a heartbeat that it is in one of these states."""
-
-    def fits(frame: Frame) -> bool:
-        one = frame.can_id == cobid.ERROR_CONTROL + slave.id and len(frame.data) == 1
-        return one and (not states or nmt.state_of(frame.data[0]) in states)
-
-    return Step((), fits, _REACTION_S)
-
-
-def _send(*frames: Frame) -> Step:
-    return Step(frames, lambda _: False, 0.05)
-
-
 def heartbeat(slave: Slave) -> Check:
     """A period set in 1017h is kept. It stays set for the checks of the NMT states."""
     clause, rule = "§7.2.8.3.2.2", f"the heartbeat comes every {_BEAT_MS} ms where 1017h says so"
@@ -228,8 +170,8 @@ def heartbeat(slave: Slave) -> Check:
         slave.heartbeat_ms = None
         slave.skipped(clause, rule, f"1017h cannot be written: {shown(answer)}", Verdict.NOT_SEEN)
         return
-    yield _is_state(slave)
-    beats = yield Step((), _is_state(slave).fits, (_BEATS + 5) * _BEAT_MS / 1000, _BEATS)
+    yield is_state(slave)
+    beats = yield Step((), is_state(slave).fits, (_BEATS + 5) * _BEAT_MS / 1000, _BEATS)
     if len(beats) < _BEATS:
         slave.found(clause, rule, ok=False, seen=f"{len(beats)} came in {(_BEATS + 5) * _BEAT_MS} ms")
         return
@@ -256,7 +198,7 @@ def guarding(slave: Slave) -> Check:
     question = Frame(cobid.ERROR_CONTROL + slave.id | REMOTE)
     seen: list[int] = []
     for _ in range(3):
-        came = yield Step((question,), _is_state(slave).fits, slave.timeout_s)
+        came = yield Step((question,), is_state(slave).fits, slave.timeout_s)
         seen += [frame.data[0] for frame in came]
     toggles = [octet >> 7 for octet in seen]
     ok = len(seen) == 3 and toggles[0] == toggles[2] != toggles[1]
@@ -266,26 +208,26 @@ def guarding(slave: Slave) -> Check:
 def stopping(slave: Slave) -> Check:
     """Stop and enter pre-operational, as the heartbeat and the SDO server show it."""
     has_beat = slave.heartbeat_ms is not None
-    slave.is_stopped = True
+    slave.is_displaced = True
     for command, state, answers in (
         (NmtCommand.STOP, NmtState.STOPPED, False),
         (NmtCommand.ENTER_PRE_OPERATIONAL, NmtState.PRE_OPERATIONAL, True),
     ):
         frames = (nmt.command(command, slave.id),)
         if has_beat:
-            told = yield Step(frames, _is_state(slave, state).fits, _REACTION_S)
+            told = yield Step(frames, is_state(slave, state).fits, REACTION_S)
             slave.found("§7.2.8.2.1", f"the heartbeat says {state.words} when it is told so", bool(told))
         else:
-            yield _send(*frames)
+            yield send(*frames)
         answer = yield from slave.read(0x1000)
         words = "is answered" if answers else "is not answered"
         rule = f"{state.words}, SDO {words}"
         slave.found("§7.3.2.2", rule, bool(answer) is answers, shown(answer))
-    slave.is_stopped = False
+    slave.is_displaced = False
     if not has_beat:
         return
-    yield _send(Frame(cobid.NMT, bytes((_NO_COMMAND, slave.id))))
-    told = yield _is_state(slave)
+    yield send(Frame(cobid.NMT, bytes((_NO_COMMAND, slave.id))))
+    told = yield is_state(slave)
     states = [nmt.state_of(frame.data[0]) for frame in told]
     ok = states == [NmtState.PRE_OPERATIONAL]
     rule = "an unknown NMT command changes nothing"
@@ -310,9 +252,12 @@ def lengths(slave: Slave, heard: dict[int, set[int]]) -> None:
     """How long the node's frames were that were heard meanwhile."""
     if sizes := heard.get(cobid.EMCY + slave.id):
         slave.found("§7.2.7.3.1", "emergency messages have 8 bytes", sizes == {8}, f"{sorted(sizes)} bytes")
-    for cob_id, bits in slave.mapped_bits.items():
-        rule = f"the TPDO on {cob_id:03X}h is as long as its mapping, {bits} bits"
-        if sizes := heard.get(cob_id):
-            slave.found("§7.5.2.38", rule, sizes == {-(-bits // 8)}, f"{sorted(sizes)} bytes")
+    for pdo in slave.tpdos:
+        if not pdo.bits:
+            # A static mapping may show no entries, as Lenze's does.
+            continue
+        rule = f"the TPDO on {pdo.cob_id:03X}h is as long as its mapping, {pdo.bits} bits"
+        if sizes := heard.get(pdo.cob_id):
+            slave.found("§7.5.2.38", rule, sizes == {-(-pdo.bits // 8)}, f"{sorted(sizes)} bytes")
         else:
             slave.skipped("§7.5.2.38", rule, "none came", Verdict.NOT_SEEN)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 
 import pytest
@@ -12,6 +13,10 @@ from bridge.errands.conformance_checks import checks, lengths, put_back
 
 NODE = 5
 NAME = b"a drive with a long name"
+SYNC, EVERY = 0x80, 3
+TPDO_BY_SYNC, TPDO_BY_TIMER, TPDO_ON_REQUEST = 0x180 + NODE, 0x280 + NODE, 0x380 + NODE
+TPDOS = (TPDO_BY_SYNC, TPDO_BY_TIMER, TPDO_ON_REQUEST)
+WORD = b"\x50\2"
 _MUX = struct.Struct("<HB")
 
 
@@ -27,9 +32,17 @@ class SmallSlave:
             (0x1018, 2): 1,
             (0x1014, 0): 0x80 + NODE,
         }
-        u32 |= {(0x1800, 1): 0x180 + NODE, (0x1A00, 0): 1, (0x1A00, 1): 0x6041_0010, (0x1003, 0): 0}
+        u32 |= {(0x1003, 0): 0, (0x1005, 0): SYNC, (0x1400, 1): 0x200 + NODE}
+        ids = (TPDO_BY_SYNC | 0x4000_0000, TPDO_BY_TIMER | 0x4000_0000, TPDO_ON_REQUEST)
+        u32 |= {(0x1800 + number, 1): can_id for number, can_id in enumerate(ids)}
+        # Each carries a word.
+        for index, mapped in ((0x1600, 0x6040_0010), *((0x1A00 + n, 0x6041_0010) for n in range(3))):
+            u32 |= {(index, 0): 1, (index, 1): mapped}
         self.objects = {place: value.to_bytes(4, "little") for place, value in u32.items()}
         self.objects |= {(0x1001, 0): b"\0", (0x1017, 0): b"\0\0", (0x6041, 0): b"\x50\2"}
+        self.objects |= {(0x1400, 2): b"\xff", (0x6040, 0): b"\0\0"}
+        self.objects |= {(0x1800, 2): bytes((EVERY,)), (0x1801, 2): b"\xff", (0x1802, 2): b"\xfd"}
+        self.objects |= {(0x1801, 3): (300).to_bytes(2, "little"), (0x1801, 5): b"\x64\0"}
         self.objects |= {(0x100C, 0): b"\0\0", (0x100D, 0): b"\0", (0x1008, 0): NAME}
         if fault == "errors":
             self.objects[0x1003, 0] = b"\2\0\0\0"
@@ -38,16 +51,48 @@ class SmallSlave:
         self.state, self.toggle, self.guard = 0x7F, 0, 0
         self.left: bytes | None = None
         self.beat_at: float | None = None
+        self.timer_at: float | None = None
         self.types = 0
+        self.syncs = 0
 
     @property
     def beat_s(self) -> float:
         period_ms = int.from_bytes(self.objects[0x1017, 0], "little")
         return period_ms / (500 if self.fault == "period" else 1000)
 
+    @property
+    def sends_pdos(self) -> bool:
+        return self.state == 5 or (self.fault == "early" and self.state == 0x7F)
+
+    def next_at(self) -> float:
+        """When it speaks by itself."""
+        return min(at for at in (self.beat_at, self.timer_at, math.inf) if at is not None)
+
+    def on_time(self, now: float) -> list[Frame]:
+        if self.beat_at is not None and now >= self.beat_at:
+            self.beat_at = now + self.beat_s if self.beat_s else None
+            return [Frame(0x700 + NODE, bytes((self.state,)))]
+        if self.timer_at is not None and now >= self.timer_at:
+            self.timer_at = now + {"timer": 0.2, "inhibit": 0.01}.get(self.fault, 0.1)
+            return [Frame(TPDO_BY_TIMER, WORD)]
+        return []
+
     def on_frame(self, frame: Frame, now: float) -> list[Frame]:
         if frame.can_id == 0 and frame.data[1] == NODE:
-            return self._nmt(frame.data[0])
+            said = self._nmt(frame.data[0])
+            if self.state != 5 and self.fault != "late":
+                self.timer_at = None
+            elif self.timer_at is None and self.state == 5:
+                self.timer_at = now
+            return said
+        if frame.can_id == SYNC and self.sends_pdos:
+            self.syncs += 1
+            every = EVERY + 1 if self.fault == "every" else EVERY
+            return [Frame(TPDO_BY_SYNC, WORD)] if self.syncs % every == 0 or self.state != 5 else []
+        if frame.can_id == TPDO_ON_REQUEST | REMOTE and self.sends_pdos and self.fault != "request":
+            return [Frame(TPDO_ON_REQUEST, WORD)]
+        if frame.can_id == 0x200 + NODE and self.state == 5 and len(frame.data) < 2:
+            return [] if self.fault == "untold" else [Frame(0x80 + NODE, b"\x10\x82\x11".ljust(8, b"\0"))]
         if frame.can_id == (0x700 + NODE) | REMOTE:
             self.guard ^= 0 if self.fault == "guarding" else 0x80
             return [Frame(0x700 + NODE, bytes((self.guard ^ 0x80 | self.state,)))]
@@ -59,7 +104,8 @@ class SmallSlave:
         return [Frame(0x580 + NODE, answer)] if answer else []
 
     def _nmt(self, command: int) -> list[Frame]:
-        self.state = {2: 4, 0x80: 0x7F, 0x55: 4 if self.fault == "nmt" else self.state}.get(
+        started = 0x7F if self.fault == "operation" else 5
+        self.state = {1: started, 2: 4, 0x80: 0x7F, 0x55: 4 if self.fault == "nmt" else self.state}.get(
             command, self.state
         )
         if command == 0x82:
@@ -122,10 +168,10 @@ def tried(device: SmallSlave) -> Slave:
         deadline = errand.next_deadline()
         if deadline is None:
             continue
-        if device.beat_at is not None and device.beat_s and device.beat_at <= deadline:
-            now = max(now, device.beat_at)
-            device.beat_at = now + device.beat_s
-            errand.on_frame(Frame(0x700 + NODE, bytes((device.state,)), now))
+        if device.next_at() <= deadline:
+            now = max(now, device.next_at())
+            for said in device.on_time(now):
+                errand.on_frame(said._replace(time=now))
         else:
             now = max(now, deadline)
             errand.on_time(now)
@@ -144,6 +190,9 @@ def test_a_slave_after_the_standard_has_no_faults() -> None:
     assert failures(slave) == []
     passed = {one.clause for one in slave.findings if one.verdict is Verdict.PASSED}
     assert {"§7.2.8.3.2.1", "§7.2.8.3.2.2", "§7.2.8.3.3", "§7.2.4.3.6", "§7.5.2.38"} <= passed
+    assert {"§7.2.2.2", "§7.2.2.3", "§7.5.2.37", "§7.2.7.1"} <= passed
+    seen = {one.rule for one in slave.findings if one.verdict is Verdict.PASSED}
+    assert {f"the TPDO on {can_id:03X}h is as long as its mapping, 16 bits" for can_id in TPDOS} <= seen
     assert (device.state, device.objects[0x1017, 0]) == (0x7F, b"\0\0"), "all is as it was"
 
 
@@ -164,6 +213,13 @@ def test_a_slave_after_the_standard_has_no_faults() -> None:
         ("stopped", "stopped, SDO is not answered"),
         ("nmt", "an unknown NMT command changes nothing"),
         ("boot-up", "reset communication ends with a boot-up message"),
+        ("early", "no PDO comes before the node is started"),
+        ("late", "no PDO comes any more when it is pre-operational again"),
+        ("operation", "the heartbeat says operational when it is told so"),
+        ("every", "TPDO 1 comes with every 3 SYNCs"),
+        ("timer", "TPDO 2 comes every 100 ms at least, as its event timer says"),
+        ("inhibit", "TPDO 2 comes every 30 ms at most, as its inhibit time says"),
+        ("request", "TPDO 3 comes when it is asked for"),
     ],
 )
 def test_a_fault_is_found(fault: str, rule: str) -> None:
@@ -185,6 +241,23 @@ def test_a_node_that_is_silent_ends_it_all_the_same() -> None:
     device = SmallSlave()
     device.on_frame = lambda frame, now: []  # type: ignore[method-assign]
     assert failures(tried(device))
+
+
+def test_a_short_rpdo_that_nobody_tells_is_no_fault() -> None:
+    slave = tried(SmallSlave("untold"))
+    verdicts = {one.rule: one.verdict for one in slave.findings}
+    assert verdicts["RPDO 1 without data is told by an emergency message, 8210h"] is Verdict.NOT_OFFERED
+    assert failures(slave) == []
+
+
+def test_a_mapping_that_cannot_be_read_is_not_judged() -> None:
+    device = SmallSlave()
+    del device.objects[0x1A01, 0]
+    slave = tried(device)
+    assert failures(slave) == []
+    verdicts = {one.rule: one.verdict for one in slave.findings}
+    assert verdicts["what is mapped to TPDO 2 fits into a frame"] is Verdict.NOT_OFFERED
+    assert not any(f"the TPDO on {TPDO_BY_TIMER:03X}h" in rule for rule in verdicts)
 
 
 _MUTE = {

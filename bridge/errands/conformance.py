@@ -18,9 +18,9 @@ from bridge.canopen.sdo_transfer import ABORT, MUX, U32
 from bridge.errands.errand import Errand
 
 REACTION_S: Final = 1.0
-"""How long a node may take to do what NMT says."""
+"""The longest that a node may take to do what NMT says."""
 _SDO_BYTES: Final = 8
-_NOT_THERE: Final = (0x0602_0000, 0x0609_0011, abort.UNKNOWN_COMMAND)
+_NOT_THERE: Final = (abort.NO_OBJECT, abort.NO_SUB, abort.UNKNOWN_COMMAND)
 """Abort codes: no such object, no such sub-index, no such service."""
 
 

@@ -25,8 +25,6 @@ from bridge.errands.conformance import (
 from bridge.errands.conformance_pdos import operation, settings_of_pdos
 from bridge.errands.conformance_transfers import block, segmented
 
-_NO_OBJECT: Final = 0x0602_0000
-_NO_SUB: Final = 0x0609_0011
 _READ_ONLY: Final = 0x0601_0002
 _NO_ACCESS: Final = 0x0601_0000
 _RESERVED: Final = 0x0FFF
@@ -97,9 +95,9 @@ def mandatory(slave: Slave) -> Check:
 def error_codes(slave: Slave) -> Check:
     """What is not there, or must not be written, is refused with the code for it."""
     for rule, request, codes in (
-        ("reading an object that is not there is refused", (_RESERVED, 0, b""), (_NO_OBJECT,)),
-        ("reading a sub-index that is not there is refused", (0x1018, _NO_SUCH_SUB, b""), (_NO_SUB,)),
-        ("writing an object that is not there is refused", (_RESERVED, 0, b"\0"), (_NO_OBJECT,)),
+        ("reading an object that is not there is refused", (_RESERVED, 0, b""), (abort.NO_OBJECT,)),
+        ("reading a sub-index that is not there is refused", (0x1018, _NO_SUCH_SUB, b""), (abort.NO_SUB,)),
+        ("writing an object that is not there is refused", (_RESERVED, 0, b"\0"), (abort.NO_OBJECT,)),
     ):
         index, sub, data = request
         answer = yield from (slave.write(index, sub, data) if data else slave.read(index, sub))

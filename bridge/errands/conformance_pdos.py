@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from itertools import cycle, pairwise
 from typing import Final
 
-from bridge.canopen import cobid, nmt
+from bridge.canopen import abort, cobid, nmt
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.errands.conformance import (
@@ -27,7 +27,6 @@ from bridge.errands.conformance import (
     shown,
 )
 
-_NOT_THERE: Final = (0x0602_0000, 0x0609_0011)
 _PDOS: Final = 4
 """So many of each kind are looked at: those that have a place in the pre-defined connection set."""
 _PDO_BITS: Final = 64
@@ -36,7 +35,7 @@ _ON_REQUEST: Final = (252, 253)
 _EVENT_DRIVEN: Final = (254, 255)
 _MOST_SYNCS: Final = 20
 _SYNC_S: Final = 0.1
-"""How long after a SYNC a TPDO is waited for."""
+"""The time after a SYNC in which its TPDO is waited for."""
 _QUIET_S: Final = 0.2
 _LONGEST_EVENT_MS: Final = 2_000
 _EVENTS: Final = 4
@@ -49,7 +48,7 @@ _PRODUCES_SYNC: Final = 0x4000_0000
 
 
 def settings_of_pdos(slave: Slave) -> list[Check]:
-    """How each PDO is set."""
+    """The checks of how each PDO is set."""
     return [_setting(slave, number, sent=sent) for sent in (True, False) for number in range(_PDOS)]
 
 
@@ -108,7 +107,7 @@ def _mapped(slave: Slave, name: str, entry: int, *, sent: bool) -> Check:
         return
     answer = yield from slave.read(index, sub)
     place, code, size = f"{index:04X}h:{sub:02X}", aborted(answer), expedited_bytes(answer)
-    if code in _NOT_THERE or not answer:
+    if code in (abort.NO_OBJECT, abort.NO_SUB) or not answer:
         slave.found(of_mapping, f"{place}, mapped to {name}, is there", ok=False, seen=shown(answer))
     elif sent and size is not None and answer[0] & 1 and 8 * size < bits:
         rule = f"{place} is as long as it is mapped to {name}"

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.canopen import width
+from bridge.canopen import abort, width
 from bridge.image import Value
 from bridge.mapping.model import Family, ObjectRef
 from bridge.parameter.codec import decode, encode_value, forms, matches, shown
@@ -24,7 +24,7 @@ FRESH_S: Final = 1.0
 """A value that was read this long ago is what the drive holds: it is not read again before a write."""
 _RAM_ONLY_FRESH_S: Final = 10.0
 _SAVE: Final = b"save"
-MISSING: Final = (0x0602_0000, 0x0609_0011)
+MISSING: Final = (abort.NO_OBJECT, abort.NO_SUB)
 """Abort codes: no such object, no such sub-index."""
 
 

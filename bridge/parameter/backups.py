@@ -26,7 +26,6 @@ from bridge.parameter.protection import Gate
 
 _MOVING: Final = (Effect.COMMANDS, Effect.MAY_MOVE)
 _NO_VALUE: Final = "is neither a number nor a text"
-_NO_OBJECT: Final = 0x0602_0000
 _READ_ONLY: Final = (0x0601_0000, 0x0601_0002)
 """Abort codes: no such access, read-only."""
 _SUBS: Final = 0xFF
@@ -228,7 +227,7 @@ def _scan_object(
             _, is_told = yield from access.compare(entry, reading.value, reading.time)
         except ParameterError as error:
             why = _refusal(entry, error, into)
-            if error.abort_code == _NO_OBJECT:
+            if error.abort_code == abort.NO_OBJECT:
                 break
             if error.abort_code not in MISSING:
                 found.unreadable[entry.name] = why

@@ -63,10 +63,11 @@ class ForeignWatch:
     def _pause_s(self) -> float:
         return _LOOK_AGAIN_S if self._looked_at < self._found_at + _ALERT_S else LOOK_S
 
-    def take(self, now: float) -> list[Frame]:
-        """What has come from others since the last look, if it is time for one."""
+    def take(self, now: float, *, at_once: bool = False) -> list[Frame]:
+        """What has come from others since the last look, if it is time for one or ``at_once``."""
         frames: list[Frame] = []
-        if self._receiver is None or now < self._looked_at + self._pause_s:
+        is_due = at_once or now >= self._looked_at + self._pause_s
+        if self._receiver is None or not is_due:
             return frames
         stamps = Stamps(now - time.time(), self._looked_at, now)
         self._looked_at = now

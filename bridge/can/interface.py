@@ -70,9 +70,10 @@ class Bus(Protocol):
         """These 11-bit identifiers are ours alone: give what others send on them by ``take_foreign``."""
         ...
 
-    def take_foreign(self, now: float) -> list[Frame]:
-        """What others have sent on the watched identifiers since the last call, oldest first. A frame of our
-        own is never among them; one of another's that is like ours may be missing."""
+    def take_foreign(self, now: float, *, at_once: bool = False) -> list[Frame]:
+        """What others have sent on the watched identifiers, oldest first. A frame of our own is never among
+        them; one of another's that is like ours may be missing, and one that has just come may be given by a
+        later call, unless ``at_once``."""
         ...
 
     def drain(self, now: float) -> list[Frame]:

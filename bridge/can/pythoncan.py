@@ -65,7 +65,7 @@ class PythonCanBus(SoftBus):
         options: dict[str, Any] = {"bitrate": self._bitrate}
         return can.Bus(interface=self._interface, channel=self._channel, **options)
 
-    def take_foreign(self, now: float) -> list[Frame]:
+    def take_foreign(self, now: float, *, at_once: bool = False) -> list[Frame]:
         frames: list[Frame] = []
         while self._foreign:
             frames.append(self._foreign.popleft())

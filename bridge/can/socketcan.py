@@ -184,8 +184,8 @@ class SocketCanBus:
             self._send_waiting(now)
         return frames
 
-    def take_foreign(self, now: float) -> list[Frame]:
-        return self._foreign.take(now)
+    def take_foreign(self, now: float, *, at_once: bool = False) -> list[Frame]:
+        return self._foreign.take(now, at_once=at_once)
 
     def _count_drops(self, drops: int) -> None:
         """The kernel counts from the socket's opening, modulo 2³²."""

@@ -59,7 +59,7 @@ class VirtualBus(SoftBus):
         self._wake = wake
         self._loop = asyncio.get_running_loop()
 
-    def take_foreign(self, now: float) -> list[Frame]:
+    def take_foreign(self, now: float, *, at_once: bool = False) -> list[Frame]:
         foreign, self._foreign = self._foreign, []
         return foreign
 

@@ -40,8 +40,8 @@ class MutableBus:
     def watch(self, can_ids: frozenset[int]) -> None:
         self._bus.watch(can_ids)
 
-    def take_foreign(self, now: float) -> list[Frame]:
-        return self._bus.take_foreign(now)
+    def take_foreign(self, now: float, *, at_once: bool = False) -> list[Frame]:
+        return self._bus.take_foreign(now, at_once=at_once)
 
     def drain(self, now: float) -> list[Frame]:
         frames = self._bus.drain(now)

@@ -128,9 +128,10 @@ class Line:
     def receive(self, now: float) -> list[Frame]:
         """Take in what has come since the last call; gives what others have sent on identifiers of ours."""
         frames = self.bus.drain(now)
-        if frames:
-            self.network.on_frames(frames, now)
-        return self.bus.take_foreign(now)
+        has_started = bool(frames) and self.network.on_frames(frames, now)
+        # They come by a way of their own: what was sent to a node before its boot-up message is taken in with
+        # that message, and not later.
+        return self.bus.take_foreign(now, at_once=has_started)
 
     @property
     def has_news(self) -> bool:

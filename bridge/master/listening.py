@@ -83,7 +83,9 @@ class Listening:
         return True
 
     def next_deadline(self) -> float | None:
-        return None if self.acts else self._until
+        if self.acts or self._is_gone:
+            return None
+        return float("-inf") if self._until is None else self._until
 
     def returns(self, now: float) -> None:
         """The bridge or its bus was away: another one may have taken over meanwhile."""

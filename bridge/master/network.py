@@ -73,6 +73,7 @@ class Network:
         """Identifiers on which nobody else may send what we repeat; brought up to date by ``take_routes``."""
         self._has_booted = False
         self._has_news = False
+        self._has_started = False
         self._nmt_for_all: Frame | None = None
         self._routes_changed = True
         self._routes: dict[int, Handler] = {}
@@ -83,14 +84,16 @@ class Network:
         self._frames: list[Frame] = []
         self._points = BusPoints(bus, plant)
 
-    def on_frames(self, frames: list[Frame], now: float) -> None:
-        """Everything received, in order."""
+    def on_frames(self, frames: list[Frame], now: float) -> bool:
+        """Everything received, in order; gives whether a node has started by it."""
+        self._has_started = False
         routes = self._routes
         for frame in frames:
             handler = routes.get(frame.can_id)
             if handler is not None:
                 handler(frame)
         self._pump(now)
+        return self._has_started
 
     def on_foreign(self, frames: list[Frame], now: float) -> None:
         """What others have sent on identifiers that are ours."""
@@ -138,6 +141,9 @@ class Network:
         self._pump(now)
 
     def _begins_to_act(self, now: float) -> bool:
+        if not self.routings:
+            # The bus lets nothing in yet, so its silence proves nothing.
+            return False
         was_left = self.charge.is_left
         self.charge.on_time(now)
         self._reach.on_bus(now)
@@ -234,6 +240,9 @@ class Network:
 
     def touched(self, node: Neighbour) -> None:
         self._schedule.touch(node)
+
+    def started_anew(self, node: Neighbour) -> None:
+        self._has_started = True
 
     def may_start(self, node: Neighbour) -> bool:
         self._gate.judge()

@@ -97,6 +97,7 @@ class NodeCore:
     def _on_boot_up(self, now: float) -> None:
         """The node has started: whatever it was told before is forgotten."""
         self.started_at = now
+        self._neighbours.started_anew(self)
         self.told = None
         self._memory.may_run = False
         self.leaving.on_restart()

@@ -28,8 +28,10 @@ class Fault:
     does not concern. Without a ``bus_bound`` somebody else speaks there; without a ``drive_bound`` the drive
     says nothing. ``examine``: in place of times, what is done and judged by yes or no; ``demand`` says what
     has to hold then. ``brings_back``: somebody enables the drive again and again, so that its time is the
-    longest that it turned without a stop. ``ends_soon``: it is undone as soon as its last bound has passed,
-    and not only when all are measured. ``of_outputs``: it is about the outputs beside the drives."""
+    longest that it turned without a stop. ``speaks_on``: somebody goes on enabling a drive whose node is
+    stopped, so that its time is to the end of its last turn. ``ends_soon``: it is undone as soon as its last
+    bound has passed, and not only when all are measured. ``of_outputs``: it is about the outputs
+    beside the drives."""
 
     name: str
     reference: Reference
@@ -47,6 +49,7 @@ class Fault:
     is_long: bool = False
     others_may_stop: bool = False
     brings_back: bool = False
+    speaks_on: bool = False
     ends_soon: bool = False
     examine: Examine | None = None
     demand: str = ""

@@ -258,6 +258,7 @@ FAULTS: Final = (
         None,
         bounds.node_stopped,
         nodes=(others.VICTIM.node,),
+        speaks_on=True,
     ),
     Fault(
         "intruder that is a master",

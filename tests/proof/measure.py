@@ -263,9 +263,19 @@ def was_enabled(rig: Rig, drive: Drive, bus: float, own: float) -> bool:
 
 
 def longest_turn(rig: Rig, drive: Drive, since: float) -> float:
-    """For how long, in seconds, the drive was enabled and turned at a stretch after ``since``, by what it
-    reports: to its first report that it does not, or that its node is not in operation. What a drive gains
-    that is stopped as soon as it starts is no turning."""
+    """For how long, in seconds, the drive was enabled and turned at a stretch after ``since``."""
+    return max(end - begin for begin, end in _turns(rig, drive, since))
+
+
+def last_turn_end(rig: Rig, drive: Drive, since: float) -> float:
+    """When the drive had turned for the last time after ``since``; now, if it still turns."""
+    return _turns(rig, drive, since)[-1][1]
+
+
+def _turns(rig: Rig, drive: Drive, since: float) -> list[tuple[float, float]]:
+    """When the drive was enabled and turned after ``since``, at which it did, by what it reports: to its
+    first report that it does not, or that its node is not in operation. What a drive gains that is stopped as
+    soon as it starts is no turning."""
     least = (1 - _SLOWER) * drive.family.speed
     looks = [
         (at, drive.enabled(run.data) and abs(drive.speed(run.data)) > least)
@@ -274,15 +284,15 @@ def longest_turn(rig: Rig, drive: Drive, since: float) -> float:
     ]
     signs = rig.said.runs(0x700 + drive.node_id, since)
     looks += [(run.first, False) for run in signs if run.first >= since and _is_left(run.data)]
-    longest, began = 0.0, since
-    turned = True
+    found: list[tuple[float, float]] = []
+    began: float | None = since
     for at, turns in sorted(looks):
-        if turned:
-            longest = max(longest, at - began)
-        elif turns:
+        if began is None and turns:
             began = at
-        turned = turns
-    return max(longest, rig.now() - began if turned else 0.0)
+        elif began is not None and not turns:
+            found.append((began, at))
+            began = None
+    return found if began is None else [*found, (began, rig.now())]
 
 
 def _is_left(sign: bytes) -> bool:

@@ -66,12 +66,11 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
     words = {drive: measure.stopping(rig, drive, times[0]) for drive, times in stopped.items()}
     _all_go_on(rig, others, fault, "which it does not concern", began, say)
     ends: dict[Drive, float] = {}
-    if fault.brings_back:
+    if fault.brings_back or fault.speaks_on:
         # Until now it may have turned now and then; from now on it may not.
         ends = dict.fromkeys(stopped, rig.now())
         stopped = {
-            drive: (bus, moment + measure.longest_turn(rig, drive, moment))
-            for drive, (bus, _) in stopped.items()
+            drive: (bus, _turned_until(rig, fault, drive, moment)) for drive, (bus, _) in stopped.items()
         }
     before = {drive: rig.board.accepted(drive.place)[0] for drive in concerned}
     if not fault.ends_soon:
@@ -133,6 +132,13 @@ def _examined(rig: Rig, fault: Fault, examine: Examine, say: Callable[[str], Non
     rig.run_all()
     say(f"{fault.name}: {time.monotonic() - began:.1f} s")
     return samples
+
+
+def _turned_until(rig: Rig, fault: Fault, drive: Drive, moment: float) -> float:
+    """As if it had turned without a pause from ``moment`` on, where somebody brings it back."""
+    if fault.brings_back:
+        return moment + measure.longest_turn(rig, drive, moment)
+    return measure.last_turn_end(rig, drive, moment)
 
 
 def _wrong(rig: Rig, fault: Fault, drive: Drive, times: tuple[float, float], word: bytes | None) -> str:

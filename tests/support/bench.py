@@ -54,6 +54,8 @@ class ClockBus:
         self.accepted: frozenset[int] = frozenset()
         self.ours: frozenset[int] = frozenset()
         self.foreign: list[Frame] = []
+        self.is_looking = True
+        """Else what others send is found only when it is asked for at once."""
         self._deliver = deliver
         self._bursts = SoftBursts()
 
@@ -65,9 +67,13 @@ class ClockBus:
     def watch(self, can_ids: frozenset[int]) -> None:
         self.ours = can_ids
 
-    def take_foreign(self, now: float) -> list[Frame]:
+    def take_foreign(self, now: float, *, at_once: bool = False) -> list[Frame]:
+        if not (self.is_looking or at_once):
+            return []
+        if not self.foreign:
+            return []
         frames, self.foreign = self.foreign, []
-        return frames
+        return [frame._replace(time=min(frame.time, now)) for frame in frames]
 
     def drain(self, now: float) -> list[Frame]:
         frames, self.inbox = self.inbox, []

@@ -83,5 +83,8 @@ async def test_what_comes_back_without_any_mark_is_told_from_anothers_by_what_it
             assert bus.take_foreign(now) == [], "it is looked at now and then"
             found = bus.take_foreign(time.monotonic() + 2 * LOOK_S)
             assert [(frame.can_id, frame.data) for frame in found] == [(0x205, stranger.data)]
+            sockets.back.send(frame_bytes(stranger))
+            assert bus.take_foreign(now) == []
+            assert [frame.data for frame in bus.take_foreign(now, at_once=True)] == [stranger.data]
             assert bus.next_deadline() is not None
             bus.close()

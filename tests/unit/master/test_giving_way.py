@@ -75,11 +75,11 @@ def hangs_in(bench: Bench, name: str) -> None:
     """The process has looked at the clock, and stands still as it begins to read what has come."""
     reads = getattr(bench.bus, name)
 
-    def hangs(now: float) -> list[Frame]:
+    def hangs(now: float, **how: bool) -> list[Frame]:
         setattr(bench.bus, name, reads)
         bench.hang(HANG_S)
         bench.receive(TWIN)
-        frames: list[Frame] = reads(now)
+        frames: list[Frame] = reads(now, **how)
         return frames
 
     setattr(bench.bus, name, hangs)

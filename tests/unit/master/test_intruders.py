@@ -77,6 +77,26 @@ def test_a_frame_that_was_there_before_the_node_has_started_does_not_stop_it(tmp
     assert bench.value("conveyor/node/nmt_state") == 5
 
 
+def test_what_came_with_its_boot_up_message_is_before_it(tmp_path: Path) -> None:
+    """A late bridge cannot tell which was first. So it is taken in with the message: what it finds later has
+    come later."""
+    bench = running(tmp_path)
+    bench.receive(Frame(0x205, ENABLE))
+    bench.run(0.5)
+    bench.bus.is_looking = False
+    bench.bus.foreign.append(Frame(0x205, ENABLE, bench.now + 0.004))
+    bench.powered = False
+    bench.power_on()
+    bench.run(0.005)
+    bench.bus.is_looking = True
+    bench.run(5.0)
+    assert bench.value("bus/can0/intruders") == 2
+    assert bench.value("conveyor/node/nmt_state") == 5
+    bench.receive(Frame(0x205, ENABLE))
+    bench.run(0.5)
+    assert bench.value("conveyor/node/nmt_state") == 4
+
+
 def test_each_stop_of_a_node_is_told(tmp_path: Path) -> None:
     """Also where the same intruder was told a moment ago, and the node has started since."""
     bench = running(tmp_path)

@@ -428,7 +428,8 @@ def test_who_reads_is_answered_by_nothing_where_all_are_stopped(make: Any) -> No
 
 
 def test_that_somebody_writes_is_told_at_once(make: Any) -> None:
-    bus = make(Node(5))
+    """Also where nobody is stopped for it, which would be told anyway."""
+    bus = make(Node(5), on_intruder="report")
     bus.hears(0x605, READ)
     bus.hears(0x605, WRITE, 10.01)
     assert len(bus.events) == 2

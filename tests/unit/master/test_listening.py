@@ -71,6 +71,24 @@ def test_one_that_hears_another_stays_passive_and_says_so(tmp_path: Path, sign: 
     assert from_master(bench) == []
 
 
+def test_its_time_begins_when_it_can_hear(tmp_path: Path) -> None:
+    """On a slow machine the first round, at whose end the bus is told what to let in, takes longer."""
+    bench = listening(tmp_path)
+    watch = bench.bus.watch
+
+    def watch_late(can_ids: frozenset[int]) -> None:
+        bench.now += 1.0 if not bench.bus.ours else 0.0
+        watch(can_ids)
+
+    bench.bus.watch = watch_late
+    for _ in range(4):
+        bench.run(0.1)
+        bench.receive(HEARTBEAT)
+    bench.run(0.001)
+    assert from_master(bench) == []
+    assert bench.value("bus/can0/passive") is True
+
+
 def test_sync_alone_is_no_other_bridge(tmp_path: Path) -> None:
     bench = listening(tmp_path)
     for _ in range(30):

@@ -16,6 +16,7 @@ from tests.proof.measure import (
     handed_on,
     held,
     keeps_setpoint,
+    last_turn_end,
     longest_turn,
     spoken_to,
     stopping,
@@ -260,3 +261,11 @@ def test_a_node_that_is_not_in_operation_turns_nothing() -> None:
     rig = scene(said=[Run(9.0, 10.1, RUNNING), Run(11.0, 11.2, RUNNING), Run(11.3, 20.0, READY)])
     rig.said.frames[0x700 + FU1.node_id] = [Run(9.0, 10.2, b"\x05"), Run(10.3, 10.4, b"\x04")]
     assert longest_turn(rig, FU1, 10.0) == pytest.approx(0.3), "it is cut off while it turns"
+
+
+def test_beside_one_that_speaks_on_the_end_of_the_last_turn_counts() -> None:
+    said = [Run(9.0, 10.1, RUNNING), Run(10.2, 10.3, READY), Run(10.4, 10.7, RUNNING), Run(10.8, 20.0, READY)]
+    assert last_turn_end(scene(said=said), FU1, 10.0) == pytest.approx(10.8)
+    assert last_turn_end(scene(said=said[:2]), FU1, 10.0) == pytest.approx(10.2)
+    rig = scene(said=said[:3])
+    assert last_turn_end(rig, FU1, 10.0) == rig.now(), "it turns still"

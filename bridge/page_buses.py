@@ -93,10 +93,10 @@ class Buses:
 
     def _pdos(self, table: BusTable, name: str) -> Iterator[dict[str, Any]]:
         node = next(node for node in table.node if node.name == name)
-        family = self._project.families[node.mapping]
+        family = self._project.families[node.mapping_key]
         found: dict[int, PdoView | DevicePdoView] = dict(views(node, family))
         if family.is_device:
-            found |= device_views(node, family, self._descriptions.get(node.mapping))
+            found |= device_views(node, family, self._descriptions.get(node.mapping_key))
         for cob_id, view in sorted(found.items(), key=lambda pair: pair[1].label):
             parts = _words(view) if isinstance(view, PdoView) else _signals(view)
             yield {"cob_id": f"{cob_id:03X}", "label": view.label, "bytes": view.codec.length, "parts": parts}

@@ -55,7 +55,7 @@ def _vain_silences(project: Project) -> Iterator[tuple[Key, str, str]]:
     """Keys of the site file that ask for silence, why it would not stop the drive, and what would."""
     for b, bus in enumerate(project.site.bus):
         for n, node in enumerate(bus.node):
-            family = project.families[node.mapping]
+            family = project.families[node.mapping_key]
             settings = _settings(node, project.downloads.get(node.name, ()))
             for d, drive in enumerate(node.drive):
                 table = ("bus", b, "node", n, "drive", d)

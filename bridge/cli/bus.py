@@ -95,10 +95,10 @@ class Line:
         node = next((node for node in self.table.node if node.id == node_id), None)
         if node is None:
             raise typer.BadParameter("a further SDO channel has the COB-IDs of the mapping: give SITE")
-        for server in self.families[node.mapping].sdo:
+        for server in self.families[node.mapping_key].sdo:
             if server.number == number:
                 return server
-        known = ", ".join(str(server.number) for server in self.families[node.mapping].sdo)
+        known = ", ".join(str(server.number) for server in self.families[node.mapping_key].sdo)
         hint = f"1, {known}" if known else "1"
         raise typer.BadParameter(f"{node.mapping} has no SDO channel {number}: {hint}")
 

@@ -50,7 +50,7 @@ def conformance(
     """Try on NODE, which must stand still, what CiA 301 asks of a slave, and write a report."""
     project = load_project(site)
     bus, table = drop_test.find_node(project, node)
-    family = project.families[table.mapping]
+    family = project.families[table.mapping_key]
     names = [f"{node}/{family.leaf_of(drive)}" for drive in table.drive] or [node]
     targets = [find(site, name) for name in names]
     drop_test.refuse_company(project, bus, table)

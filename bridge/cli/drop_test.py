@@ -48,7 +48,7 @@ def drop_test(
     """Stop supervising the drives or outputs of NODE, measure what it does, and write a report to sign."""
     project = load_project(site)
     bus, table = find_node(project, node)
-    family = project.families[table.mapping]
+    family = project.families[table.mapping_key]
     if family.is_device and not family.output:
         raise typer.BadParameter(f"{node} has neither drives nor outputs: there is nothing to stop")
     consent = agree(table, at_the_machine=at_the_machine, is_device=family.is_device)
@@ -115,7 +115,7 @@ def agree(node: NodeTable, *, at_the_machine: bool, first: str = "", is_device: 
 
 def refuse_company(project: Project, bus: BusTable, node: NodeTable) -> None:
     """Raises ``OperationFailed`` if another master commands this bus."""
-    family = project.families[node.mapping]
+    family = project.families[node.mapping_key]
     commands = command_ids(node, family)
     listen_s = max(_LISTEN_S, 3 * bus.heartbeat_ms / 1000)
     line = Line(bus, project.families, is_of_site=True)

@@ -33,6 +33,10 @@ def eds(
     node_id: Annotated[
         int | None, typer.Option(min=1, max=127, help="the node id that $NODEID stands for")
     ] = None,
+    module: Annotated[
+        list[str] | None,
+        typer.Option(help="a module that is plugged in, by order code, name or number; in their order"),
+    ] = None,
     concise: Annotated[
         Path | None, typer.Option(help="write what the file configures as a concise DCF (1F22h)")
     ] = None,
@@ -44,11 +48,12 @@ def eds(
 ) -> None:
     """Read FILE even if it has faults; print what it describes and what was wrong with it."""
     if form is Format.CANOPEN:
-        if concise or as_json:
-            raise typer.BadParameter("goes with neither --concise nor --json", param_hint="--format canopen")
+        if concise or as_json or module:
+            message = "goes with none of --concise, --json and --module"
+            raise typer.BadParameter(message, param_hint="--format canopen")
         print(_canopen_eds()(str(file), node_id), end="")
         return
-    description = read_device_file(file)
+    description = read_device_file(file, module or ())
     node_id = node_id or description.commissioning.node_id
     report = Report()
     downloads = configuration(description, node_id, report)
@@ -105,6 +110,9 @@ def _lines(
     if commissioning.node_id is not None or commissioning.node_name:
         name = f" {commissioning.node_name}" if commissioning.node_name else ""
         lines.append(f"  for node {commissioning.node_id}{name}")
+    for one in description.modules:
+        times = description.plugged.count(one.number)
+        lines.append(f"  module {one}" + (f", plugged in {times} ×" if times else ""))
     lines += [f"  {_pdo_line(pdo)}" for pdo in pdos(description, node_id)]
     if downloads:
         lines.append(f"  configures {len(downloads)} objects:")
@@ -137,6 +145,8 @@ def _as_json(
     return {
         "format": description.format,
         "device": asdict(description.device),
+        "modules": [asdict(one) for one in description.modules],
+        "plugged": list(description.plugged),
         "node_id": node_id,
         "node_name": description.commissioning.node_name,
         "objects": [_entry_json(entry, node_id) for one in description.objects for entry in one.entries],

@@ -75,7 +75,7 @@ def exchange(
     """After NODE was exchanged: restore its backups, save, do the drop test, audit, and write a report."""
     project = load_project(site)
     bus, table = drop_test.find_node(project, node)
-    if project.families[table.mapping].is_device:
+    if project.families[table.mapping_key].is_device:
         raise typer.BadParameter(
             f"{node} is no drive: `drivebridge parameters restore` gives it its settings, and `drop-test` "
             "proves what becomes of its outputs"
@@ -127,7 +127,7 @@ def exchange(
 
 def _places(project: Project, site: Path, node: NodeTable, files: Sequence[Path]) -> list[_Place]:
     """Each drive of the node with its file. Raises ``BadParameter`` where one has none, or two."""
-    family = project.families[node.mapping]
+    family = project.families[node.mapping_key]
     targets = {
         name: find(site, name) for name in (f"{node.name}/{family.leaf_of(one)}" for one in node.drive)
     }

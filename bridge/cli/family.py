@@ -33,9 +33,13 @@ def new(
     output: Annotated[
         Path | None, typer.Option(help="where to write it; left out, mappings/VENDOR/PRODUCT.toml")
     ] = None,
+    module: Annotated[
+        list[str] | None,
+        typer.Option(help="a module that is plugged in, by order code, name or number; in their order"),
+    ] = None,
 ) -> None:
     """Write a mapping for the device that FILE describes: a drive with CiA 402, or one that is no drive."""
-    description = read_whole_device_file(file)
+    description = read_whole_device_file(file, module or ())
     lost = [one for one in description.findings if one.severity is Severity.ERROR]
     told = sorted((*lost, *contradictions(description)), key=lambda one: one.line)
     derived = derive_family(description, file.name, mode)

@@ -177,7 +177,7 @@ def find(site: Path, drive: str) -> Target:
     targets: dict[str, tuple[BusTable, NodeTable, Slot | None]] = {}
     for bus in project.site.bus:
         for node in bus.node:
-            family = project.families[node.mapping]
+            family = project.families[node.mapping_key]
             for table in node.drive:
                 slot = family.slot_named(table.slot)
                 targets[f"{node.name}/{family.leaf_of(table)}"] = (bus, node, slot)
@@ -189,7 +189,7 @@ def find(site: Path, drive: str) -> Target:
         raise typer.BadParameter(f"{drive!r} is {'more than one' if found else 'no'} drive: {known}")
     (name,) = found
     bus, node, slot = targets[name]
-    family = project.families[node.mapping]
+    family = project.families[node.mapping_key]
     access = DriveParameters(
         name, node.name, family, Names(family), ledger, on_first=family.is_on_first(slot)
     )

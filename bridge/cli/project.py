@@ -60,13 +60,16 @@ def _served(project: Project) -> str:
 def _devices(project: Project) -> list[str]:
     """The nodes that are no drives."""
     return [
-        node.name for bus in project.site.bus for node in bus.node if project.families[node.mapping].is_device
+        node.name
+        for bus in project.site.bus
+        for node in bus.node
+        if project.families[node.mapping_key].is_device
     ]
 
 
 def _drives(project: Project) -> list[str]:
     return [
-        f"{node.name}/{project.families[node.mapping].leaf_of(drive)}"
+        f"{node.name}/{project.families[node.mapping_key].leaf_of(drive)}"
         for bus in project.site.bus
         for node in bus.node
         for drive in node.drive

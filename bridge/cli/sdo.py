@@ -120,7 +120,7 @@ def why_forced(line: Line, node_id: int, address: ObjectRef) -> str:
     node = next((node for node in line.table.node if node.id == node_id), None)
     if node is None:
         return ""
-    names = Names(line.families[node.mapping])
+    names = Names(line.families[node.mapping_key])
     return names.protection.why_forced(names.resolve(str(address)))
 
 

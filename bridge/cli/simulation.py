@@ -42,12 +42,11 @@ def simulated_nodes(table: BusTable, site: Path, habits: Habits = NONE) -> list[
         parameters: dict[str, float] = {}
         for drive in node.drive:
             parameters |= {f"{drive.slot}/{name}": value for name, value in drive.parameters.items()}
-        if node.mapping not in makers:
-            file = described_file(site, node.mapping)
-            makers[node.mapping] = (
-                _maker(node.mapping, folders) if file is None else _described(file, folders)
-            )
-        simulated = makers[node.mapping](node.id, parameters)
+        key = node.mapping_key
+        if key not in makers:
+            file = described_file(site, key)
+            makers[key] = _maker(key, folders) if file is None else _described(file, folders, node.modules)
+        simulated = makers[key](node.id, parameters)
         if node.name in habits:
             simulated.adopt_habits(habits[node.name])
         nodes.append(simulated)
@@ -65,11 +64,11 @@ def _maker(mapping: str, folders: Sequence[Path]) -> _Make:
     return partial(simulate_family, lineage(mapping, folders), family)
 
 
-def _described(file: Path, folders: Sequence[Path]) -> _Make:
+def _described(file: Path, folders: Sequence[Path], modules: Sequence[str]) -> _Make:
     """A node of a device description. A drive is played as the mapping that is made of its file."""
-    family = describe(file, folders)
+    family = describe(file, folders, modules)
     if family.is_device:
-        description = read_whole_device_file(file)
+        description = read_whole_device_file(file, modules)
         return lambda node_id, parameters: simulate_description(description, node_id)
     return partial(simulate_family, [file.name, *_bases(family, folders)], family)
 

@@ -161,8 +161,8 @@ class Plant:
         units = _unit_ids(site)
         for bus in site.bus:
             for table in bus.node:
-                family = families[table.mapping]
-                node = self.nodes[table.name] = Node(bus, table, family, names[table.mapping])
+                family = families[table.mapping_key]
+                node = self.nodes[table.name] = Node(bus, table, family, names[table.mapping_key])
                 settled = partial(self._on_settled, node)
                 if family.is_device:
                     node.device = Device(table, family, units[table.name, _DEVICE], self.image)

@@ -67,7 +67,7 @@ def site_points(
     for bus in site.bus:
         points[f"bus/{bus.name}"] = _bus_points(bus)
         for node in bus.node:
-            family, shown = families[node.mapping], names[node.mapping]
+            family, shown = families[node.mapping_key], names[node.mapping_key]
             points[node.name] = _node_points(node, family.poll)
             if family.is_device:
                 points[node.name] += _input_points(node.name, family) + parameter_points(node.name, shown)

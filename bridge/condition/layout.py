@@ -43,7 +43,7 @@ def layout_of(points: Sequence[Point], site: Site, families: Mapping[str, Family
     units = {point.name: point.unit for point in points}
     nodes = [(bus.name, node) for bus in site.bus for node in bus.node]
     drives = {
-        f"{node.name}/{families[node.mapping].leaf_of(drive)}": node.name
+        f"{node.name}/{families[node.mapping_key].leaf_of(drive)}": node.name
         for _, node in nodes
         for drive in node.drive
     }

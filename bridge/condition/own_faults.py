@@ -28,7 +28,7 @@ def with_faults(layout: Layout, site: Site, families: Mapping[str, Family]) -> L
 
 def _by_drive(site: Site, families: Mapping[str, Family], of_family: Mapping[str, _Of]) -> dict[str, _Of]:
     return {
-        f"{node.name}/{families[node.mapping].leaf_of(drive)}": of_family[node.mapping]
+        f"{node.name}/{families[node.mapping_key].leaf_of(drive)}": of_family[node.mapping_key]
         for bus in site.bus
         for node in bus.node
         for drive in node.drive

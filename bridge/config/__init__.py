@@ -9,6 +9,7 @@ from bridge.config.fields import Reaction as Reaction
 from bridge.config.fields import WordOrder as WordOrder
 from bridge.config.load import load_site as load_site
 from bridge.config.load import read_site as read_site
+from bridge.config.model import MODULES as MODULES
 from bridge.config.model import BusTable as BusTable
 from bridge.config.model import CableTable as CableTable
 from bridge.config.model import DriveTable as DriveTable
@@ -22,3 +23,4 @@ from bridge.config.model import SafeValue as SafeValue
 from bridge.config.model import Site as Site
 from bridge.config.model import UserTable as UserTable
 from bridge.config.model import ZenohTable as ZenohTable
+from bridge.config.model import mapping_key as mapping_key

@@ -228,10 +228,23 @@ class ConfigureTable(Table):
         )
 
 
+MODULES: Final = "modules"
+"""The key of a fault about what is plugged into a device, found in its description."""
+
+
+def mapping_key(mapping: str, modules: Sequence[str]) -> str:
+    """A mapping, and the modules that are plugged into the device, one to a line."""
+    return "\n".join((mapping, *modules))
+
+
 class NodeTable(Table):
     name: Name = Field(description="a name for this node, lower_snake_case")
     id: int = Field(ge=1, le=127, description="the node's CANopen address, 1…127")
     mapping: str = Field(description="a file below mappings/ without .toml, such as nord/sk-tu4-cao")
+    modules: list[Annotated[str, Field(min_length=1)]] = Field(
+        default_factory=list[str],
+        description="what is plugged into a coupler, in its order: order codes, names or numbers of its EDS",
+    )
     supervision: Literal["heartbeat", "guarding", "none"] = Field(
         "heartbeat", description="heartbeat, guarding or none"
     )
@@ -264,6 +277,11 @@ class NodeTable(Table):
     drive: list[DriveTable] = Field(
         default_factory=list[DriveTable], description="a [[bus.node.drive]] table for each drive"
     )
+
+    @property
+    def mapping_key(self) -> str:
+        """What its family is found by: nodes with the same mapping and the same modules share one."""
+        return mapping_key(self.mapping, self.modules)
 
 
 class CableTable(Table):

@@ -100,13 +100,19 @@ def _error_lines(description: Description, entry: Entry) -> Iterator[str]:
 
 
 def _signals(description: Description, *, receives: bool) -> Iterator[tuple[str, tuple[Entry, str, str]]]:
-    """What the RPDOs or the TPDOs carry, in their order: name, and entry, type and title."""
+    """What the RPDOs or the TPDOs carry, in their order, and what modules bring for them: name, and entry,
+    type and title."""
     found: dict[tuple[int, int], Entry] = {}
     for pdo in pdos(description):
         for one in pdo.mapped if pdo.receives == receives else ():
             entry = description.entry(one.index, one.sub)
             if entry and one.index not in _DUMMIES:
                 found.setdefault((one.index, one.sub), entry)
+    for at in sorted(description.extended):
+        # A coupler maps by itself what is plugged in.
+        entry = description.entry(*at)
+        if entry and entry.pdo_mappable and entry.access.writable == receives:
+            found.setdefault(at, entry)
     names: set[str] = set()
     for entry in found.values():
         kind = TYPES.get(entry.data_type) if entry.data_type else None

@@ -302,9 +302,10 @@ def _further(layout: Layout, taken: Set[tuple[str, str]]) -> Iterator[str]:
             yield ""
 
 
-def describe(path: Path, folders: Sequence[Path] = ()) -> Family:
-    """The family of the device that the description in ``path`` describes. Raises ``FileFaults``."""
-    description = read_whole_device_file(path)
+def describe(path: Path, folders: Sequence[Path] = (), modules: Sequence[str] = ()) -> Family:
+    """The family of the device that the description in ``path`` describes, with ``modules`` plugged in.
+    Raises ``FileFaults``."""
+    description = read_whole_device_file(path, modules)
     try:
         made = derive_family(description, path.name)
     except OperationFailed as error:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from bridge.eds.fields import Fields
 from bridge.eds.ini import SPELLING, Section, read_sections, shown, stripped
 from bridge.eds.model import Commissioning, Description, Device, Object, Report
+from bridge.eds.modules import Modules
 from bridge.eds.objects import ObjectReader
 from bridge.eds.pdos import add_compact_pdos
 from bridge.eds.text import lines
@@ -26,11 +27,20 @@ _COMMISSIONING: Final = ("devicecomissioning", "devicecommissioning")
 """CiA 306 spells it with one m, tools with two."""
 
 
-def read_eds(text: str, report: Report) -> Description:
-    """Everything that can be read from ``text``; the report has what cannot."""
+def read_eds(text: str, report: Report, names: Sequence[str] = ()) -> Description:
+    """Everything that can be read from ``text``, with the modules that are plugged in, in their order; the
+    report has what cannot. Raises ``UnknownModule``."""
     all_lines = lines(text)
     sections = read_sections(all_lines, report)
-    reader = _EdsReader(sections, report)
+    modules = Modules(sections, report)
+    plugged = tuple(modules.find(name) for name in names) or modules.connected()
+    extended = modules.plug(plugged, anew=bool(names))
+    if modules.known and not plugged:
+        missing = (
+            f"{len(modules.known)} modules are described and none is plugged in: their objects are missing"
+        )
+        report.warning(modules.line, missing)
+    reader = _EdsReader(sections, report, modules.brought)
     objects = reader.objects()
     if stripped(all_lines[-1]) and (lost := reader.lost(all_lines)):
         report.breaks_off(len(all_lines), f"it ends within a line, and {lost}")
@@ -40,6 +50,9 @@ def read_eds(text: str, report: Report) -> Description:
         device=reader.device(),
         commissioning=commissioning,
         objects=tuple(objects[index] for index in sorted(objects)),
+        modules=modules.known,
+        plugged=plugged,
+        extended=extended,
     )
 
 
@@ -62,9 +75,11 @@ def _is_end(all_lines: Sequence[str]) -> bool:
 
 
 class _EdsReader:
-    def __init__(self, sections: dict[str, Section], report: Report) -> None:
+    def __init__(self, sections: dict[str, Section], report: Report, brought: Collection[int]) -> None:
+        """``brought`` are the objects that stand in no list, for they come with modules."""
         self._sections = sections
         self._report = report
+        self._brought = brought
         self._fields = Fields(report)
         self._roots: dict[int, Section] = {}
         self._subs: dict[int, dict[int, Section]] = {}
@@ -181,7 +196,7 @@ class _EdsReader:
                     section.line, f"[{name}] says {count} objects and lists {len(values)}: the list counts"
                 )
         for index in found:
-            if index in self._roots and index not in listed:
+            if index in self._roots and index not in listed and index not in self._brought:
                 self._report.warning(
                     self._roots[index].line, f"{index:04X}h is described and not listed: taken"
                 )

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from bridge.config import MODULES
 from bridge.config.download import Download, parse_concise_dcf
 from bridge.eds.configuration import configuration
 from bridge.eds.contradictions import contradictions
 from bridge.eds.eds import read_eds
 from bridge.eds.model import Description, Report, Severity
+from bridge.eds.modules import UnknownModule
 from bridge.eds.text import decode
 from bridge.eds.xdd import read_xdd
 from bridge.errors import Fault, FileFaults
@@ -20,19 +23,28 @@ _MOST_BYTES: Final = 16 << 20
 _XML_STARTS: Final = (b"<", b"\xef\xbb\xbf<", b"\xff\xfe<", b"\xfe\xff\0<")
 
 
-def read_device_file(path: Path) -> Description:
-    """The description in ``path``, with its oddities in ``findings``.
+def read_device_file(path: Path, modules: Sequence[str] = ()) -> Description:
+    """The description in ``path``, with its oddities in ``findings``. ``modules`` are those that are plugged
+    in, in their order, by order code, name or number; left out, those that the file itself connects.
 
-    Raises ``FileFaults`` if it cannot be opened or is no device description.
+    Raises ``FileFaults`` if it cannot be opened, is no device description, or has no such module.
     """
-    return read_device(contents(path), str(path))
+    return read_device(contents(path), str(path), modules)
 
 
-def read_device(content: bytes, name: str) -> Description:
+def read_device(content: bytes, name: str, modules: Sequence[str] = ()) -> Description:
     """As ``read_device_file``, from a file's content; ``name`` is for messages."""
     report = Report()
     is_xml = content.lstrip(b" \t\r\n").startswith(_XML_STARTS)
-    description = read_xdd(content, report) if is_xml else read_eds(decode(content, report), report)
+    if is_xml and modules:
+        message = "an XDD describes no modules here"
+        raise FileFaults([Fault(name, 0, MODULES, message, "an EDS or DCF of the device")])
+    try:
+        description = (
+            read_xdd(content, report) if is_xml else read_eds(decode(content, report), report, modules)
+        )
+    except UnknownModule as error:
+        raise FileFaults([Fault(name, 0, MODULES, str(error), error.hint)]) from None
     findings = report.findings()
     if not description.objects:
         first = next((one for one in findings if one.severity is Severity.ERROR), None)
@@ -44,10 +56,10 @@ def read_device(content: bytes, name: str) -> Description:
     return replace(description, findings=report.findings(), broken_off_at=report.broken_off_at)
 
 
-def read_whole_device_file(path: Path) -> Description:
+def read_whole_device_file(path: Path, modules: Sequence[str] = ()) -> Description:
     """As ``read_device_file``, for those who make something of it: half a description is none, and raises
     ``FileFaults``, too."""
-    description = read_device_file(path)
+    description = read_device_file(path, modules)
     line = description.broken_off_at
     if line is None:
         return description

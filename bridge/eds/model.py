@@ -180,6 +180,19 @@ class Device:
 
 
 @dataclass(frozen=True, slots=True)
+class Module:
+    """A module that a modular device may have plugged in; ``number`` is that of the file."""
+
+    number: int
+    product: str = ""
+    order_code: str = ""
+
+    def __str__(self) -> str:
+        names = ", ".join(name for name in (self.order_code, self.product) if name)
+        return f"{self.number} ({names})" if names else f"{self.number}"
+
+
+@dataclass(frozen=True, slots=True)
 class Commissioning:
     """The node that a DCF or XDC is for."""
 
@@ -191,13 +204,18 @@ class Commissioning:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A whole file: the device, its objects by index, and the oddities found."""
+    """A whole file: the device, its objects by index, and the oddities found. ``modules`` are those that it
+    knows, ``plugged`` the numbers of those whose objects are here, and ``extended`` their elements of shared
+    objects, by index and sub-index."""
 
     format: str
     device: Device = field(default_factory=Device)
     commissioning: Commissioning = field(default_factory=Commissioning)
     objects: tuple[Object, ...] = ()
     findings: tuple[Finding, ...] = ()
+    modules: tuple[Module, ...] = ()
+    plugged: tuple[int, ...] = ()
+    extended: frozenset[tuple[int, int]] = frozenset()
     broken_off_at: int | None = None
     """The line in which the file ends before it is complete."""
 

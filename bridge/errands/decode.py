@@ -92,12 +92,12 @@ class Decoder:
         self._sdo: dict[int, SdoListener] = {}
         for node in nodes:
             self._names[node.id] = node.name
-            family = (families or {}).get(node.mapping)
+            family = (families or {}).get(node.mapping_key)
             if family:
                 self._families[node.id] = family
                 self._pdos.update(views(node, family))
                 if family.is_device:
-                    self._pdos.update(device_views(node, family, (descriptions or {}).get(node.mapping)))
+                    self._pdos.update(device_views(node, family, (descriptions or {}).get(node.mapping_key)))
 
     def decode(self, frame: Frame) -> Meaning:
         """What ``frame`` says; every frame says something."""

@@ -132,9 +132,9 @@ def view_bus(
     nodes: list[NodeView] = []
     for n, table in enumerate(bus.node):
         node_key = (*key, "node", n)
-        family = families[table.mapping]
+        family = families[table.mapping_key]
         settings = Settings(table, family, node_key, downloads.get(table.name, ()))
-        dictionary = dictionaries.get(table.mapping)
+        dictionary = dictionaries.get(table.mapping_key)
         nodes.append(_node(table, node_key, family, dictionary, settings))
     return BusView(bus, key, tuple(nodes))
 

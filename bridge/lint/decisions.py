@@ -15,7 +15,7 @@ def check_decisions(site: Site, families: Mapping[str, Family], report: LintRepo
         for n, node in enumerate(bus.node):
             _check_commands(node, ("bus", b, "node", n), report)
             for d, drive in enumerate(node.drive):
-                name = f"{node.name}/{families[node.mapping].leaf_of(drive)}"
+                name = f"{node.name}/{families[node.mapping_key].leaf_of(drive)}"
                 _check_drive(drive, name, ("bus", b, "node", n, "drive", d), report)
     if site.opcua and site.opcua.no_security:
         report.warning(

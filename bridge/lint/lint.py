@@ -16,6 +16,7 @@ from bridge.lint.identifiers import check_identifiers
 from bridge.lint.interface import check_interface
 from bridge.lint.intruder import Exposure, exposure
 from bridge.lint.load import BusLoad, check_load
+from bridge.lint.modules import check_modules
 from bridge.lint.moving import check_moving
 from bridge.lint.outputs import check_outputs, check_read_only, output_cases
 from bridge.lint.own import WorstCase, check_own_supervision, worst_cases
@@ -25,7 +26,7 @@ from bridge.lint.times import check_times
 from bridge.lint.words import check_words
 from bridge.mapping import Family
 from bridge.mapping.loader import mapping_folders
-from bridge.mapping.site import described_file
+from bridge.mapping.site import described_file, modules_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,9 @@ def family_dictionaries(names: Iterable[str], site: Path | None = None) -> dict[
 
     Raises ``FileFaults`` where one cannot be read.
     """
-    return {name: read_device_file(file) for name, file in dictionary_files(names, site).items()}
+    return {
+        name: read_device_file(file, modules_of(name)) for name, file in dictionary_files(names, site).items()
+    }
 
 
 def dictionary_files(names: Iterable[str], site: Path | None = None) -> dict[str, Path]:
@@ -93,6 +96,7 @@ def lint(
         check_outputs(bus, report)
         check_read_only(bus, report)
         check_moving(bus, report)
+        check_modules(bus, known, report)
         check_cable(bus, report)
         cases += [*worst_cases(bus), *output_cases(bus)]
         loads.append(check_load(bus, report))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final, cast
 
-from bridge.config import Site, read_site
+from bridge.config import MODULES, Site, mapping_key, read_site
 from bridge.errors import Fault, FileFaults
 from bridge.mapping.loader import (
     family_names,
@@ -24,13 +24,21 @@ from bridge.tomlfile import RawTable, TomlFile
 
 DESCRIBED: Final = "eds:"
 """What stands before the name of a device description in the place of a mapping."""
-Describe = Callable[[Path, Sequence[Path]], Family]
-"""The family that a device description gives, with the folders of mappings. Raises ``FileFaults``."""
+Describe = Callable[[Path, Sequence[Path], Sequence[str]], Family]
+"""The family that a device description gives, with the folders of mappings and the modules that are plugged
+in. Raises ``FileFaults``."""
 
 
-def described_file(site: Path, mapping: str) -> Path | None:
-    """The device description that a node of the site file in ``site`` has in the place of a mapping."""
+def described_file(site: Path, key: str) -> Path | None:
+    """The device description that a node of the site file in ``site`` has in the place of a mapping; ``key``
+    is its ``mapping_key``."""
+    mapping = key.partition("\n")[0]
     return site.parent / mapping.removeprefix(DESCRIBED) if mapping.startswith(DESCRIBED) else None
+
+
+def modules_of(key: str) -> tuple[str, ...]:
+    """The modules that are plugged into a node with this ``mapping_key``, in their order."""
+    return tuple(key.split("\n")[1:])
 
 
 def load_site_and_families(path: Path, describe: Describe | None = None) -> tuple[Site, dict[str, Family]]:
@@ -41,18 +49,26 @@ def load_site_and_families(path: Path, describe: Describe | None = None) -> tupl
     of_families: list[Fault] = []
     folders = mapping_folders(path)
     for node in _nodes(file):
-        name = node.text("mapping")
-        if name is None or name in families:
+        name, key = node.text("mapping"), _key(node)
+        if name is None or key in families:
             continue
         file_of_it = described_file(path, name)
+        if MODULES in node.content and file_of_it is None:
+            hint = f'a coupler has its EDS as its mapping, "{DESCRIBED}FILE"'
+            file.fault((*node.key, MODULES), f"{name} knows of no modules", hint)
+            continue
         if file_of_it is not None and not file_of_it.is_file():
             file.fault((*node.key, "mapping"), f"there is no file {file_of_it}", _near(file_of_it))
             continue
         if describe and file_of_it is not None:
             try:
-                families[name] = describe(file_of_it, folders)
+                families[key] = describe(file_of_it, folders, modules_of(key))
             except FileFaults as error:
-                of_families += error.faults
+                for fault in error.faults:
+                    if fault.key == MODULES:
+                        file.fault((*node.key, MODULES), f"{file_of_it}: {fault.message}", fault.hint)
+                    elif fault not in of_families:
+                        of_families.append(fault)
             continue
         if not is_family(name, folders):
             known, templates = family_names(folders), template_names(folders)
@@ -84,10 +100,17 @@ def _nodes(file: TomlFile) -> list[RawTable]:
     return [node for bus in file.root.tables("bus") for node in bus.tables("node")]
 
 
+def _key(node: RawTable) -> str:
+    """Its ``mapping_key``, as far as the table says."""
+    modules: object = node.content.get(MODULES)
+    named = cast("list[object]", modules) if isinstance(modules, list) else []
+    return mapping_key(node.text("mapping") or "", [one for one in named if isinstance(one, str)])
+
+
 def _check(file: TomlFile, families: dict[str, Family]) -> None:
     for bus in file.root.tables("bus"):
         for node in bus.tables("node"):
-            family = families.get(node.text("mapping") or "")
+            family = families.get(_key(node))
             if family is not None:
                 _check_node(node, family, file)
                 for drive in node.tables("drive"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -25,10 +25,10 @@ def described(file: Path, names: Names) -> list[ObjectRef]:
     return [ObjectRef(one.index, one.sub) for one in _settings(read_whole_device_file(file), names)]
 
 
-def factory(file: Path, names: Names, node_id: int) -> dict[str, Value]:
-    """The factory settings that ``file`` has, by name. Raises ``FileFaults``."""
+def factory(file: Path, names: Names, node_id: int, modules: Sequence[str] = ()) -> dict[str, Value]:
+    """The factory settings that ``file`` has with these ``modules``, by name. Raises ``FileFaults``."""
     found: dict[str, Value] = {}
-    for one in _settings(read_whole_device_file(file), names):
+    for one in _settings(read_whole_device_file(file, modules), names):
         entry = names.at(ObjectRef(one.index, one.sub))
         plain = one.default.at(node_id) if one.default else None
         if plain is None or one.data_type is None:

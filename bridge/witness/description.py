@@ -7,10 +7,12 @@ outputs and what the node does with them: a file that is odd otherwise is read a
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 from xml.etree import ElementTree
+
+from bridge.witness.modules import Sections, plug
 
 At = tuple[int, int]
 """Index and sub-index."""
@@ -43,10 +45,12 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """``entries`` by index and sub-index; ``names`` of the objects that have elements, by index."""
+    """``entries`` by index and sub-index; ``names`` of the objects that have elements, by index;
+    ``by_modules`` are the elements that plugged modules bring and that an RPDO may set."""
 
     entries: Mapping[At, Entry]
     names: Mapping[int, str]
+    by_modules: frozenset[At] = frozenset()
 
     def number(self, index: int, sub: int) -> int | None:
         entry = self.entries.get((index, sub))
@@ -58,10 +62,12 @@ class Description:
         return entry.name if entry.name.lower().startswith(whole.lower()) else f"{whole} {entry.name}"
 
 
-def describe(content: bytes, node_id: int) -> Description:
-    """What a file says of the node with this id. Raises ``Unreadable``."""
+def describe(content: bytes, node_id: int, modules: Sequence[str] = ()) -> Description:
+    """What a file says of the node with this id and these modules. Raises ``Unreadable``."""
     text = _decoded(content)
-    sections = _xml(text) if text.lstrip().startswith("<") else dict(_ini(text))
+    is_xml = text.lstrip().startswith("<")
+    sections = _xml(text) if is_xml else dict(_ini(text))
+    by_modules = frozenset[At]() if is_xml else plug(sections, text, modules)
     if not sections:
         raise Unreadable("describes no objects")
     parts = {index for index, sub in sections if sub is not None}
@@ -75,7 +81,7 @@ def describe(content: bytes, node_id: int) -> Description:
             number = _number(given or keys.get("defaultvalue", ""), node_id)
             name = keys.get("parametername", "")
             entries[index, sub or 0] = Entry(name, _number(kind, node_id), number, bool(given))
-    return Description(entries, names)
+    return Description(entries, names, by_modules)
 
 
 def _decoded(content: bytes) -> str:
@@ -93,13 +99,10 @@ def _line(content: bytes) -> str:
         return content.decode("cp1252", "replace")
 
 
-_Sections = dict[tuple[int, int | None], dict[str, str]]
-
-
 def _ini(text: str) -> Iterator[tuple[tuple[int, int | None], dict[str, str]]]:
     """The sections of objects and elements, with their keys in lower case. What is there twice counts once,
     as it stands first."""
-    found: _Sections = {}
+    found: Sections = {}
     keys: dict[str, str] | None = None
     for line in (one.strip() for one in re.split(r"\r\n|\n|\r", text)):
         if line.startswith("["):
@@ -115,14 +118,14 @@ def _ini(text: str) -> Iterator[tuple[tuple[int, int | None], dict[str, str]]]:
     yield from found.items()
 
 
-def _xml(text: str) -> _Sections:
+def _xml(text: str) -> Sections:
     if "<!DOCTYPE" in text:
         raise Unreadable("has a document type")
     try:
         root = ElementTree.fromstring(text.encode())
     except ElementTree.ParseError as error:
         raise Unreadable(str(error)) from error
-    found: _Sections = {}
+    found: Sections = {}
     for element in root.iter():
         if element.tag.rpartition("}")[2] == "CANopenObject":
             index = _hexadecimal(element, "index")

@@ -11,7 +11,7 @@ import re
 import struct
 import tomllib
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -122,9 +122,10 @@ def output_frames(bus: BusTable, node: NodeTable, folder: Path) -> OutputFrames 
     """Of a node, whose site file is in ``folder``; None where it has no outputs."""
     try:
         if node.mapping.startswith("eds:"):
-            description = _described(folder / node.mapping.removeprefix("eds:"), node.id)
+            description = _described(folder / node.mapping.removeprefix("eds:"), node.id, node.modules)
             numbers = _numbers(description) | _written(node, folder)
             outputs = _described_outputs(description, node)
+            _refuse_unmapped(description.by_modules, numbers)
         else:
             numbers = _written(node, folder)
             try:
@@ -155,9 +156,9 @@ def output_frames(bus: BusTable, node: NodeTable, folder: Path) -> OutputFrames 
 # a device description
 
 
-def _described(path: Path, node_id: int) -> Description:
+def _described(path: Path, node_id: int, modules: Sequence[str] = ()) -> Description:
     try:
-        return describe(path.read_bytes(), node_id)
+        return describe(path.read_bytes(), node_id, modules)
     except Unreadable as error:
         raise Unreadable(f"{path}: {error}") from None
 
@@ -167,26 +168,43 @@ def _numbers(description: Description) -> dict[At, int]:
 
 
 def _described_outputs(description: Description, node: NodeTable) -> dict[At, _Output]:
-    """What its RPDOs carry, those that are switched off as well: all of them have names."""
+    """What its RPDOs carry, those that are switched off as well, and what modules bring for them: all of them
+    have names."""
+    carried: list[At] = []
     found: dict[At, _Output] = {}
     names: set[str] = set()
     numbers, there = _numbers(description), {index for index, _ in description.entries}
     for number in range(_MOST_PDOS):
         if _RPDOS[0] + number not in there:
             continue
-        for index, sub, _ in _entries(numbers, _RPDOS[1] + number):
-            at = index, sub
-            entry = description.entries.get(at)
-            kind = _TYPES.get(entry.data_type or 0) if entry else None
-            if kind is None or index in _DUMMIES or at in found:
-                continue
-            name = _name(description.title(at), at)
-            name = f"{name}_{index:04x}_{sub:02x}" if name in names else name
-            names.add(name)
-            mode, error = _IN_ERROR.get(index, (0, 0))
-            safe = _safe(node.outputs.on_expiry.get(name, 0), kind)
-            found[at] = _Output(name, at, _bits(kind), safe, (mode, sub), (error, sub))
+        carried += [(index, sub) for index, sub, _ in _entries(numbers, _RPDOS[1] + number)]
+    for at in (*carried, *sorted(description.by_modules)):
+        entry = description.entries.get(at)
+        kind = _TYPES.get(entry.data_type or 0) if entry else None
+        if kind is None or at[0] in _DUMMIES or at in found:
+            continue
+        index, sub = at
+        name = _name(description.title(at), at)
+        name = f"{name}_{index:04x}_{sub:02x}" if name in names else name
+        names.add(name)
+        mode, error = _IN_ERROR.get(index, (0, 0))
+        safe = _safe(node.outputs.on_expiry.get(name, 0), kind)
+        found[at] = _Output(name, at, _bits(kind), safe, (mode, sub), (error, sub))
     return found
+
+
+def _refuse_unmapped(by_modules: Collection[At], numbers: Mapping[At, int]) -> None:
+    """A coupler maps by itself what is plugged in, and no file may say where. Raises ``_Unknown``."""
+    carried = {
+        (index, sub)
+        for number in range(_MOST_PDOS)
+        if not numbers.get((_RPDOS[0] + number, 1), _OFF) & (_OFF | _LONG)
+        for index, sub, _ in _entries(numbers, _RPDOS[1] + number)
+    }
+    lost = sorted(at for at in by_modules if at not in carried)
+    if lost:
+        named = ", ".join(f"{index:04X}:{sub:02X}" for index, sub in lost)
+        raise _Unknown(f"no file says which RPDO carries {named}")
 
 
 def _name(title: str, at: At) -> str:

@@ -271,12 +271,33 @@ def vendor_alone(text: str, chance: Random) -> bytes:
     return joined(parts).encode()
 
 
+def modular(text: str, chance: Random) -> bytes:
+    """A device that could have modules, of which some are plugged in: they bring an object of their own and
+    elements of another."""
+    spelt = chance.choice((str, str.lower, str.upper))
+    parts = [
+        ("SupportedModules", ["NrOfEntries=2"]),
+        ("M1ModuleInfo", ["ProductName=Inputs", "OrderCode=IN 8"]),
+        ("M1FixedObjects", ["NrOfEntries=1", "1=0x2FF1"]),
+        ("M1Fixed2FF1", ["ParameterName=Filter", "ObjectType=0x7", "DataType=0x6", "AccessType=rw"]),
+        ("M2ModuleInfo", ["ProductName=Gains"]),
+        ("M2SubExtends", ["NrOfEntries=1", "1=0x2FF2"]),
+        ("M2SubExt2FF2", ["ParameterName=Gain", "DataType=0x6", "AccessType=rw", "PDOMapping=0"]),
+    ]
+    parts[-1][1].append(f"Count={chance.choice(('1', '2', '0;8'))}")
+    plugged = [chance.choice((1, 2)) for _ in range(chance.randrange(5))]
+    if plugged:
+        listed = [f"{place}={number}" for place, number in enumerate(plugged, 1)]
+        parts.append(("ConnectedModules", [f"NrOfEntries={len(plugged)}", *listed]))
+    return (joined(sections(text)) + joined([(spelt(name), lines) for name, lines in parts])).encode()
+
+
 DIALECTS: Final[dict[str, Dialect]] = {
     one.__name__: one
     for one in (
         cp1252, byte_order_mark, lower_case, line_ends, spaces, duplicate_keys, duplicate_sections,
         missing_keys, no_types, node_id_forms, no_sub_0, wrong_counts, compact, noise, shuffled, odd_numbers,
-        no_values, no_last_line_end, joined_encodings, vendor_alone,
+        no_values, no_last_line_end, joined_encodings, vendor_alone, modular,
     )
 }  # fmt: skip
 

@@ -75,6 +75,9 @@ def _plan(
             continue
         mapped = [ObjectRef(entry.index, entry.sub) for entry in entries if not entry.is_dummy]
         objects = [ref for ref in mapped if ref in wanted]
+        if kind == "TPDO" and len(objects) < len(mapped) and not cob_id & cobid.PDO_DISABLED:
+            others = ", ".join(str(ref) for ref in mapped if ref not in wanted)
+            result.notes.append(f"{name} carries {others}, which nothing here describes")
         if not objects:
             continue
         if cob_id & cobid.PDO_DISABLED:

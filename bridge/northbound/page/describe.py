@@ -27,7 +27,7 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
     drives: list[dict[str, Any]] = []
     for bus in site.bus:
         for node in bus.node:
-            family = families[node.mapping]
+            family = families[node.mapping_key]
             of_node = {"name": node.name, "bus": bus.name, "id": node.id, "family": family.family.name}
             nodes.append(of_node)
             for drive in node.drive:
@@ -89,10 +89,10 @@ def _scaled(image: Image, site: Site, families: dict[str, Family]) -> dict[str, 
     known = {name: Names(family) for name, family in families.items()}
     found: dict[str, dict[str, Any]] = {}
     for node in (node for bus in site.bus for node in bus.node):
-        family = families[node.mapping]
+        family = families[node.mapping_key]
         points = {
             family.parameter_and_set(entry.name): f"parameter/{entry.leaf}"
-            for entry in known[node.mapping].points()
+            for entry in known[node.mapping_key].points()
         }
         for table in node.drive:
             drive = f"{node.name}/{family.leaf_of(table)}"

@@ -68,7 +68,7 @@ def holders_of(site: Site, families: Mapping[str, Family]) -> dict[str, Holder]:
     found: dict[str, Holder] = {}
     for bus in site.bus:
         for node in bus.node:
-            family, names = families[node.mapping], known[node.mapping]
+            family, names = families[node.mapping_key], known[node.mapping_key]
             if family.is_device:
                 found[node.name] = Holder(node.name, node, family, names, on_first=True)
             for drive in node.drive:
@@ -127,9 +127,9 @@ class Parameters:
     def _factory(self, holder: Holder) -> dict[str, Value]:
         """The factory settings that the maker's description has, as far as there is one."""
         if holder.name not in self._factories:
-            file = self._dictionaries.get(holder.node.mapping)
+            file = self._dictionaries.get(holder.node.mapping_key)
             try:
-                found = factory(file, holder.names, holder.node.id) if file else {}
+                found = factory(file, holder.names, holder.node.id, holder.node.modules) if file else {}
             except FileFaults as error:
                 _log.warning("page: no factory settings of %s: %s", holder.name, error)
                 found = {}

@@ -389,6 +389,23 @@ def test_encodings_and_ends_of_lines_do_not_matter(tmp_path: Path, encoding: str
     assert set(bus.outputs[0].rpdos) == {DIGITAL, ANALOGUE}
 
 
+def test_lines_in_utf_8_may_stand_among_others_in_windows_1252(tmp_path: Path) -> None:
+    """As of two files that were joined; the names are what the bridge calls the outputs."""
+    first, second = "ParameterName=Lüfter", "ParameterName=Größe"
+    text = EDS.replace(DIGITAL_TITLE, first).replace("ParameterName=Digital outputs 9 to 16", second)
+    content = text.encode().replace(second.encode(), second.encode("cp1252"))
+    assert content not in (text.encode(), text.encode("cp1252"))
+    on_hold = 'on_expiry = { digital_outputs_luefter = "hold", digital_outputs_groesse = "hold" }'
+    path = written(tmp_path, io("", OWNED + on_hold))
+    (tmp_path / "io.eds").write_bytes(content)
+    (bus,) = plan(load_site(path), path.parent)
+    assert bus.outputs[0].rpdos[DIGITAL].are_active(b"\xff\xff") is False
+    assert {one.name for one in load_project(path).families["eds:io.eds"].output} >= {
+        "digital_outputs_luefter",
+        "digital_outputs_groesse",
+    }
+
+
 def test_what_is_there_twice_counts_as_it_stands_first(tmp_path: Path) -> None:
     eds = EDS + "\n[1400sub1]\nDefaultValue=0x345\n; DefaultValue=1\n[Comments]\nDefaultValue=2\n"
     assert set(watched(tmp_path, eds=eds).rpdos) == {DIGITAL, ANALOGUE}

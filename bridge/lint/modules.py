@@ -1,0 +1,27 @@
+"""Couplers whose modules nobody names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from bridge.eds import Description
+from bridge.lint.bus import BusView
+from bridge.lint.report import LintReport
+
+_SHOWN: Final = 3
+
+
+def check_modules(bus: BusView, dictionaries: Mapping[str, Description], report: LintReport) -> None:
+    for node in bus.nodes:
+        known = dictionaries.get(node.table.mapping_key)
+        if known is None or not known.modules or known.plugged:
+            continue
+        names = [one.order_code or one.product or str(one.number) for one in known.modules[:_SHOWN]]
+        listed = ", ".join(f'"{name}"' for name in names)
+        more = ", …" if len(known.modules) > _SHOWN else ""
+        report.warning(
+            (*node.key, "mapping"),
+            f"the file knows {len(known.modules)} modules, and none is named: what they bring is not served",
+            f"modules = [{listed}{more}], in the order in which they stand",
+        )

@@ -30,7 +30,8 @@ class Fault:
     has to hold then. ``brings_back``: somebody enables the drive again and again, so that its time is the
     longest that it turned without a stop. ``speaks_on``: somebody goes on enabling a drive whose node is
     stopped, so that its time is to the end of its last turn. ``ends_soon``: it is undone as soon as its last
-    bound has passed, and not only when all are measured. ``of_outputs``: it is about the outputs
+    bound has passed, and not only when all are measured. ``hands_over``: its end gives the drives to new
+    owners, which ends what holds. ``of_outputs``: it is about the outputs
     beside the drives."""
 
     name: str
@@ -50,6 +51,7 @@ class Fault:
     others_may_stop: bool = False
     brings_back: bool = False
     speaks_on: bool = False
+    hands_over: bool = False
     ends_soon: bool = False
     examine: Examine | None = None
     demand: str = ""

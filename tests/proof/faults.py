@@ -151,7 +151,15 @@ FAULTS: Final = (
         "drive for who is no engineer",
     ),
     Fault("network cut", "telegram", acts.cut, acts.uncut, *_OF_OWNERS, at_once=_OWNERS),
-    Fault("half-open connection", "telegram", acts.vanish, acts.come_back, *_OF_OWNERS, at_once=_OWNERS),
+    Fault(
+        "half-open connection",
+        "telegram",
+        acts.vanish,
+        acts.come_back,
+        *_OF_OWNERS,
+        at_once=_OWNERS,
+        hands_over=True,
+    ),
     Fault("disk full", "telegram", acts.stop_owners, acts.empty, *_OF_OWNERS, steady=acts.full),
     Fault(
         "clock stepped by an hour",

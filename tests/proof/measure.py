@@ -223,15 +223,16 @@ def longest_pause(rig: Rig, drive: Drive, since: float) -> float:
     return max(after - before for before, after in pairwise(times))
 
 
-def held(rig: Rig, drive: Drive, since: float) -> str:
-    """What a drive did since then that is to go on all the time; empty where it did."""
-    until = rig.now()
-    told = rig.told.runs(drive.rpdo, since)
+def held(rig: Rig, drive: Drive, since: float, until: float | None = None) -> str:
+    """What a drive did since then that is to go on all the time, or until then; empty where it did."""
+    until = rig.now() if until is None else until
+    told = [run for run in rig.told.runs(drive.rpdo, since) if run.first <= until]
     if not all(drive.enabling(run.data) for run in told) or not told:
         return "the bus has stopped it"
     if until - told[-1].last > _SILENT_S:
         return "the bus is silent"
-    if not all(drive.enabled(run.data) for run in rig.said.runs(drive.tpdo, since)):
+    said = [run for run in rig.said.runs(drive.tpdo, since) if run.first <= until]
+    if not all(drive.enabled(run.data) for run in said):
         return "it has stopped"
     return ""
 

@@ -73,6 +73,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
             drive: (bus, _turned_until(rig, fault, drive, moment)) for drive, (bus, _) in stopped.items()
         }
     before = {drive: rig.board.accepted(drive.place)[0] for drive in concerned}
+    undone = rig.now()
     if not fault.ends_soon:
         fault.undo(rig)
     _wait_talking(rig, concerned)
@@ -86,7 +87,8 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
             continue
         wrong = _wrong(rig, fault, drive, (times[0], ends.get(drive, times[1])), words[drive])
         samples.append(_sample(rig, fault, drive, moment, times[1], ways.get(drive), wrong))
-    samples += _held(rig, fault, [drive for drive in holding if drive not in still], moment)
+    held_until = undone if fault.hands_over else rig.now()
+    samples += _held(rig, fault, [drive for drive in holding if drive not in still], moment, held_until)
     for sample in samples:
         if sample.verdict != "ok":
             drive = next(drive for drive in DRIVES if drive.path == sample.drive)
@@ -167,13 +169,13 @@ def _was_stopped_before(rig: Rig, fault: Fault, drive: Drive, bus: float, since:
     return fault.of_controller and early and _was_slow(rig, drive, since)
 
 
-def _held(rig: Rig, fault: Fault, drives: list[Drive], moment: float) -> list[Sample]:
+def _held(rig: Rig, fault: Fault, drives: list[Drive], moment: float, until: float) -> list[Sample]:
     """Drives whose reaction is to hold. One that stops because the machine was slow for its bridge or itself
     counts as stopped in vain."""
     samples: list[Sample] = []
     for drive in drives:
-        wrong = measure.held(rig, drive, moment)
-        if wrong and _was_slow(rig, drive, moment):
+        wrong = measure.held(rig, drive, moment, until)
+        if wrong and _was_held_up(rig, drive, moment):
             rig.stopped_in_vain.append(f"{fault.name}: {drive.path} ({drive.protocol}), which is to hold")
             continue
         text = f"it is to hold, and {wrong}" if wrong else ""

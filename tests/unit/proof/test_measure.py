@@ -192,7 +192,9 @@ def test_the_reaction_is_the_first_word_that_does_not_enable() -> None:
 def test_a_drive_that_is_to_hold_goes_on_all_the_time() -> None:
     told, said = [Run(9.0, 19.9, ENABLE)], [Run(9.0, 19.9, RUNNING)]
     assert held(scene(told=told, said=said), FU1, 10.0) == ""
-    assert held(scene(told=[*told, Run(19.95, 20.0, STOP)], said=said), FU1, 10.0) == "the bus has stopped it"
+    stopped = scene(told=[*told, Run(19.95, 20.0, STOP)], said=[*said, Run(19.97, 20.0, READY)])
+    assert held(stopped, FU1, 10.0) == "the bus has stopped it"
+    assert held(stopped, FU1, 10.0, 19.9) == "", "what comes after that does not count"
     assert held(scene(told=[Run(9.0, 19.0, ENABLE)], said=said), FU1, 10.0) == "the bus is silent"
     assert held(scene(told=told, said=[*said, Run(19.95, 20.0, READY)]), FU1, 10.0) == "it has stopped"
 

@@ -200,24 +200,25 @@ def test_a_restarted_bridge_starts_with_stopped_words(lab: Lab) -> None:
     until(lambda: lab.turns_at(0), 5.0, "the drive that ran on is stopped")
 
 
-def test_a_killed_front_changes_nothing_on_the_bus(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("role", "ready"), [("opcua", "INFO    OPC UA on"), ("zenoh", "INFO    zenoh on")])
+def test_a_killed_front_changes_nothing_on_the_bus(tmp_path: Path, role: str, ready: str) -> None:
     site = lab_site(tmp_path, timeout_ms=5000, bus="deadman_ms = 400")
     with ExitStack() as stack:
         bus = stack.enter_context(sniffing())
         stack.enter_context(drivebridge(tmp_path, "simulate", "simulate", str(site.path)))
         bridge = stack.enter_context(drivebridge(tmp_path, "run", "run", str(site.path), notify=True))
         bridge.wait_output("node operational")
-        bridge.wait_output("OPC UA on")
+        bridge.wait_output(ready)
         [front] = subprocess.run(
-            ["pgrep", "-P", str(bridge.pid), "-f", "--", "--role opcua"],
+            ["pgrep", "-P", str(bridge.pid), "-f", "--", f"--role {role}"],
             capture_output=True,
             text=True,
             check=True,
         ).stdout.split()
         begin = time.time()
         subprocess.run(["kill", "-9", front], check=True)
-        bridge.wait_output("the opcua front ended (SIGKILL)")
-        until(lambda: bridge.output().count("INFO    OPC UA on") == 2, 30.0, "the front is back")
+        bridge.wait_output(f"the {role} front ended (SIGKILL)")
+        until(lambda: bridge.output().count(ready) == 2, 30.0, "the front is back")
         for can_id in (SYNC, RPDO1):
             times = [frame.time for frame in bus.of(can_id, begin)]
             pauses = [later - earlier for earlier, later in pairwise(times)]

@@ -4,7 +4,6 @@ port."""
 from __future__ import annotations
 
 import contextlib
-import json
 import select
 import socket
 import threading
@@ -17,10 +16,11 @@ import zenoh
 from tests.fuzz.case import Case, load
 from tests.fuzz.mutate import Mutator
 from tests.fuzz.rig import STRANGER, Rig
+from tests.fuzz.targets.zenoh_config import configure
+from tests.fuzz.targets.zenoh_keys import DOINGS, declare_keys
 
 _KINDS: Final = {"get": 70, "put": 12, "declare": 8, "tampered": 3, "raw": 7, "keys": 0.3}
 _MODES: Final = ("client", "peer", "router")
-_DOINGS: Final = ("token", "queryable", "subscriber", "alias", "publisher")
 _DEEPEST: Final = 9000
 """Words of a key. It fits into no message that the bridge takes, and ended its process when it did."""
 _MOST_WORDS: Final = 100_000
@@ -38,16 +38,6 @@ _OF_USERS: Final = f"{_TOP}/@/controller/fuzz"
 """Keys that a site with users has."""
 _LONGEST_ENCODING: Final = 60
 """The library panics at more than 255 bytes."""
-
-
-def configure(port: int, mode: str = "client") -> zenoh.Config:
-    config = zenoh.Config()
-    config.insert_json5("mode", json.dumps(mode))
-    config.insert_json5("listen/endpoints", "[]")
-    config.insert_json5("connect/endpoints", json.dumps([f"tcp/127.0.0.1:{port}"]))
-    config.insert_json5("connect/timeout_ms", "2000")
-    config.insert_json5("scouting/multicast/enabled", "false")
-    return config
 
 
 class Thrower:
@@ -90,7 +80,7 @@ class Thrower:
     def _declarations(self) -> list[bytes]:
         words = [1, 3, 30, 300, 3000, _DEEPEST]
         return [
-            f"{self._random.choice(_DOINGS)} {self._random.choice(words)}".encode()
+            f"{self._random.choice(DOINGS)} {self._random.choice(words)}".encode()
             for _ in range(self._random.choice((1, 5, 20)))
         ]
 
@@ -130,17 +120,16 @@ class Thrower:
     def _name_keys(self, case: Case) -> None:
         """Distinct ones, on a session of its own that ends with them."""
         mode, *declarations = case.parts
-        with zenoh.open(configure(self._port, mode.decode())) as session:
-            for declaration in declarations:
-                doing, words = declaration.decode().split()
-                if int(words) < _DEEPEST:
-                    if self._rig.named_words + int(words) > _MOST_WORDS:
-                        continue
-                    self._rig.named_words += int(words)
-                self._named += 1
-                key = "/".join([f"fuzz{self._named}", *"k" * (int(words) - 1)])
-                with contextlib.suppress(zenoh.ZError):
-                    _declare(session, doing, key)
+        keys: list[tuple[str, str, int]] = []
+        for declaration in declarations:
+            doing, words = declaration.decode().split()
+            if int(words) < _DEEPEST:
+                if self._rig.named_words + int(words) > _MOST_WORDS:
+                    continue
+                self._rig.named_words += int(words)
+            self._named += 1
+            keys.append((doing, f"fuzz{self._named}", int(words)))
+        declare_keys(self._port, mode.decode(), keys)
 
     def _throw_call(self, case: Case) -> None:
         key, parameters, payload, attachment, encoding = case.parts
@@ -200,21 +189,6 @@ class Thrower:
             self._session = None
         if self._tampering is not None:
             self._tampering.join(_GIVEN_UP_S)
-
-
-def _declare(session: zenoh.Session, doing: str, key: str) -> object:
-    ignored = zenoh.handlers.Callback(lambda _: None, indirect=False)
-    match doing:
-        case "token":
-            return session.liveliness().declare_token(key)
-        case "queryable":
-            return session.declare_queryable(key, ignored)
-        case "subscriber":
-            return session.declare_subscriber(key, ignored)
-        case "alias":
-            return session.declare_keyexpr(key)
-        case _:
-            return session.declare_publisher(key)
 
 
 def _text(raw: bytes) -> str:

@@ -280,7 +280,7 @@ class NodeTable(Table):
 
     @property
     def mapping_key(self) -> str:
-        """What its family is found by: nodes with the same mapping and the same modules share one."""
+        """The key of its family: nodes with the same mapping and the same modules share one."""
         return mapping_key(self.mapping, self.modules)
 
 

@@ -17,6 +17,7 @@ from typing import Final
 from bridge.eds.fields import Fields
 from bridge.eds.ini import Section, Text, shown
 from bridge.eds.model import DataType, Module, ObjectType, Report
+from bridge.eds.values import bits_of_type
 
 _PART: Final = re.compile(
     r"m([0-9]{1,5})(moduleinfo|fixed([0-9a-f]{4}(?:sub[0-9a-f]{1,2})?)|subext([0-9a-f]{4}))"
@@ -28,15 +29,6 @@ _MOST_ELEMENTS: Final = 10_000
 """Elements that modules may bring to one device."""
 _SUPPORTED: Final = "supportedmodules"
 _CONNECTED: Final = "connectedmodules"
-_BITS: Final = {
-    DataType.BOOLEAN: 1,
-    DataType.INTEGER8: 8,
-    DataType.UNSIGNED8: 8,
-    DataType.INTEGER16: 16,
-    DataType.UNSIGNED16: 16,
-    DataType.INTEGER32: 32,
-    DataType.UNSIGNED32: 32,
-}
 
 
 class UnknownModule(Exception):
@@ -49,10 +41,8 @@ class UnknownModule(Exception):
 
 @dataclass(frozen=True, slots=True)
 class _Extension:
-    """Elements that a module brings to the object ``index``: whole ones, or bits of shared ones."""
+    """Elements that a module brings to an object: whole ones, or bits of shared ones of ``width`` bits."""
 
-    index: int
-    section: Section
     elements: int
     bits: int
     width: int
@@ -128,7 +118,7 @@ class Modules:
         ends: dict[int, _End] = {}
         for number in numbers:
             for index, section in self._extensions.get(number, ()):
-                extension = self._extension(index, section)
+                extension = self._extension(section)
                 end = ends.setdefault(index, _End(index, self._highest(index)))
                 if extension is None or (end.first and not anew):
                     continue
@@ -140,7 +130,7 @@ class Modules:
                     added.add(at)
         return frozenset(added)
 
-    def _extension(self, index: int, section: Section) -> _Extension | None:
+    def _extension(self, section: Section) -> _Extension | None:
         data_type = self._fields.number(section, "DataType")
         known = DataType(data_type) if data_type in {int(one) for one in DataType} else None
         text = section.get("Count")
@@ -151,9 +141,10 @@ class Modules:
             self._report.error(line, f"[{shown(section.name)}] has {told}: its elements are left out")
             return None
         elements, bits = int(match[1]), int(match[2] or 0)
-        width = _BITS.get(known, 8) if known else 8
+        # An element of booleans is one bit, however long a value of it is on its way.
+        width = 1 if known is DataType.BOOLEAN else (known and bits_of_type(known)) or 8
         last = self._fields.number(section, "ObjExtend", 0, _HIGHEST) or 0
-        return _Extension(index, section, elements, 0 if elements else bits, width, last)
+        return _Extension(elements, 0 if elements else bits, width, last)
 
     def _highest(self, index: int) -> int:
         """The highest sub-index of the object as the file has it, 0 where it has no elements."""

@@ -31,8 +31,7 @@ class Fault:
     longest that it turned without a stop. ``speaks_on``: somebody goes on enabling a drive whose node is
     stopped, so that its time is to the end of its last turn. ``ends_soon``: it is undone as soon as its last
     bound has passed, and not only when all are measured. ``hands_over``: its end gives the drives to new
-    owners, which ends what holds. ``of_outputs``: it is about the outputs
-    beside the drives."""
+    owners, which ends what holds. ``of_outputs``: it is about the outputs beside the drives."""
 
     name: str
     reference: Reference

@@ -72,10 +72,12 @@ def test_how_many_elements_a_module_brings(
     assert sorted(description.extended) == places
 
 
-def test_sixteen_bits_are_half_as_many_elements() -> None:
-    one = module(1, "Inputs", "IN", extension("6100", INPUTS, "0;8", kind=U16))
+@pytest.mark.parametrize(("kind", "subs"), [(U16, [1, 2]), ("0x18", [1]), ("0x1", [*range(1, 25)])])
+def test_how_many_bits_share_an_element_its_type_says(kind: str, subs: list[int]) -> None:
+    """Sixteen, forty, and one: a boolean is a bit."""
+    one = module(1, "Inputs", "IN", extension("6100", INPUTS, "0;8", kind=kind))
     description = with_modules("IN", "IN", "IN", content=coupler(modules=(one,)))
-    assert elements(description, 0x6100) == [1, 2]
+    assert elements(description, 0x6100) == subs
 
 
 @pytest.mark.parametrize(

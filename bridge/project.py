@@ -64,8 +64,9 @@ def _vain_silences(project: Project) -> Iterator[tuple[Key, str, str]]:
                         yield (*table, "then_silence_ms"), _NEVER_SILENT, "0 (never), or another on_expiry"
                     continue
                 slot = family.slot_named(drive.slot)
-                raw = offline(family, settings, bus, node, slot)
-                why = why_silence_does_not_stop(family, judge(family, raw, bus, node), node)
+                of_drive = family.of_slot(slot)
+                own = judge(of_drive, offline(of_drive, settings, bus, node, slot), bus, node)
+                why = why_silence_does_not_stop(of_drive, own, node)
                 if not why:
                     continue
                 why = f"silence does not stop this drive: {why}"

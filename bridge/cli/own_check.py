@@ -191,6 +191,12 @@ def _remedy(drives: list[Audited]) -> Iterator[str]:
     names = {one.case.drive for one in drives}
     slots = [drive.slot for drive in node.drives if drive.name in names]
     wants = suggested(node.family, node.bus, node.table)
+    of_axes = [
+        want
+        for drive in node.drives
+        for want in suggested(drive.family, node.bus, node.table)
+        if drive.name in names and want not in wants
+    ]
     if not wants:
         guards = any(entry.watches == "guarding" for entry in node.family.own_supervision)
         yield 'supervision = "guarding"' if guards else "# its mapping needs an [[own_supervision]]"
@@ -198,8 +204,9 @@ def _remedy(drives: list[Audited]) -> Iterator[str]:
     channels = channels_needed(node.family, node.table, slots)
     if channels:
         yield f"sdo_channels = {channels}    # to read each drive's own parameters"
-    for want in wants:
-        if not want.only_if or (not want.place.per_drive and any(_runs_on_by(one, want) for one in drives)):
+    for want in (*wants, *of_axes):
+        is_on_first = not want.place.per_drive or node.family.is_per_axis(want.place.ref)
+        if not want.only_if or (is_on_first and any(_runs_on_by(one, want) for one in drives)):
             yield from _configure(want)
     time_ms = suggested_ms(node.family, node.bus, node.table)
     yield f"# or, for the same: own_timeout_ms = {time_ms} and enforce = true"
@@ -223,9 +230,10 @@ def _configure(want: OwnWant) -> Iterator[str]:
 def audit_facts(one: Audited) -> dict[str, Any]:
     """What ``--json`` says of one drive."""
     own = one.own
-    wants = (
-        [] if own.verdict is OwnVerdict.STOPS else suggested(one.node.family, one.node.bus, one.node.table)
+    family = next(
+        (drive.family for drive in one.node.drives if drive.name == one.case.drive), one.node.family
     )
+    wants = [] if own.verdict is OwnVerdict.STOPS else suggested(family, one.node.bus, one.node.table)
     return {
         "drive": one.case.drive,
         "ok": one.is_ok,

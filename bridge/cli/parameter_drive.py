@@ -190,6 +190,7 @@ def find(site: Path, drive: str) -> Target:
     (name,) = found
     bus, node, slot = targets[name]
     family = project.families[node.mapping_key]
+    family = family.of_slot(slot) if slot else family
     access = DriveParameters(
         name, node.name, family, Names(family), ledger, on_first=family.is_on_first(slot)
     )

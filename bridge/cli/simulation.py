@@ -17,7 +17,7 @@ from bridge.eds import read_whole_device_file
 from bridge.mapping import Family
 from bridge.mapping.loader import lineage, load_family, mapping_folders
 from bridge.mapping.site import described_file
-from bridge.sim.catalogue import SIMULATED, simulate_description, simulate_family, simulate_node
+from bridge.sim.catalogue import SIMULATED, simulate_description, simulate_family, simulate_node, values_of
 from bridge.sim.device import SimulatedDevice
 from bridge.sim.habit import Rule, load_habit
 from bridge.sim.shell import Simulation
@@ -65,11 +65,14 @@ def _maker(mapping: str, folders: Sequence[Path]) -> _Make:
 
 
 def _described(file: Path, folders: Sequence[Path], modules: Sequence[str]) -> _Make:
-    """A node of a device description. A drive is played as the mapping that is made of its file."""
+    """A node of a device description. A drive with one axis is played as the mapping that is made of its
+    file: it has a motor."""
     family = describe(file, folders, modules)
-    if family.is_device:
+    if family.is_device or any(slot.axis > 1 for slot in family.slot):
         description = read_whole_device_file(file, modules)
-        return lambda node_id, parameters: simulate_description(description, node_id)
+        return lambda node_id, parameters: simulate_description(
+            description, node_id, values_of(family, parameters)
+        )
     return partial(simulate_family, [file.name, *_bases(family, folders)], family)
 
 

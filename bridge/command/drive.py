@@ -86,8 +86,8 @@ class Drive(Commanded):
         self.node_name = node.name
         self._node = node
         self.unit_id = unit_id
-        self.family = family
         self.slot: Slot = family.slot_named(table.slot)
+        family = self.family = family.of_slot(self.slot)
         self.channel = DriveChannel(
             self.name,
             family,

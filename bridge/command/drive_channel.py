@@ -170,11 +170,12 @@ class DriveChannel(Channel):
             self._status.link_fault = 0.0
             self._happen(self._way(now), now)
 
-    def on_emcy(self, told: Told, now: float) -> None:
-        """An emergency message about this drive."""
+    def on_emcy(self, told: Told, now: float, *, is_its_own: bool = True) -> None:
+        """An emergency message about this drive, or else about one of those of its node."""
         self._status.on_emcy(told)
-        severity = 100 if told.is_gone else 700
-        self._tell(now, Kind.EMERGENCY, severity, f"emergency {told.code:04X}h: {told.text}")
+        if is_its_own:
+            severity = 100 if told.is_gone else 700
+            self._tell(now, Kind.EMERGENCY, severity, f"emergency {told.code:04X}h: {told.text}")
         self._settled(now)
 
     def on_drive_fault(self, current: float | None, last: float | None, now: float) -> None:

@@ -36,8 +36,9 @@ from bridge.config import BusTable, NodeTable, Site
 from bridge.errors import Fault, FileFaults
 from bridge.guard import Guard
 from bridge.image import Image, Quality, Value
-from bridge.mapping.model import Family
-from bridge.parameter import Ledger, Names
+from bridge.mapping.axes import profile_of
+from bridge.mapping.model import Family, ObjectRef
+from bridge.parameter import AxisNames, Ledger, Names
 from bridge.ratelimit import RateLimit
 
 CarryOut = Callable[[Request, float, Reply], bool]
@@ -87,13 +88,29 @@ class Node:
     bus: BusTable
     table: NodeTable
     family: Family
-    names: Names
+    axis_names: AxisNames
     drives: list[Drive] = field(default_factory=list[Drive])
     device: Device | None = None
 
     @property
     def name(self) -> str:
         return self.table.name
+
+    @property
+    def names(self) -> Names:
+        """The parameters of the node, or of its first axis."""
+        return self.axis_names.of()
+
+    def names_of(self, who: HasParameters) -> Names:
+        """The parameters of one of those that the node has."""
+        return self.axis_names.of(who.slot.axis) if isinstance(who, Drive) else self.names
+
+    def is_of(self, who: HasParameters, ref: ObjectRef) -> bool:
+        """Whether an object is one of who has parameters, and no other drive's of the node: of a node with
+        several axes those of its profile."""
+        if not isinstance(who, Drive) or all(one.slot.axis == 1 for one in self.drives):
+            return True
+        return ref.index in profile_of(who.slot.axis)
 
     @property
     def with_parameters(self) -> Sequence[HasParameters]:
@@ -154,8 +171,8 @@ class Plant:
         self._refused_by_others = 0
         self._is_closing = False
         self._buses = frozenset(f"bus/{bus.name}" for bus in site.bus)
-        names = {mapping: Names(family) for mapping, family in families.items()}
-        points = site_points(site, families, names)
+        names = {mapping: AxisNames(family) for mapping, family in families.items()}
+        points = site_points(site, families, {mapping: one.of() for mapping, one in names.items()})
         self.image = Image(chain.from_iterable(points.values()))
         self.audit = AuditTrail(self.image)
         units = _unit_ids(site)

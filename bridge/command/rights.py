@@ -44,7 +44,7 @@ class Rights:
 
     def _may_set(self, plant: Plant, one: Drive | Device, leaf: str) -> bool:
         node = plant.nodes[one.node_name if isinstance(one, Drive) else one.name]
-        names = node.names
+        names = node.names_of(one)
         entry = next((entry for entry in names.points() if entry.leaf == leaf), None)
         if entry is None:
             return False

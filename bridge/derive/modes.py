@@ -63,15 +63,6 @@ MODES: Final = (
 """The one that is taken first where a device has several first."""
 
 
-def is_drive(description: Description) -> bool:
-    """Whether the device has the profile CiA 402: control and status word decide, as many files leave
-    1000h at 0."""
-    device_type = description.number(0x1000)
-    if device_type and device_type & 0xFFFF not in (0, PROFILE_402):
-        return False
-    return bits_of(description, CONTROL_WORD) == bits_of(description, STATUS_WORD) == 16
-
-
 def modes_of(description: Description) -> list[Mode]:
     """The modes that a mapping of ours can drive the device in, the best first. A frequency converter is
     driven in velocity mode, if it has it."""

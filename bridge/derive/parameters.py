@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import Final
 
 from bridge.canopen.datatypes import INTEGERS, REALS, TypeName, encode
 from bridge.derive.modes import PROFILE_402
 from bridge.derive.toml import number, one_line, string, value
 from bridge.eds import DataType, Description, Entry, Value
+from bridge.mapping.axes import STANDARDISED, profile_of
 from bridge.mapping.model import Parameter
 from bridge.parameter.effect import Effect
 from bridge.parameter.profiles import effect_of
@@ -34,8 +35,8 @@ TYPES: Final[dict[DataType, TypeName]] = {
 }
 """Types that a parameter may have; INTEGER24 and its like are not among them."""
 MANUFACTURER: Final = range(0x2000, 0x6000)
-PROFILE: Final = range(0x6000, 0x6800)
-FURTHER_AXES: Final = range(0x6800, 0xA000)
+PROFILE: Final = profile_of(1)
+FURTHER_AXES: Final = range(PROFILE.stop, STANDARDISED.stop)
 _OF_BASE: Final = frozenset((0x6040, 0x6042, 0x6071, 0x607A, *range(0x60B0, 0x60B3), 0x60FF))
 """What commands a drive and is no parameter of the base."""
 
@@ -45,10 +46,12 @@ def parameter_name(index: int, sub: int, *, has_subs: bool) -> str:
     return f"{index:04X}:{sub:02X}" if has_subs else f"{index:04X}"
 
 
-def entries_of(description: Description) -> Iterator[tuple[str, Entry]]:
+def entries_of(
+    description: Description, spans: Sequence[range] = (MANUFACTURER, PROFILE)
+) -> Iterator[tuple[str, Entry]]:
     """Every entry of the maker's and the profile's objects that can be a parameter, by its name."""
     for one in description.objects:
-        if one.index not in MANUFACTURER and one.index not in PROFILE:
+        if not any(one.index in span for span in spans):
             continue
         has_subs = one.object_type.has_subs
         for entry in one.entries:

@@ -27,7 +27,7 @@ def ask(node: Node) -> Generator[Read, bytes | None, Judgements]:
     for drive in node.drives:
         of_drive = yield from read_places(node, drive, link=True)
         accepted = drive.table.accepts.runs_on or ""
-        found[drive.name] = judge(node.family, {**of_node, **of_drive}, node.bus, node.table, accepted)
+        found[drive.name] = judge(drive.family, {**of_node, **of_drive}, node.bus, node.table, accepted)
     if node.device and node.device.outputs:
         found[node.name] = yield from _of_outputs(node, node.device.outputs, of_node)
     return found

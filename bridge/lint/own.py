@@ -82,8 +82,8 @@ def _stop_time(
 
 
 def judged(bus: BusView, node: NodeView, drive: DriveView) -> OwnJudgement:
-    family, table = node.family, node.table
-    slot = family.slot_named(drive.table.slot)
+    slot = node.family.slot_named(drive.table.slot)
+    family, table = node.family.of_slot(slot), node.table
     raw = offline(family, node.settings.values, bus.table, table, slot)
     return judge(family, raw, bus.table, table, drive.table.accepts.runs_on or "")
 

@@ -15,7 +15,7 @@ from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import ControlWord, Family, pattern_bits
 from bridge.tomlfile import Key
 
-_NODE_POINTS: Final = (
+NODE_POINTS: Final = (
     "nmt_state",
     "state",
     "supervision_state",
@@ -110,7 +110,7 @@ def _check_eeprom(family: Family, file: MergedFile) -> None:
 def _check_polls(family: Family, file: MergedFile) -> None:
     twice(((poll.name, ("poll", p, "name")) for p, poll in enumerate(family.poll)), "poll", file)
     for p, poll in enumerate(family.poll):
-        if poll.name in _NODE_POINTS:
+        if poll.name in NODE_POINTS:
             file.fault(("poll", p, "name"), f"every node has {poll.name!r} of its own", "choose another name")
         _check_integer(poll.data_type, ("poll", p, "data_type"), file)
 

@@ -46,6 +46,9 @@ def check_process(family: Family, file: MergedFile) -> None:
 
 def check_slots(family: Family, file: MergedFile) -> None:
     twice(((slot.name, ("slot", s, "name")) for s, slot in enumerate(family.slot)), "slot", file)
+    if any(slot.axis > 1 for slot in family.slot):
+        axes = ((f"{slot.axis}", ("slot", s, "axis")) for s, slot in enumerate(family.slot))
+        twice(axes, "axis", file)
     for s, slot in enumerate(family.slot):
         for name, pdos, words in (
             ("rpdo", slot.rpdo, family.process.rpdo),

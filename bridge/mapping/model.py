@@ -10,11 +10,12 @@ import re
 from collections.abc import Sequence
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from bridge.config import DriveTable
 from bridge.config.fields import RegularExpression
 from bridge.mapping.aliases import Aliases
+from bridge.mapping.axes import STANDARDISED, on_axis
 from bridge.mapping.device import Output, Signal, no_process
 from bridge.mapping.faults import EmcyTable, FaultEntry, FaultNumbers
 from bridge.mapping.faults import FaultParameter as FaultParameter
@@ -205,6 +206,28 @@ class Family(Table):
     fault: list[FaultEntry] = Field(default_factory=list[FaultEntry])
     own_supervision: list[OwnSupervision] = Field(default_factory=list[OwnSupervision])
 
+    _axis: int = PrivateAttr(1)
+
+    def of_axis(self, axis: int) -> Family:
+        """The family as an axis of the node has it: its parameters are objects of that axis."""
+        if axis == self._axis:
+            return self
+        made = self.model_copy()
+        made._axis = axis
+        return made
+
+    def of_slot(self, slot: Slot) -> Family:
+        """The family as the drive in this slot has it."""
+        return self.of_axis(slot.axis)
+
+    def place(self, ref: ObjectRef) -> ObjectRef:
+        """Where the axis has an object that the file names."""
+        return ObjectRef(on_axis(ref.index, self._axis), ref.sub)
+
+    def is_per_axis(self, ref: ObjectRef) -> bool:
+        """Whether each axis of the node has an object of its own for the one that the file names."""
+        return ref.index in STANDARDISED and any(slot.axis > 1 for slot in self.slot)
+
     @property
     def is_device(self) -> bool:
         """It is of a node without drives."""
@@ -254,10 +277,11 @@ class Family(Table):
     def object_of(self, parameter: Parameter) -> ObjectRef:
         """Where a parameter is in the object dictionary."""
         if parameter.object is not None:
-            return parameter.object
+            return self.place(parameter.object)
         if self.parameter_names is None:
             raise ValueError(f"{parameter.name} has no object")
-        return object_of(self.parameter_names, parameter.name, parameter.sets, parameter.elements)
+        named = object_of(self.parameter_names, parameter.name, parameter.sets, parameter.elements)
+        return self.place(named)
 
     def rpdo_words(self, pdo: Pdo) -> list[str]:
         """The words that this RPDO carries, in its order."""
@@ -359,4 +383,4 @@ class Family(Table):
         if self.parameter_names is None:
             raise ValueError(f"{meaning.parameter} has no object")
         first = object_of(self.parameter_names, meaning.parameter, self.sets if self.sets > 1 else 0)
-        return self.object_in_set(first, in_set)
+        return self.object_in_set(self.place(first), in_set)

@@ -50,9 +50,10 @@ class OwnPlace:
 def place_of(family: Family, one: OwnObject) -> OwnPlace:
     """Where a setting is. The mapping's checks have seen to it that there is one."""
     if one.parameter is None:
-        ref = one.object or ObjectRef(0, 0)
+        ref = family.place(one.object or ObjectRef(0, 0))
+        per_drive = one.per_drive or family.is_per_axis(ref)
         number = INTEGERS[one.data_type]
-        return OwnPlace(str(ref), ref, one.data_type, one.per_drive, number.low, number.high, {}, one.absent)
+        return OwnPlace(str(ref), ref, one.data_type, per_drive, number.low, number.high, {}, one.absent)
     parameter = family.parameter_named(one.parameter)
     number = INTEGERS[parameter.data_type]
     low, high = number.low, number.high
@@ -62,7 +63,8 @@ def place_of(family: Family, one: OwnObject) -> OwnPlace:
         high = min(high, round(parameter.high / parameter.factor))
     ref = family.object_of(parameter)
     kind, states = parameter.data_type, parameter.states
-    return OwnPlace(parameter.name, ref, kind, one.per_drive, low, high, states)
+    per_drive = one.per_drive or family.is_per_axis(ref)
+    return OwnPlace(parameter.name, ref, kind, per_drive, low, high, states)
 
 
 def places(family: Family, *, link: bool = False) -> list[OwnPlace]:

@@ -10,6 +10,7 @@ from bridge.canopen.datatypes import INTEGERS, TypeName, encode
 from bridge.config.download import Download
 from bridge.config.fields import PlainValue, listed
 from bridge.image import DataType
+from bridge.mapping.axes import MOST_AXES
 from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, Ref, States, Table
 
 MOST_WORDS: Final = 9
@@ -126,6 +127,14 @@ class Slot(Table):
     """One drive of the node."""
 
     name: Name
+    axis: int = Field(
+        1,
+        ge=1,
+        le=MOST_AXES,
+        description="which axis of the node it is, for CiA 402: its parameters and its own supervision are "
+        "800h × (axis − 1) behind those of 6000h … 67FFh that this file names; PDOs and `start` name objects "
+        "as the node has them",
+    )
     rpdo: Pdos
     tpdo: Pdos
     start: list[StartWrite] = Field(default_factory=list[StartWrite])

@@ -55,15 +55,16 @@ class Emergencies:
 
     def _tell(self, emergency: emcy.Emergency, number: int | None, at: float) -> None:
         told = self._reader.read(emergency.code, emergency.vendor)
-        if self._node.device:
+        concerned = [one for one in self._node.drives if one.slot.emcy_drive in (None, number)]
+        is_of_one_drive = len(concerned) == 1 or any(one.slot.emcy_drive is not None for one in concerned)
+        if self._node.device or (concerned and not is_of_one_drive):
             severity = _GONE if told.is_gone else _COMES
             message = f"emergency {told.code:04X}h: {told.text}"
             self._plant.report(Event(at, Kind.EMERGENCY, self._node.name, severity, message))
-        for drive in self._node.drives:
-            if drive.slot.emcy_drive is None or drive.slot.emcy_drive == number:
-                drive.channel.on_emcy(told, at)
-                drive.refresh(at)
-                self._told(drive, at)
+        for drive in concerned:
+            drive.channel.on_emcy(told, at, is_its_own=is_of_one_drive)
+            drive.refresh(at)
+            self._told(drive, at)
 
     def refresh(self, now: float) -> None:
         top = f"{self._node.name}/node"

@@ -41,7 +41,6 @@ class FaultReading:
         def parameter(given: FaultParameter | None) -> Parameter | None:
             return None if given is None else family.parameter_named(given.parameter)
 
-        self._family = family
         # Some families have a number for "no fault" that is not 0.
         self._none = family.emcy.event.gone if family.emcy.event else None
         self._current, self._last = parameter(faults.current), parameter(faults.last)
@@ -101,7 +100,7 @@ class FaultReading:
 
         for parameter, tell in ((self._current, tell_current), (self._last, tell_last)):
             if parameter is not None:
-                ref = self._family.object_of(parameter)
+                ref = asked.drive.family.object_of(parameter)
                 done = _done(parameter, tell)
                 asked.sdo.read(ref.index, ref.sub, now, done, priority=Priority.POLL)
 

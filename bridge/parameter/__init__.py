@@ -11,4 +11,5 @@ from bridge.parameter.error import ParameterError as ParameterError
 from bridge.parameter.error import TransferFailed as TransferFailed
 from bridge.parameter.error import Why as Why
 from bridge.parameter.ledger import Ledger as Ledger
+from bridge.parameter.names import AxisNames as AxisNames
 from bridge.parameter.names import Names as Names

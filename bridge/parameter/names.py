@@ -30,7 +30,8 @@ _MOST_NUMBER: Final = 99_999
 
 
 class Names:
-    """The parameters of one drive family by name. ``definitions`` are in the order of the file.
+    """The parameters of one drive family by name, at the objects of the axis that the family is of
+    (``Family.of_axis``). ``definitions`` are in the order of the file.
 
     Raises ValueError where a listed parameter has no object; the mapping's own checks find that first.
     """
@@ -39,6 +40,7 @@ class Names:
         rule = self._rule = family.parameter_names
         self._pattern = re.compile(rule.pattern, re.IGNORECASE | re.ASCII) if rule else None
         self._first = rule.element_first if rule else 1
+        self._family = family
         self.definitions = tuple(_as_read(parameter) for parameter in family.parameter)
         self._by_name = {definition.name.upper(): definition for definition in self.definitions}
         self._by_leaf: dict[str, Entry] = {}
@@ -59,7 +61,7 @@ class Names:
         wanted = text.strip()
         match = _OBJECT.fullmatch(wanted)
         if match:
-            address = ObjectRef(int(match[1], 16), int(match[2], 16))
+            address = self._family.place(ObjectRef(int(match[1], 16), int(match[2], 16)))
             return self._by_address.get(address) or Entry(str(address), address)
         definition = self._by_name.get(wanted.upper())
         if definition is not None:
@@ -121,7 +123,7 @@ class Names:
                 continue
             for name in self._candidates(f"{letter}{number:0{len(shape[2])}}", address.sub):
                 try:
-                    if object_of(rule, name) == address:
+                    if self._family.place(object_of(rule, name)) == address:
                         return name
                 except ValueError:
                     continue
@@ -175,7 +177,7 @@ class Names:
             self._check(definition, element, number)
             return self._entry(definition, element, number)
         try:
-            found = object_of(self._rule, text.upper())
+            found = self._family.place(object_of(self._rule, text.upper()))
         except ValueError:
             return None
         listed = self._by_address.get(found)
@@ -197,11 +199,11 @@ class Names:
         if base is not None:
             place = self._first if element is None else element
             sub = base.sub + max(definition.sets, 1) * (place - self._first) + (number or 1) - 1
-            return Entry(name, ObjectRef(base.index, min(sub, _MOST_SUB)), definition)
+            return Entry(name, self._family.place(ObjectRef(base.index, min(sub, _MOST_SUB))), definition)
         if self._rule is None:
             raise ValueError(f"{definition.name} has no object")
         found = object_of(self._rule, name, definition.sets, definition.elements)
-        return Entry(name, found, definition)
+        return Entry(name, self._family.place(found), definition)
 
     def _spelled(self, name: str, element: int | None, number: int | None) -> str:
         """The name of one element in one set, as the family's pattern reads it."""
@@ -215,6 +217,20 @@ class Names:
                 if (_number(parts.get("element")), _number(parts.get("set"))) == (element, number):
                     return text
         return "_".join(str(part) for part in (name, element, number) if part is not None)
+
+
+class AxisNames:
+    """The names of a family for each axis of a node."""
+
+    def __init__(self, family: Family) -> None:
+        self._family = family
+        self._made: dict[int, Names] = {}
+
+    def of(self, axis: int = 1) -> Names:
+        """What is no axis has the names of the first."""
+        if axis not in self._made:
+            self._made[axis] = Names(self._family.of_axis(axis))
+        return self._made[axis]
 
 
 def _number(text: str | None) -> int | None:

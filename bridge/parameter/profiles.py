@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from bridge.mapping.axes import STANDARDISED, on_first
 from bridge.parameter.effect import Effect
 
-STANDARDISED: Final = range(0x6000, 0xA000)
-_OF_ONE_DEVICE: Final = 0x800
 NETWORK_VARIABLES: Final = range(0xA000, 0xC000)
 """CiA 301 §7.4.1: the network and system variables of a programmable device (CiA 302-4). They are process
 data: what an RPDO brings to a program."""
@@ -78,7 +77,7 @@ def effect_of(index: int, profile: int | None) -> Effect | None:
         return Effect.COMMANDS
     if index not in STANDARDISED:
         return None
-    first = STANDARDISED.start + (index - STANDARDISED.start) % _OF_ONE_DEVICE
+    first = on_first(index)
     is_first = index == first
     # What a further logical device is, its own 67FFh says; the profile is that of the first.
     rows = PROFILES.get(profile, _ANY) if is_first and profile is not None else _ANY

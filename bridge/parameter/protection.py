@@ -54,7 +54,8 @@ class Protection:
         self._profile = _profile_of(family)
         self._read_only = family.family.read_only
         self._commands = [indices(one) for one in rule.protected] if rule else []
-        self._own = {place.ref.index for place in places(family, link=True)}
+        axes = {1, *(slot.axis for slot in family.slot)}
+        self._own = {place.ref.index for one in axes for place in places(family.of_axis(one), link=True)}
         self._names_objects = rule is None or (rule.hexadecimal and not rule.index)
         self._listed: set[int] = set()
         self._flags: dict[int, Effect] = {}

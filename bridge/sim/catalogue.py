@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final
 
 from bridge.canopen.datatypes import REALS
@@ -15,10 +16,12 @@ from bridge.sim.generic_eds import plan_of_description
 from bridge.sim.generic_family import pattern, plan_of_family
 from bridge.sim.generic_inputs import motions_of
 from bridge.sim.generic_node import GenericNode
+from bridge.sim.generic_plan import At
 from bridge.sim.nord_catalogue import NORD
 from bridge.sim.object_catalogue import MAPPINGS, cia402, lenze_8400_motec
 from bridge.sim.stoeber_catalogue import stoeber_5000, stoeber_5000_four_axes, stoeber_5000_posi
 
+NOTHING: Final[Mapping[At, int]] = MappingProxyType({})
 Factory = Callable[[int, Mapping[str, float]], SimulatedDevice]
 
 
@@ -45,15 +48,18 @@ def simulate_family(
     """A simulated node of a family of the site's own. ``mappings`` names it and those that it extends, the
     nearest first: it is played as the first of them that has a simulation, else as a generic node, whose
     values are its set-points. Raises ``OperationFailed`` as ``simulate_node`` does."""
-    kind = next((name for name in mappings if name in _FAMILIES), None)
+    of_one_axis = all(slot.axis == 1 for slot in family.slot)
+    kind = next((name for name in mappings if name in _FAMILIES and of_one_axis), None)
     own: dict[str, float] = {}
     known = dict(parameters)
     if kind is None or kind != mappings[0]:
         of_kind = {one.name for one in load_family(kind).parameter} if kind else set[str]()
         for name in parameters:
-            if name.rpartition("/")[2] in {one.name for one in family.parameter} - of_kind:
+            of_slot, _, leaf = name.rpartition("/")
+            is_of_family = leaf in {one.name for one in family.parameter} - of_kind
+            if is_of_family and (kind or of_slot in ("", *(slot.name for slot in family.slot))):
                 own[name] = known.pop(name)
-    values = {at: value for name, given in own.items() for at, value in _value(family, name, given)}
+    values = values_of(family, own)
     if kind is None:
         if known:
             raise OperationFailed(f"{', '.join(known)}: the simulated {mappings[0]} has no such parameter")
@@ -64,22 +70,34 @@ def simulate_family(
     return node
 
 
-def simulate_description(description: Description, node_id: int) -> SimulatedDevice:
-    """A simulated node that is as its device description says, and whose inputs move."""
-    plan = plan_of_description(description, node_id)
+def simulate_description(
+    description: Description, node_id: int, values: Mapping[At, int] = NOTHING
+) -> SimulatedDevice:
+    """A simulated node that is as its device description says, and whose inputs move. ``values`` are in
+    place of the file's."""
+    plan = plan_of_description(description, node_id).with_numbers(values)
     return GenericNode(node_id, plan, motions_of(plan))
 
 
-def _value(family: Family, name: str, given: float) -> Iterator[tuple[tuple[int, int], int]]:
-    """Where a parameter is, and what it holds. Raises ``OperationFailed`` where that cannot be."""
-    parameter = family.parameter_named(name.rpartition("/")[2])
-    ref = family.object_of(parameter)
+def values_of(family: Family, parameters: Mapping[str, float]) -> dict[At, int]:
+    """What the objects hold of parameters in engineering units, of all axes or, as ``axis2/6083``, of one.
+    Raises ``OperationFailed`` where that cannot be."""
+    return {at: value for name, given in parameters.items() for at, value in _value(family, name, given)}
+
+
+def _value(family: Family, name: str, given: float) -> Iterator[tuple[At, int]]:
+    of_slot, _, leaf = name.rpartition("/")
+    parameter = family.parameter_named(leaf)
+    axes = [family.of_slot(slot) for slot in family.slot if of_slot in ("", slot.name)] or [family]
     is_real = parameter.data_type in REALS
+    raw = given / parameter.factor
     try:
-        raw = given / parameter.factor
-        yield (ref.index, ref.sub), pattern(parameter.data_type, raw if is_real else round(raw))
+        word = pattern(parameter.data_type, raw if is_real else round(raw))
     except ValueError as error:
         raise OperationFailed(f"{name} = {given:g}: {error}") from None
+    for axis in axes:
+        ref = axis.object_of(parameter)
+        yield (ref.index, ref.sub), word
 
 
 _FAMILIES: Final[dict[str, Factory]] = {

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 from bridge.eds import Access, Description, Entry
 from bridge.eds import DataType as EdsType
 from bridge.eds.pdos import PdoSummary, pdos
 from bridge.mapping import load_family
+from bridge.mapping.axes import MOST_AXES, on_axis
 from bridge.sim.communication_objects import DeviceIdentity
 from bridge.sim.dictionary import DataType
 from bridge.sim.generic_family import MODE_DISPLAY
@@ -32,8 +33,9 @@ _TYPES: Final = {
     **{EdsType[one.name]: one for one in DataType},
 }
 _REALS: Final = {EdsType.REAL32: "<f", EdsType.REAL64: "<d"}
-_CONTROL: Final = (0x6040, 0)
-_STATUS: Final = (0x6041, 0)
+_CONTROL: Final = 0x6040
+_STATUS: Final = 0x6041
+_ERROR: Final = 0x603F
 _COPIES: Final = (
     Copy((0x6042, 0), (0x6044, 0)),
     Copy((0x60FF, 0), (0x606C, 0)),
@@ -49,14 +51,14 @@ def plan_of_description(description: Description, node_id: int) -> NodePlan:
     """The node ``node_id`` as its file describes it. Of what is mapped into a PDO and not described, of other
     lengths, or shorter than a byte, nothing is known: such a PDO carries nothing."""
     entries = {(entry.index, entry.sub): entry for one in description.objects for entry in one.entries}
-    is_drive = _is_word(entries.get(_CONTROL)) and _is_word(entries.get(_STATUS))
+    axes = tuple(_axes(entries))
     plans = {True: list[PdoPlan](), False: list[PdoPlan]()}
     mapped: dict[bool, set[At]] = {True: set(), False: set()}
     for pdo in pdos(description, node_id):
         words = _mapping(pdo, entries)
         plans[pdo.receives].append(_pdo(description, pdo, words, node_id))
         mapped[pdo.receives] |= {(word >> 16, word >> 8 & 0xFF) for word in words}
-    own = {_CONTROL, _STATUS} if is_drive else set[At]()
+    own = {at for axis in axes for at in (*axis.control, *axis.status)}
     objects = [
         _object(entry, node_id, in_rpdo=at in mapped[True], in_tpdo=at in mapped[False])
         for at, entry in entries.items()
@@ -67,15 +69,20 @@ def plan_of_description(description: Description, node_id: int) -> NodePlan:
         objects=tuple(one for one in objects if one is not None),
         rpdo=tuple(plans[True]),
         tpdo=tuple(plans[False]),
-        axes=tuple(_axes()) if is_drive else (),
-        mirrors=(MODE_DISPLAY,),
+        axes=axes,
+        mirrors=tuple(MODE_DISPLAY.on_axis(axis) for axis in range(1, MOST_AXES + 1)),
         only=frozenset(entries) | _LEAST,
     )
 
 
-def _axes() -> Iterator[AxisPlan]:
+def _axes(entries: Mapping[At, Entry]) -> Iterator[AxisPlan]:
     profile = load_family(_PROFILE)
-    yield AxisPlan((_CONTROL,), (_STATUS,), profile.control_word, profile.status_word, _COPIES)
+    for axis in range(1, MOST_AXES + 1):
+        control, status = ((on_axis(index, axis), 0) for index in (_CONTROL, _STATUS))
+        if _is_word(entries.get(control)) and _is_word(entries.get(status)):
+            copies = tuple(one.on_axis(axis) for one in _COPIES)
+            error = (on_axis(_ERROR, axis), 0)
+            yield AxisPlan((control,), (status,), profile.control_word, profile.status_word, copies, error)
 
 
 def _is_word(entry: Entry | None) -> bool:

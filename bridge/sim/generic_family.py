@@ -96,19 +96,21 @@ def plan_of_family(family: Family, node_id: int) -> NodePlan:
         rpdo=(*(_pdo(pdo, node_id) for slot in family.slot for pdo in slot.rpdo), *to_device),
         tpdo=(*(_pdo(pdo, node_id) for slot in family.slot for pdo in slot.tpdo), *of_device),
         axes=axes,
-        mirrors=(MODE_DISPLAY,),
+        mirrors=tuple(MODE_DISPLAY.on_axis(slot.axis) for slot in family.slot) or (MODE_DISPLAY,),
     )
 
 
 def objects_of_family(family: Family) -> list[NumberPlan | BytesPlan]:
     """Every object that the mapping speaks of, as delivered: parameters, what is polled, watched or written
     at start, and what the PDOs carry."""
+    axes = [family.of_slot(slot) for slot in family.slot] or [family]
     objects = {
         (ref.index, ref.sub): parameter_plan((ref.index, ref.sub), parameter)
+        for axis in axes
         for parameter in family.parameter
-        for ref in (family.object_of(parameter),)
+        for ref in (axis.object_of(parameter),)
     }
-    for at, kind, value in _further(family):
+    for at, kind, value in (further for axis in axes for further in _further(axis)):
         objects.setdefault(at, NumberPlan(at, kind, value))
     for signal in family.input:
         at = (signal.object.index, signal.object.sub)
@@ -160,7 +162,8 @@ def _further(family: Family) -> Iterator[tuple[At, DataType, int]]:
     for own in family.own_supervision:
         for one in (own, own.reaction):
             if one is not None and one.object is not None:
-                at = (one.object.index, one.object.sub)
+                ref = family.place(one.object)
+                at = (ref.index, ref.sub)
                 yield at, NUMBER_TYPES.get(one.data_type, DataType.UNSIGNED32), one.factory or 0
     for slot in family.slot:
         for write in slot.start:
@@ -253,7 +256,10 @@ def _axis(family: Family, slot: Slot) -> AxisPlan:
         if source and target and len(source) == len(target) == 1:
             copies.append(Copy(source[0], target[0], stays=value.name == _STAYS))
     control, status = commanded[family.process.rpdo[0]], told[family.process.tpdo[0]]
-    return AxisPlan(control, status, family.control_word, family.status_word, tuple(copies))
+    current = family.faults.current
+    error = family.of_slot(slot).object_of(family.parameter_named(current.parameter)) if current else None
+    told_by = (error.index, error.sub) if error else None
+    return AxisPlan(control, status, family.control_word, family.status_word, tuple(copies), told_by)
 
 
 def _first_word(family: Family, slot: Slot, value: ProcessValue) -> str:

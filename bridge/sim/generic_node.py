@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from bridge.canopen.frame import Frame
@@ -17,7 +18,7 @@ from bridge.sim.emcy_producer import EmcyProducer
 from bridge.sim.generic_axis import GenericAxis
 from bridge.sim.generic_inputs import TICK_S, Motion
 from bridge.sim.generic_outputs import behaviour_in_error, outputs_in_error
-from bridge.sim.generic_plan import At, BytesPlan, Copy, NodePlan, NumberPlan, PdoPlan
+from bridge.sim.generic_plan import At, AxisPlan, BytesPlan, Copy, NodePlan, NumberPlan, PdoPlan
 from bridge.sim.nmt_slave import NmtCommand, NmtState
 from bridge.sim.pdo_objects import PdoObjects
 from bridge.sim.sdo_server import SdoServer
@@ -50,7 +51,7 @@ class GenericNode(SimulatedDevice):
         self._numbers = Store(lambda: copy.copy(numbers))
         self._contents = Store(lambda: copy.copy(contents))
         self._emcy = EmcyProducer(self._communication, _RULES)
-        self.axes = tuple(GenericAxis(axis, self._report) for axis in plan.axes)
+        self.axes = tuple(GenericAxis(axis, partial(self._report, axis)) for axis in plan.axes)
         self._consumer = HeartbeatConsumer(
             lambda: self._watched() >> 16 & 0x7F, lambda: self._watched() & 0xFFFF
         )
@@ -152,7 +153,9 @@ class GenericNode(SimulatedDevice):
             axis.master_lost()
         self._settle()
 
-    def _report(self, code: int) -> None:
+    def _report(self, axis: AxisPlan, code: int) -> None:
+        if axis.error in self._numbers.current:
+            self._numbers.current[axis.error] = code
         self._emcy.report(code, 1 if code else 0)
 
     def _settle(self) -> None:

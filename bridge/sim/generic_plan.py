@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
+from bridge.mapping.axes import on_axis
 from bridge.mapping.model import ControlWord, StatusWord
 from bridge.sim.communication_objects import DeviceIdentity
 from bridge.sim.dictionary import DataType
@@ -49,6 +50,11 @@ class Copy:
     target: At
     stays: bool = False
 
+    def on_axis(self, axis: int) -> Copy:
+        """The same of another axis than the first."""
+        (source, source_sub), (target, target_sub) = self.source, self.target
+        return Copy((on_axis(source, axis), source_sub), (on_axis(target, axis), target_sub), self.stays)
+
 
 @dataclass(frozen=True, slots=True)
 class AxisPlan:
@@ -60,6 +66,8 @@ class AxisPlan:
     control_word: ControlWord
     status_word: StatusWord
     copies: tuple[Copy, ...] = ()
+    error: At | None = None
+    """What tells the code of its last error."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import Result as SdoResult
 from bridge.canopen.sdo import SdoChannel
 from bridge.canopen.sdo_transfer import SdoError
-from bridge.derive.modes import is_drive
+from bridge.derive.axes import axes_of
 from bridge.eds import Description, Entry, read_whole_device_file
 from bridge.errors import BridgeError
 from bridge.image import Quality
@@ -53,7 +53,7 @@ def served(folder: Path, name: str, content: bytes) -> Result:
     except BridgeError as error:
         return Result(name, "read", str(error))
     findings = tuple(str(one) for one in description.findings if one.severity == "error")
-    drive = is_drive(description)
+    drive = bool(axes_of(description))
 
     def result(step: str, problem: str = "") -> Result:
         return Result(name, step, problem, drive, findings)

@@ -131,14 +131,37 @@ class DerivedBench(Bench):
     """The node that a description describes, and a bridge that knows it by the mapping made of it only."""
 
     def __init__(
-        self, folder: Path, description: Description, mode: str | None = None, source: str = "spin.eds"
+        self,
+        folder: Path,
+        description: Description,
+        mode: str | None = None,
+        source: str = "spin.eds",
+        timeout_ms: int = 0,
     ) -> None:
         derived = derive_family(description, source, mode)
         family = family_of(folder, derived)
         self.generic = GenericNode(NODE_ID, plan_of_description(description, NODE_ID))
-        drives = [] if family.is_device else [sites.drive("drive", "modbus", 0, "")]
+        drives = [sites.drive(slot.name, "modbus", timeout_ms, "") for slot in family.slot]
         by = "heartbeat" if description.entry(0x1017) else "guarding" if description.entry(0x100C) else "none"
         node = sites.node(*drives, mapping=derived.name, node_id=NODE_ID, more=f'supervision = "{by}"')
         site = load_site(sites.write(folder, sites.bus(node), sites.modbus(), name="bench"))
         super().__init__(site, family=family, mapping=derived.name, node=self.generic)
         self.run(1.5)
+
+
+def axis_objects(axis: int) -> dict[str, Section]:
+    """The objects of the profile that ``SPIN`` has, as those of one axis."""
+    first = {name: one for name, one in SPIN.items() if name.startswith("60")}
+    return {f"{int(name, 16) + 0x800 * (axis - 1):04X}": one for name, one in first.items()}
+
+
+def axis_pdos(axis: int, number: int, cob_ids: tuple[str, str], access: str = "rw") -> dict[str, Section]:
+    """RPDO and TPDO ``number`` (from 0) with an axis's words."""
+    command, target, status, actual, mode = (
+        f"0x{index + 0x800 * (axis - 1):04X}00{bits}"
+        for index, bits in ((0x6040, 10), (0x6042, 10), (0x6041, 10), (0x6044, 10), (0x6061, "08"))
+    )
+    return {
+        **pdo(f"{0x1400 + number:04X}", cob_ids[0], command, target, access=access),
+        **pdo(f"{0x1800 + number:04X}", cob_ids[1], status, actual, mode, access=access),
+    }

@@ -38,11 +38,11 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
     for drive in node.drives:
         of_drive = yield from read_places(node, drive, read=_reader(node, result))
         channel = channel_of(node, drive.slot)
-        for want in wanted(node.family, node.bus, node.table):
+        for want in wanted(drive.family, node.bus, node.table):
             if want.place.per_drive and want.place.key in of_drive and channel is not None:
                 yield from _bring(node, want, of_drive, channel, drive.name, result)
         raw = {**of_node, **of_drive}
-        own = judge(node.family, raw, node.bus, node.table, drive.table.accepts.runs_on or "")
+        own = judge(drive.family, raw, node.bus, node.table, drive.table.accepts.runs_on or "")
         result.own[drive.name] = own
     _note_who_runs_on(node, result)
 
@@ -73,7 +73,8 @@ def read_places(
     channel = FIRST if drive is None else channel_of(node, drive.slot)
     if channel is None:
         return raw
-    for place in places(node.family, link=link):
+    family = node.family if drive is None else drive.family
+    for place in places(family, link=link):
         if place.per_drive is not (drive is not None):
             continue
         try:

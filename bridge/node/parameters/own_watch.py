@@ -9,27 +9,28 @@ from bridge.command import Drive, HasParameters
 from bridge.command.plant import Node
 from bridge.image import Value
 from bridge.mapping.own_places import OwnPlace, ends_own_watch, places
-from bridge.parameter import Entry, Names, ParameterError
+from bridge.parameter import Entry, ParameterError
 from bridge.parameter.codec import encode_value
 
 
 class OwnWatch:
     """Of the drives of one node."""
 
-    def __init__(self, node: Node, names: Names) -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
-        self._protection = names.protection
-        self._places = places(node.family)
+        self._protection = node.names.protection
+        self._places = {drive.name: places(drive.family) for drive in node.drives}
 
     def why_kept(self, drive: HasParameters, entry: Entry, value: Value) -> str:
         """Why this is not written: a drive of the site is stopped by silence, and would not stop."""
         key = entry.address.index, entry.address.sub
-        place = next((one for one in self._places if one.key == key), None)
-        silent = [one.name for one in self._concerned(drive, entry) if one.table.falls_silent]
-        if place is None or not silent:
-            return ""
-        raw = _raw(place, entry, value)
-        if raw is None or not ends_own_watch(self._node.family, key, raw):
+        silent: list[str] = []
+        for one in self._concerned(drive, entry):
+            place = next((place for place in self._places[one.name] if place.key == key), None)
+            raw = None if place is None else _raw(place, entry, value)
+            if one.table.falls_silent and raw is not None and ends_own_watch(one.family, key, raw):
+                silent.append(one.name)
+        if not silent:
             return ""
         return (
             f"{entry.name} would end the watch by which silence stops {' and '.join(silent)}: first another "
@@ -48,9 +49,13 @@ class OwnWatch:
             device.outputs.on_own_supervision_changed(why, now)
 
     def _concerned(self, drive: HasParameters, entry: Entry) -> Sequence[Drive]:
-        """Whom the object is about: ``drive``, or all of the node."""
-        is_of_drive = any(one.per_drive and one.ref.index == entry.address.index for one in self._places)
-        return [one for one in self._node.drives if not is_of_drive or one is drive]
+        """Whom the object is about: ``drive``, another axis, whose object it is, or all of the node."""
+        having = [one for one in self._node.drives if self._is_own(one, entry)]
+        return [one for one in having if one is drive] or having or self._node.drives
+
+    def _is_own(self, drive: Drive, entry: Entry) -> bool:
+        index = entry.address.index
+        return any(one.per_drive and one.ref.index == index for one in self._places[drive.name])
 
 
 def _raw(place: OwnPlace, entry: Entry, value: Value) -> int | None:

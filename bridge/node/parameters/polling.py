@@ -13,7 +13,7 @@ from typing import Final
 
 from bridge.command import HasParameters
 from bridge.command.plant import Node
-from bridge.parameter import Entry, Names
+from bridge.parameter import Entry
 
 MOST_PER_S: Final = 20.0
 """Reads of one node in a second: drives answer an SDO in 20 … 50 ms (Lenze: 30 ms and 20 ms typical)."""
@@ -40,8 +40,8 @@ Ask = Callable[[HasParameters, Entry, Callable[[Came], None]], None]
 class ParameterPolling:
     """``ask`` reads one point and tells what came of it; ``nodes`` share the budget."""
 
-    def __init__(self, node: Node, names: Names, nodes: int, ask: Ask) -> None:
-        self._entries = tuple(names.points())
+    def __init__(self, node: Node, nodes: int, ask: Ask) -> None:
+        self._node = node
         self._ask = ask
         share = BUS_SHARE * node.bus.bitrate / _BITS / max(nodes, 1)
         self.pause_s = 1.0 / min(MOST_PER_S, share)
@@ -54,7 +54,8 @@ class ParameterPolling:
 
     def start(self, drives: Sequence[HasParameters], now: float) -> None:
         """Begin with all points of ``drives``."""
-        self._places = [(drive, entry) for entry in self._entries for drive in drives]
+        of_drives = [[(drive, entry) for entry in self._node.names_of(drive).points()] for drive in drives]
+        self._places = [place for in_turn in zip(*of_drives, strict=True) for place in in_turn]
         self._due = [(now, place) for place in range(len(self._places))]
         self._next_at = now
         self._round += 1

@@ -75,24 +75,23 @@ class NodeParameters:
         self._sdo = sdo
         self._now = plant.began
         self._state = NodeState.ABSENT
-        names = self._names = node.names
         self._who = parameter_places(node)
         self._access = {
             place.who.name: DriveParameters(
                 place.who.name,
                 node.name,
                 node.family,
-                names,
+                node.names_of(place.who),
                 plant.eeprom_writes,
                 on_first=place.on_first,
             )
             for place in self._who
         }
         self._channels = {place.who.name: place.channel for place in self._who}
-        self._own_watch = OwnWatch(node, names)
-        self._view = ParameterView(node, plant.image, names)
+        self._own_watch = OwnWatch(node)
+        self._view = ParameterView(node, plant.image)
         sharing = sum(other.bus is node.bus for other in plant.nodes.values())
-        self._polling = ParameterPolling(node, names, sharing, self._poll)
+        self._polling = ParameterPolling(node, sharing, self._poll)
         self._deciding = {
             name
             for value in node.family.value
@@ -173,7 +172,7 @@ class NodeParameters:
             check_raw(entry, command.value)
             entry = entry.as_bytes
         access.check_writable(entry)
-        gate = _gate(request.identity, drive)
+        gate = self._gate(request.identity, drive, entry)
         if refusal := access.names.protection.why_not(entry, gate):
             conclude(_no(Code.NOT_ALLOWED, refusal))
             return
@@ -190,7 +189,15 @@ class NodeParameters:
     def _save(
         self, access: DriveParameters, identity: Identity, drive: HasParameters, now: float, conclude: Reply
     ) -> None:
-        self._run(access.save(now, _gate(identity, drive)), drive, partial(self._on_saved, conclude))
+        gate = Gate(identity.role >= Role.ENGINEER, lambda: drive.is_enabled)
+        self._run(access.save(now, gate), drive, partial(self._on_saved, conclude))
+
+    def _gate(self, identity: Identity, drive: HasParameters, entry: Entry) -> Gate:
+        """What is not of the drive's own axis may move every one that the same channel reaches."""
+        channel = self._channels[drive.name]
+        sharing = [place.who for place in self._who if place.channel == channel]
+        moved = [drive] if self._node.is_of(drive, entry.address) else sharing
+        return Gate(identity.role >= Role.ENGINEER, lambda: any(one.is_enabled for one in moved))
 
     def _read(
         self,
@@ -268,7 +275,7 @@ class NodeParameters:
 
     def _as_listed(self, drive: HasParameters, entry: Entry, reading: Reading) -> Reading | ParameterError:
         """What was written as bytes, as the value that it is of."""
-        listed = self._names.resolve(str(entry.address))
+        listed = self._node.names_of(drive).resolve(str(entry.address))
         held = self._access[drive.name].held(entry)
         if listed.definition is None or listed.definition == reading.entry.definition or held is None:
             return reading
@@ -321,7 +328,7 @@ class NodeParameters:
             return
         self._view.show(drive.name, result)
         name = entry.definition.name if entry.definition else ""
-        if name in self._deciding and entry.address == self._names.resolve(name).address:
+        if name in self._deciding and entry.address == self._node.names_of(drive).resolve(name).address:
             # It decides what the process data mean, which follow at once.
             drive.on_parameter(name, float(result.value), self._now)
 
@@ -334,10 +341,6 @@ def _why_not_set(identity: Identity, drive: HasParameters) -> str:
     if not identity.may_set_parameters:
         return f"{identity} may not set parameters: an engineer may"
     return drive.refusal(identity)
-
-
-def _gate(identity: Identity, drive: HasParameters) -> Gate:
-    return Gate(identity.role >= Role.ENGINEER, lambda: drive.is_enabled)
 
 
 def _failed(error: ParameterError) -> Outcome:

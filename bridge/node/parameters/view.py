@@ -9,7 +9,7 @@ from bridge.command import HasParameters
 from bridge.command.link import NodeState
 from bridge.command.plant import Node
 from bridge.image import Image, Quality
-from bridge.parameter import Entry, Names, ObjectRef, ParameterError, Reading, Why
+from bridge.parameter import Entry, ObjectRef, ParameterError, Reading, Why
 
 _FINAL_ABORTS: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
 """Abort codes for what a drive does not have: asking again gives the same answer."""
@@ -21,13 +21,13 @@ NO_CHANNEL: Final = "no SDO channel reaches it: name its channel in sdo_channels
 class ParameterView:
     """The parameter points of one node's drives."""
 
-    def __init__(self, node: Node, image: Image, names: Names) -> None:
+    def __init__(self, node: Node, image: Image) -> None:
         self._image = image
         self._hold_s = node.table.hold_ms / 1000
         self._indices: dict[tuple[str, ObjectRef], int] = {
             (who.name, entry.address): image.index[f"{who.name}/parameter/{entry.leaf}"]
             for who in node.with_parameters
-            for entry in names.points()
+            for entry in node.names_of(who).points()
         }
         self._dead_at: float | None = None
 

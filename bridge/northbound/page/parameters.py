@@ -22,7 +22,7 @@ from bridge.errors import FileFaults
 from bridge.image import Value
 from bridge.mapping import Family
 from bridge.northbound.page.guards import MOST_FILE
-from bridge.parameter import Entry, Names, backups
+from bridge.parameter import AxisNames, Entry, Names, backups
 from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.factory import DESCRIPTIONS, factory
 from bridge.parameter.set_file import read_set
@@ -64,17 +64,18 @@ class Holder:
 
 def holders_of(site: Site, families: Mapping[str, Family]) -> dict[str, Holder]:
     """By the names that commands have for them."""
-    known = {name: Names(family) for name, family in families.items()}
+    known = {name: AxisNames(family) for name, family in families.items()}
     found: dict[str, Holder] = {}
     for bus in site.bus:
         for node in bus.node:
             family, names = families[node.mapping_key], known[node.mapping_key]
             if family.is_device:
-                found[node.name] = Holder(node.name, node, family, names, on_first=True)
+                found[node.name] = Holder(node.name, node, family, names.of(), on_first=True)
             for drive in node.drive:
                 name = f"{node.name}/{family.leaf_of(drive)}"
-                on_first = family.is_on_first(family.slot_named(drive.slot))
-                found[name] = Holder(name, node, family, names, on_first)
+                slot = family.slot_named(drive.slot)
+                on_first = family.is_on_first(slot)
+                found[name] = Holder(name, node, family.of_slot(slot), names.of(slot.axis), on_first)
     return found
 
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from bridge import __version__
+from bridge.base.errors import OperationFailed
 from bridge.command import Plant, Source
 from bridge.command.rights import rights_of
 from bridge.dbc import BusDescription, describe
-from bridge.errors import OperationFailed
 from bridge.image import Point
 from bridge.lint import family_dictionaries
 from bridge.lint.bus import view_bus

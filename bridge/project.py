@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from bridge.base.errors import FileFaults
 from bridge.config import NodeTable, Site, read_site
 from bridge.config.download import Download
 from bridge.derive import describe
 from bridge.drive.own_supervision import judge, why_silence_does_not_stop
 from bridge.eds import read_configurations
-from bridge.errors import FileFaults
 from bridge.mapping import Family
 from bridge.mapping.model import Slot
 from bridge.mapping.own_places import Raw, channels_needed, offline

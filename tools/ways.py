@@ -23,7 +23,7 @@ from typing import Any, Final, NamedTuple
 import zenoh
 from asyncua.client.client import Client
 
-from bridge import clock
+from bridge.base import clock
 from bridge.can.virtual import VirtualWire
 from bridge.canopen.frame import Frame
 from bridge.command import Kind
@@ -32,7 +32,7 @@ from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.zenoh import ZenohServer
 from bridge.project import load_project
-from bridge.service import Service
+from bridge.service.bus_process import Service
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
 from bridge.zenohlink import zenoh_config
@@ -154,7 +154,7 @@ _OUT: Final = {
     "command/plant.py": "finds the drive",
     "command/channel.py": "keeps the state of the drive's leg",
     "command/leg/step.py": "does what the request asks, if it may",
-    "command/telegram.py": "decodes names and values into words",
+    "command/messages/telegram.py": "decodes names and values into words",
     "command/leg/turn.py": "decides what is sent: these words or a stop",
     "node/process/process_data.py": "packs the words into the RPDO",
     "master/line.py": "compares it with what the bus repeats, and hands it over",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+from bridge.base.errors import Unavailable
 from bridge.can.interface import Bus
-from bridge.errors import Unavailable
 
 
 def open_bus(name: str, interface: str, channel: str, bitrate: int, *, at_least: int = 0) -> Bus:

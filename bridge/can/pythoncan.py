@@ -16,11 +16,11 @@ from typing import Any, Final
 
 import can
 
+from bridge.base.errors import Unavailable
 from bridge.can.interface import ControllerState
 from bridge.can.ownframes import OwnFrames
 from bridge.can.softbus import SoftBus
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
-from bridge.errors import Unavailable
 
 _MOST_WAITING: Final = 1 << 14
 _MOST_TO_SEND: Final = 256

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+from bridge.base.errors import Unavailable
 from bridge.can import bcm
 from bridge.can.burstend import Burst
 from bridge.can.cansockets import CanSockets
@@ -30,7 +31,6 @@ from bridge.can.receiver import BATCH, Receiver, Stamps
 from bridge.can.wakeups import Wakeups
 from bridge.can.wirebits import WireBits
 from bridge.canopen.frame import Frame
-from bridge.errors import Unavailable
 
 _MOST_PER_ROUND: Final = 2048
 _BEAT_LIMIT_S: Final = 0.01

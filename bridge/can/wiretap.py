@@ -11,9 +11,9 @@ import contextlib
 from pathlib import Path
 from typing import Final
 
+from bridge.base.errors import Unavailable
 from bridge.can.listener import LOST, RECORD
 from bridge.can.softbus import SoftBus
-from bridge.errors import Unavailable
 
 _PERIOD_S: Final = 0.02
 _MOST_BYTES: Final = 1 << 20

@@ -10,8 +10,8 @@ from typing import Final
 import typer
 
 from bridge import __version__
+from bridge.base.errors import BridgeError
 from bridge.cli.terminal import printable_lines
-from bridge.errors import BridgeError
 
 _COMMANDS: Final = {
     "demo": "serve.demo",

@@ -13,7 +13,7 @@ from typing import Annotated, Any, TypeVar
 
 import typer
 
-from bridge import clock
+from bridge.base import clock
 from bridge.can import Bus, open_bus
 from bridge.can.interface import ControllerState
 from bridge.cli.stopping import until_stopped
@@ -22,7 +22,7 @@ from bridge.config import BusTable
 from bridge.errands.errand import Errand
 from bridge.mapping import Family
 from bridge.mapping.model import SdoServer
-from bridge.node.sdo_channels import FIRST
+from bridge.node.places.sdo_channels import FIRST
 from bridge.parameter.number_text import NumberError, command_line_number
 from bridge.project import load_project
 

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from bridge import __version__
+from bridge.base.errors import OperationFailed
 from bridge.canopen.lss import LssAddress, LssError
 from bridge.cli import drop_report, drop_test
 from bridge.cli.bus import AsJson, Line, carry_out, print_table, tell
@@ -22,7 +23,6 @@ from bridge.cli.terminal import progress
 from bridge.errands.conformance import Conformance, Slave, Verdict
 from bridge.errands.conformance_checks import checks, lengths, put_back
 from bridge.errands.lss import LssErrand, inquire
-from bridge.errors import OperationFailed
 from bridge.parameter import backups
 from bridge.parameter.backup_file import IDENTITY
 from bridge.project import load_project

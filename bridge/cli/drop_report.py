@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from bridge import __version__
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.errands.drop_test import DropOutcome, DropTest
 
 

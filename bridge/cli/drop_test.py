@@ -13,7 +13,9 @@ from typing import Annotated
 
 import typer
 
-from bridge import __version__, clock
+from bridge import __version__
+from bridge.base import clock
+from bridge.base.errors import OperationFailed
 from bridge.cli import drop_report
 from bridge.cli.bus import AsJson, Line, carry_out, not_virtual, tell
 from bridge.cli.stopping import until_stopped
@@ -22,13 +24,12 @@ from bridge.config import BusTable, NodeTable, Site
 from bridge.errands.bystander import command_ids
 from bridge.errands.drop_test import DropTest, ForeignMaster, Phase
 from bridge.errands.muted_bus import MutableBus
-from bridge.errors import OperationFailed
 from bridge.mapping import Family
 from bridge.master.master import Master
 from bridge.master.network import Network
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.project import Project, load_project
-from bridge.service import make_bus
+from bridge.service.bus_process import make_bus
 
 _LISTEN_S = 1.0
 

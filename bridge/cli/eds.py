@@ -12,12 +12,12 @@ from typing import Annotated, Any
 
 import typer
 
+from bridge.base.errors import OperationFailed
 from bridge.cli.terminal import printable
 from bridge.config.download import Download, to_concise_dcf
 from bridge.eds import Description, Entry, Finding, Value, configuration, read_device_file
 from bridge.eds.model import Report
 from bridge.eds.pdos import PdoSummary, pdos
-from bridge.errors import OperationFailed
 
 
 class Format(StrEnum):

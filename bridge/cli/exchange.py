@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from bridge import __version__
+from bridge.base.errors import OperationFailed
 from bridge.cli import drop_report, drop_test, exchange_report
 from bridge.cli.bus import AsJson, Line, carry_out, tell
 from bridge.cli.exchange_report import Exchange
@@ -31,7 +32,6 @@ from bridge.cli.parameter_sets import write_all
 from bridge.command import Plant
 from bridge.config import BusTable, NodeTable
 from bridge.errands.open_channels import OpenChannels
-from bridge.errors import OperationFailed
 from bridge.parameter import backups
 from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.factory import DESCRIPTIONS

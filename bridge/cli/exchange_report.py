@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from bridge import __version__
+from bridge.base.errors import OperationFailed
 from bridge.cli import drop_report
 from bridge.config import NodeTable
-from bridge.errors import OperationFailed
 
 _FOLDER = "exchanges"
 _Facts = dict[str, Any]

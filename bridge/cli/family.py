@@ -7,10 +7,10 @@ from typing import Annotated, Final
 
 import typer
 
+from bridge.base.errors import FileFaults, OperationFailed
 from bridge.cli.terminal import printable
 from bridge.derive import derive_family
 from bridge.eds import Severity, contradictions, read_whole_device_file
-from bridge.errors import FileFaults, OperationFailed
 from bridge.mapping.loader import mappings_dir, read_family
 from bridge.mapping.model import Family, Parameter
 

@@ -7,9 +7,9 @@ import logging
 import os
 from typing import Any, Final
 
+from bridge.base.errors import is_exhausted
+from bridge.base.quietlog import QuietHandler, about
 from bridge.cli.terminal import printable, printable_lines
-from bridge.errors import is_exhausted
-from bridge.quietlog import QuietHandler, about
 
 _log = logging.getLogger(__name__)
 

@@ -10,13 +10,13 @@ from typing import Annotated, TypeVar
 
 import typer
 
+from bridge.base.errors import OperationFailed
 from bridge.canopen.lss import BIT_RATES, NO_NODE_ID, LssAddress, LssError, Service
 from bridge.canopen.lss_scan import Scanned, find_all
 from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.terminal import progress
 from bridge.errands import lss as lss_errand
 from bridge.errands.lss import LssErrand
-from bridge.errors import OperationFailed
 
 app = typer.Typer(help="Give devices node ids and bit rates (CiA 305).", no_args_is_help=True)
 

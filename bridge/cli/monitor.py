@@ -12,7 +12,8 @@ from typing import Annotated
 
 import typer
 
-from bridge import clock
+from bridge.base import clock
+from bridge.base.errors import OperationFailed
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.terminal import printable
@@ -22,7 +23,6 @@ from bridge.errands.errand import Errand
 from bridge.errands.habit_watch import HabitWatch
 from bridge.errands.silence_watch import SilenceWatch, bounds
 from bridge.errands.statistics import Statistics
-from bridge.errors import OperationFailed
 from bridge.lint import family_dictionaries
 
 _IDENTIFIER = 0x1FFF_FFFF

@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
+from bridge.base.errors import OperationFailed
 from bridge.canopen.nmt import NmtCommand
 from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_line, split_site, takes_bus
 from bridge.cli.terminal import progress
 from bridge.errands.single import NmtErrand
-from bridge.errors import OperationFailed
 
 _USAGE = "drivebridge nmt [SITE] COMMAND NODE|all"
 

@@ -11,13 +11,13 @@ from typing import Annotated, Any
 import typer
 
 from bridge import __version__
+from bridge.base.errors import Unavailable
 from bridge.cli.bus import AsJson, BusName, Line, carry_out, print_table, tell
 from bridge.cli.terminal import progress
 from bridge.command import Plant
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.errands.own_check import OwnCheck
-from bridge.errors import Unavailable
 from bridge.lint import WorstCase, lint
 from bridge.mapping.own_places import OwnWant, channels_needed, suggested, suggested_ms
 from bridge.project import Project, load_project

@@ -11,11 +11,11 @@ from typing import Annotated
 
 import typer
 
-from bridge import clock
+from bridge.base import clock
+from bridge.base.errors import FileFaults, OperationFailed
 from bridge.cli.bus import AsJson, print_table, tell
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Target, Yes, find
 from bridge.cli.parameter_sets import read_all, write_all
-from bridge.errors import FileFaults, OperationFailed
 from bridge.image import Value
 from bridge.mapping.model import Parameter
 from bridge.parameter import backups

@@ -9,7 +9,8 @@ from typing import Annotated, Final, TypeVar
 
 import typer
 
-from bridge import clock
+from bridge.base import clock
+from bridge.base.errors import OperationFailed
 from bridge.cli.bus import Line, carry_out, not_virtual, tell
 from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import Show, progress
@@ -17,7 +18,6 @@ from bridge.command.output_words import OutputWords
 from bridge.config import BusTable, NodeTable
 from bridge.errands.bystander import Bystander, Standstill
 from bridge.errands.parameter import ParameterErrand
-from bridge.errors import OperationFailed
 from bridge.mapping.model import Family, Slot
 from bridge.node.parameters.run import Procedure
 from bridge.parameter import DriveParameters, Entry, Ledger, Names, ParameterError, Why

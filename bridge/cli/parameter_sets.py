@@ -6,11 +6,11 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from bridge import clock
+from bridge.base import clock
+from bridge.base.errors import OperationFailed
 from bridge.cli.bus import tell
 from bridge.cli.parameter_drive import Target
 from bridge.cli.terminal import Show
-from bridge.errors import OperationFailed
 from bridge.image import Value
 from bridge.parameter import ObjectRef, ParameterError, Why, backups
 from bridge.parameter.protection import Gate

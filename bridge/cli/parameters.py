@@ -9,10 +9,10 @@ from typing import Annotated
 
 import typer
 
+from bridge.base.errors import OperationFailed
 from bridge.cli import parameter_backup
 from bridge.cli.bus import AsJson, print_table, tell
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Yes, find
-from bridge.errors import OperationFailed
 from bridge.parameter import DriveParameters, Entry, ParameterError, Reading, Transfer
 from bridge.parameter.codec import parse, shown
 

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 import typer
 
+from bridge.base.errors import Fault, FileFaults
 from bridge.cli.terminal import printable
-from bridge.errors import Fault, FileFaults
 from bridge.lint import Severity, Verdict, lint
 from bridge.project import Project, count, load_project
 

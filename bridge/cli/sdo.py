@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from bridge.base.errors import OperationFailed
 from bridge.canopen import datatypes, width
 from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Plain, TypeName
 from bridge.canopen.decode_sdo import shown
@@ -18,7 +19,6 @@ from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, spli
 from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import printable, progress
 from bridge.errands.single import SdoErrand
-from bridge.errors import OperationFailed
 from bridge.mapping.model import SdoServer
 from bridge.parameter import Names, ObjectRef
 from bridge.parameter.number_text import NumberError, command_line_number

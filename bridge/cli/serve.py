@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from bridge.base.errors import BridgeError, OperationFailed
 from bridge.cli import logs
 from bridge.cli.signals import ending_signals
 from bridge.cli.stopping import Ending, until_stopped
 from bridge.config import BusTable, Site, ZenohTable, load_site
-from bridge.errors import BridgeError, OperationFailed
-from bridge.front_process import FRONTS, Front, become_front, give_reason, limit_memory
+from bridge.service.front_process import FRONTS, Front, become_front, give_reason, limit_memory
 
 # The service is not imported for a front: after one has ended, its clients wait for the next.
 if TYPE_CHECKING:
@@ -86,15 +86,15 @@ def run(
 def _front_of(role: str, site: Path, signs: int | None, listening: int | None) -> Coroutine[None, None, None]:
     """A front imports nothing of another's."""
     if role == "opcua":
-        from bridge.opcua_front import run_opcua
+        from bridge.service.opcua_front import run_opcua
 
         return run_opcua(_limited(load_site(site)), signs, listening)
     if role == "zenoh":
-        from bridge.zenoh_front import run_zenoh
+        from bridge.service.zenoh_front import run_zenoh
 
         return run_zenoh(_limited(load_site(site)), signs)
-    from bridge.page_front import run_page
     from bridge.project import load_project
+    from bridge.service.page_front import run_page
 
     project = load_project(site)
     _limited(project.site)
@@ -131,7 +131,7 @@ def simulate(
     from bridge.can import open_all
     from bridge.cli.simulation import habits_of, simulation
     from bridge.project import load_project
-    from bridge.service import make_bus
+    from bridge.service.bus_process import make_bus
 
     logs.set_up(verbose=verbose)
     project = load_project(site)
@@ -177,9 +177,9 @@ async def _serve(
     ready: Callable[[], None] = lambda: None,
 ) -> None:
     """The service, with simulated nodes on its virtual buses."""
+    from bridge.base.memory import lock_memory
     from bridge.master.standstill import SignalAlarm
-    from bridge.memory import lock_memory
-    from bridge.service import Service, make_bus
+    from bridge.service.bus_process import Service, make_bus
 
     why_not = lock_memory()
     if why_not:

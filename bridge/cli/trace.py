@@ -12,9 +12,9 @@ from typing import Final
 import can
 from can.io.blf import BLFParseError
 
+from bridge.base.errors import OperationFailed
 from bridge.can.pythoncan import frame_of
 from bridge.canopen.frame import Frame
-from bridge.errors import OperationFailed
 
 SUFFIXES: Final = (".log", ".asc", ".blf", ".trc")
 _UNREADABLE: Final = (

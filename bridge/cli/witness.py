@@ -18,10 +18,10 @@ from typing import Annotated, Final
 
 import typer
 
+from bridge.base.errors import BridgeError, OperationFailed, Unavailable
 from bridge.cli import logs
 from bridge.cli.bus import AsJson
 from bridge.config import Site, load_site
-from bridge.errors import BridgeError, OperationFailed, Unavailable
 from bridge.witness.findings import Alarm, Finding, Kind, Sight, Stop
 from bridge.witness.numbers import Numbers
 from bridge.witness.plan import UNKNOWN_MS, UnknownFamily, WatchedBus, WatchedOutputs, plan

@@ -10,8 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
-from bridge.command.life_sign import LEAF as LIFE_SIGN
-from bridge.command.request import (
+from bridge.base.ratelimit import RateLimit
+from bridge.command.messages.life_sign import LEAF as LIFE_SIGN
+from bridge.command.messages.request import (
     Action,
     Code,
     Do,
@@ -28,7 +29,6 @@ from bridge.command.request import (
     WriteParameter,
 )
 from bridge.image import Image, Value
-from bridge.ratelimit import RateLimit
 
 Values = dict[str, Value]
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from bridge.command.event import Event, Kind
 from bridge.command.leg import event, owners
 from bridge.command.leg.effect import (
     Answer,
@@ -30,7 +29,8 @@ from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import WANTS_STOP_WORD, LegState, Output, WatchdogState, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.link import Link, NodeState
-from bridge.command.request import Identity, Outcome, Reply, Request
+from bridge.command.messages.event import Event, Kind
+from bridge.command.messages.request import Identity, Outcome, Reply, Request
 from bridge.image import Quality
 
 

@@ -8,8 +8,8 @@ from typing import Final
 
 from bridge.command.drive import Identification
 from bridge.command.link import Link, NodeState
+from bridge.command.messages.request import Identity, Role
 from bridge.command.outputs import Outputs, Telling
-from bridge.command.request import Identity, Role
 from bridge.config import NodeTable
 from bridge.image import Image, Quality, Value
 from bridge.mapping.device import Signal

@@ -10,13 +10,13 @@ from bridge.command.actual import ActualData
 from bridge.command.commanded import Commanded
 from bridge.command.deadlines import NOW
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.event import Event
 from bridge.command.follow import Verdict
 from bridge.command.following import Following
-from bridge.command.life_sign import LEAF as LIFE_SIGN
 from bridge.command.link import FurtherTpdo
 from bridge.command.meaning_news import MeaningNews
-from bridge.command.request import Identity
+from bridge.command.messages.event import Event
+from bridge.command.messages.life_sign import LEAF as LIFE_SIGN
+from bridge.command.messages.request import Identity
 from bridge.command.setpoint_doubts import InForce, in_force
 from bridge.command.worst_case import StopTime, Wire, stop_time
 from bridge.config import BusTable, DriveTable, NodeTable

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from bridge.command.channel import Channel
-from bridge.command.event import Event, Kind
 from bridge.command.leg import event
 from bridge.command.leg.effect import Tripped
 from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import AWAITS_REPORT
 from bridge.command.leg.turn import control_word
 from bridge.command.link import Link, NodeState
+from bridge.command.messages.event import Event, Kind
+from bridge.command.messages.telegram import TelegramDecoder
 from bridge.command.setpoint_doubts import SetpointDoubts
 from bridge.command.status import DriveStatus
-from bridge.command.telegram import TelegramDecoder
 from bridge.config import DriveTable
 from bridge.drive import FAULTED, DriveState, Explained, Meanings, Told
 from bridge.image import Quality

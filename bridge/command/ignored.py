@@ -4,17 +4,15 @@ NMT."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from bridge.command.audit import AuditTrail
 from bridge.command.drive import Drive
-from bridge.command.event import Event, Kind
 from bridge.command.follow import LastStop, Verdict
+from bridge.command.messages.event import Event, Kind
+from bridge.command.messages.request import Action
+from bridge.command.node import Enforce, Node
 from bridge.command.outputs import Outputs
-from bridge.command.request import Action
-
-if TYPE_CHECKING:
-    from bridge.command.plant import Enforce, Node
 
 _WORST: Final = 1000
 """The highest severity there is (OPC UA Part 5 §6.4.2)."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.event import Event, Kind
+from bridge.command.messages.event import Event, Kind
 from bridge.command.setpoint_doubts import InForce
 from bridge.drive import Codes, Key, is_scale, no_scale
 from bridge.mapping.model import Family, Meaning, Slot

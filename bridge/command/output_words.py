@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
-from bridge.command.request import Code
-from bridge.command.telegram import Refusal, Telegram
+from bridge.command.messages.request import Code
+from bridge.command.messages.telegram import Refusal, Telegram
 from bridge.config import SafeValue
 from bridge.image import Value
 from bridge.mapping.device import Output

@@ -14,14 +14,14 @@ from typing import Final, NamedTuple
 from bridge.command.channel import Channel
 from bridge.command.commanded import Commanded
 from bridge.command.deadlines import NOW
-from bridge.command.event import Event, Kind
 from bridge.command.follow import Verdict
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import Output as Sent
 from bridge.command.link import Link, NodeState
+from bridge.command.messages.event import Event, Kind
+from bridge.command.messages.request import Action, Code, Outcome, Reply, Request
 from bridge.command.output_following import Answer, OutputFollowing, Question, StoppedOutput
 from bridge.command.output_words import ACTIVE, OutputWords
-from bridge.command.request import Action, Code, Outcome, Reply, Request
 from bridge.command.worst_case import StopTime, Wire, output_stop_time
 from bridge.config import BusTable, NodeTable, OutputsTable
 from bridge.drive import ControlWords, OwnJudgement

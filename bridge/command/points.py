@@ -9,8 +9,8 @@ from typing import Any, Final
 
 from bridge.command import follow
 from bridge.command.leg.state import WATCHDOG_STATES
-from bridge.command.life_sign import LEAF as LIFE_SIGN
 from bridge.command.link import NodeState
+from bridge.command.messages.life_sign import LEAF as LIFE_SIGN
 from bridge.command.parameter_points import parameter_points
 from bridge.condition.told import CONDITIONS
 from bridge.config import BusTable, DriveTable, NodeTable, Site

@@ -7,8 +7,8 @@ from typing import Final
 
 from bridge.command.device import Device
 from bridge.command.drive import Drive
+from bridge.command.messages.request import Source
 from bridge.command.plant import Plant
-from bridge.command.request import Source
 from bridge.image import Point
 
 _TAKES_LEASES: Final = (Source.OPCUA, Source.ZENOH)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.command.freshness import way_ms
+from bridge.command.messages.freshness import way_ms
 from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, OutputsTable
 
 REACTION_BOUND_MS: Final = 20

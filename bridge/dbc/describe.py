@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
+from bridge.base.errors import OperationFailed
 from bridge.config import NodeTable, PdoTable
 from bridge.config.model import pdo_table
 from bridge.dbc.device import device_messages
@@ -14,7 +15,6 @@ from bridge.dbc.model import BRIDGE, BusDescription, Message
 from bridge.dbc.protocol import bus_messages, node_messages
 from bridge.dbc.signals import PdoSignals
 from bridge.drive import default_codecs
-from bridge.errors import OperationFailed
 from bridge.lint.bus import BusView, DriveView, NodeView, PdoView
 from bridge.mapping.model import Pdo, Slot
 from bridge.node.boot import factory_entries, layouts, match_words

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bridge.canopen.pdo import PdoEntry
-from bridge.node.process.words import WORD_BITS, Place
+from bridge.node.places.words import WORD_BITS, Place
 
 
 @dataclass(frozen=True, slots=True)

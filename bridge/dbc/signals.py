@@ -14,7 +14,7 @@ from bridge.dbc.kinds import kind_of
 from bridge.dbc.model import Signal
 from bridge.drive import ValueCodec
 from bridge.eds import Description
-from bridge.node.process.words import WORD_BITS
+from bridge.node.places.words import WORD_BITS
 
 Groups = dict[str, tuple[str, ...]]
 

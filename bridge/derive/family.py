@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from bridge.base.errors import Fault, FileFaults, OperationFailed
 from bridge.derive.axes import View, axes_of, view_of
 from bridge.derive.device import GENERIC, device_lines
 from bridge.derive.drive import Axis, drive_text, words_of
@@ -15,7 +16,6 @@ from bridge.derive.modes import CONTROL_WORD, PROFILE_402, STATUS_WORD, Mode, bi
 from bridge.derive.pdo_words import NoLayout
 from bridge.derive.toml import file_name
 from bridge.eds import Description, read_whole_device_file
-from bridge.errors import Fault, FileFaults, OperationFailed
 from bridge.mapping import Family
 from bridge.mapping.loader import family_of
 from bridge.mapping.process import MOST_WORDS

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from bridge.base.errors import Fault, FileFaults
 from bridge.config import MODULES
 from bridge.config.download import Download, parse_concise_dcf
 from bridge.eds.configuration import configuration
@@ -16,7 +17,6 @@ from bridge.eds.model import Description, Report, Severity
 from bridge.eds.modules import UnknownModule
 from bridge.eds.text import decode
 from bridge.eds.xdd import read_xdd
-from bridge.errors import Fault, FileFaults
 
 CONCISE_SUFFIXES: Final = (".cdcf", ".concise", ".bin")
 _MOST_BYTES: Final = 16 << 20

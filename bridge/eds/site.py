@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.base.errors import Fault, FileFaults
 from bridge.config import Site
 from bridge.config.download import Download
 from bridge.eds.load import read_configuration
-from bridge.errors import Fault, FileFaults
 from bridge.tomlfile import TomlFile, dotted
 
 

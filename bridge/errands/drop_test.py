@@ -18,8 +18,8 @@ from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
 from bridge.command import Drive, Event, Kind, Plant
+from bridge.command.node import Node
 from bridge.command.outputs import Outputs
-from bridge.command.plant import Node
 from bridge.drive import FAULTED, MOVING, DriveState, OwnJudgement
 from bridge.errands.errand import Errand
 from bridge.errands.muted_bus import MutableBus

@@ -6,11 +6,11 @@ from bridge.canopen import nmt
 from bridge.canopen.dialogue import Dialogue, Read, Write, ask
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoError
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.errands.errand import SdoErrands
 from bridge.node.boot import Action, BootError, BootResult, Nmt
 from bridge.node.boot.sdo_servers import open_sdo_servers
-from bridge.node.sdo_channels import FIRST, SdoChannels
+from bridge.node.places.sdo_channels import FIRST, SdoChannels
 
 _Failure = SdoError | BootError
 

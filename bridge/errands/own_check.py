@@ -7,15 +7,15 @@ from collections.abc import Generator, Mapping, Sequence
 from bridge.canopen import dialogue
 from bridge.canopen.dialogue import Dialogue, Read
 from bridge.canopen.sdo import SdoError
+from bridge.command.node import Node
 from bridge.command.outputs import Outputs
-from bridge.command.plant import Node
 from bridge.drive import OwnJudgement
 from bridge.drive.own_supervision import judge
 from bridge.errands.errand import SdoErrands
 from bridge.node.boot import BootError
 from bridge.node.boot.device_watch import keeps_outputs, read_why_not_safe
 from bridge.node.boot.own_supervision import read_places
-from bridge.node.sdo_channels import SdoChannels
+from bridge.node.places.sdo_channels import SdoChannels
 
 Judgements = dict[str, OwnJudgement]
 

@@ -9,7 +9,7 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.config import NodeTable
 from bridge.config.download import Download
-from bridge.mapping.aliases import aliases
+from bridge.mapping.alias_places import aliases
 from bridge.mapping.model import Family
 from bridge.tomlfile import Key
 

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Final, cast
+from typing import Annotated, Final, cast
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from bridge.mapping.fields import ObjectRef, Ref, Table
-from bridge.mapping.parameters import object_of
-
-if TYPE_CHECKING:
-    from bridge.mapping.model import Family
-
+from bridge.mapping.fields import Ref, Table
 
 COMMUNICATION: Final = range(0x1000, 0x2000)
 """The communication profile area (CiA 301 §7.5.1)."""
@@ -42,37 +35,3 @@ class Aliases(Table):
 
     same: dict[str, Targets] = Field(default_factory=dict[str, Targets])
     related: dict[str, Targets] = Field(default_factory=dict[str, Targets])
-
-
-@dataclass(frozen=True, slots=True)
-class Alias:
-    """``name`` is the parameter that the mapping file names, with "…" for one of its further elements;
-    ``ref`` is where it stands in the object dictionary."""
-
-    name: str
-    ref: ObjectRef
-    objects: tuple[ObjectRef, ...]
-    is_same: bool
-
-
-def aliases(family: Family) -> Iterator[Alias]:
-    """Every parameter, and every element of one, that stands for other objects.
-
-    Raises ValueError for a name that is no parameter of the family; the mapping's checks find that first.
-    """
-    for is_same, table in ((True, family.aliases.same), (False, family.aliases.related)):
-        for name, targets in table.items():
-            first = place_of(family, name)
-            for n, objects in enumerate(targets):
-                ref = ObjectRef(first.index, first.sub + n)
-                yield Alias(name if not n else f"{name} …", ref, tuple(objects), is_same)
-
-
-def place_of(family: Family, name: str) -> ObjectRef:
-    """Where the parameter stands that an alias names. Raises ValueError where it is none."""
-    for parameter in family.parameter:
-        if parameter.name == name and parameter.object is not None:
-            return parameter.object
-    if family.parameter_names is None:
-        raise ValueError("names of parameters need [parameter_names]")
-    return object_of(family.parameter_names, name)

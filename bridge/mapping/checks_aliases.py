@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from bridge.mapping.aliases import COMMUNICATION, aliases, place_of
+from bridge.mapping.alias_places import aliases, place_of
+from bridge.mapping.aliases import COMMUNICATION
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from bridge.errors import Fault, FileFaults
+from bridge.base.errors import Fault, FileFaults
 from bridge.mapping.checks import check
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family

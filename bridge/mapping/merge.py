@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, cast
 
-from bridge.errors import Fault, FileFaults
+from bridge.base.errors import Fault, FileFaults
 from bridge.tomlfile import Key, TomlFile
 from bridge.tomlfile.file import Model, dotted, validated
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final, cast
 
+from bridge.base.errors import Fault, FileFaults
 from bridge.config import MODULES, Site, mapping_key, read_site
-from bridge.errors import Fault, FileFaults
 from bridge.mapping.loader import (
     family_names,
     is_family,

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.base.ratelimit import RateLimit
 from bridge.can.interface import BusStatus
 from bridge.command import Event, Kind, Plant
 from bridge.config import BusTable
-from bridge.ratelimit import RateLimit
 
 _LOAD_PERIOD_S: Final = 1.0
 _ERRORS_EVERY_S: Final = 10.0

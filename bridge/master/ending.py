@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from bridge.command import Action, Drive, Plant
 from bridge.command.follow import LastStop
+from bridge.command.node import Enforce
 from bridge.command.outputs import Outputs
-from bridge.command.plant import Enforce
 from bridge.image import Quality
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
+from bridge.base.ratelimit import Pauses
 from bridge.canopen import cobid, nmt
 from bridge.canopen.decode_sdo import SdoListener
 from bridge.canopen.frame import Frame
@@ -23,7 +24,6 @@ from bridge.node.node import NodeCore
 from bridge.node.process.command_frames import Command, commands_of
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.wire import Handler
-from bridge.ratelimit import Pauses
 
 _AGAIN_S: Final = 10.0
 """How often an intruder that goes on is reported, with the number of frames since the last time."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.base.ratelimit import RateLimit
 from bridge.command import Event, Kind, Plant
 from bridge.command.worst_case import REACTION_BOUND_MS
-from bridge.ratelimit import RateLimit
 
 HANG_MS: Final = 100
 """From so long on the bus process counts as having been too slow to notice what went on."""

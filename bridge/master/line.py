@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Final
 
+from bridge.base.ratelimit import RateLimit
 from bridge.can.burstend import MOST_FRAMES, Burst, BurstEnd
 from bridge.can.interface import Bus, ControllerState
 from bridge.canopen import cobid
@@ -19,7 +20,6 @@ from bridge.master.network import Network
 from bridge.master.standstill import Alarm, StoodStill
 from bridge.node.node import NodeCore
 from bridge.node.process.process_data import Repetition, RunningBurst
-from bridge.ratelimit import RateLimit
 
 RENEWALS: Final = 3
 """How often a burst is renewed within its dead-man time."""

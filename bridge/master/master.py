@@ -13,11 +13,11 @@ import logging
 from collections.abc import Callable
 from functools import partial
 
+from bridge.base.errors import OperationFailed
+from bridge.base.guard import Guard
 from bridge.can import open_all
 from bridge.can.interface import Bus, ControllerState
 from bridge.command import Action, Event, Kind, Plant, Reply, Request
-from bridge.errors import OperationFailed
-from bridge.guard import Guard
 from bridge.master.ending import Ending, end, waits_for
 from bridge.master.lateness import Lateness
 from bridge.master.line import RENEWALS, Line

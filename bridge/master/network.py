@@ -16,7 +16,7 @@ from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sync import SyncWindow
 from bridge.canopen.time_stamp import TimeProducer
 from bridge.command import Action, Code, Event, Kind, Outcome, Plant, Reply, Request
-from bridge.command.request import NODE_ACTIONS
+from bridge.command.messages.request import NODE_ACTIONS
 from bridge.config import BusTable
 from bridge.config.download import Download
 from bridge.master.bus_points import BusPoints

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from bridge.base.ratelimit import Pauses
 from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import Frame
 from bridge.command import Event, Kind, Plant
-from bridge.ratelimit import Pauses
 
 _NODES: Final = range(1, 128)
 _FORGET_S: Final = 60.0

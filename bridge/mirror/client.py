@@ -11,15 +11,15 @@ from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
 
+from bridge.base.errors import OperationFailed
+from bridge.base.guard import Guard
+from bridge.base.quietlog import about
 from bridge.command import Code, Event, Identity, Outcome, Rejection, Reply, Request
-from bridge.errors import OperationFailed
-from bridge.guard import Guard
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import LEASE_MS
 from bridge.mirror.protocol import Answered, Changed, Connected, Counted, Delta, Malformed, Snapshot
 from bridge.mirror.rejections import Rejections
-from bridge.quietlog import about
 from bridge.zenohlink import Answer, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)

@@ -7,10 +7,10 @@ import stat
 from pathlib import Path
 from typing import Final
 
-from bridge.errors import Unavailable
+from bridge.base.errors import Unavailable
 
 LEASE_MS: Final = 10_000
-"""More than a front or the bus process may hang before it is killed (``bridge/front_process.py``,
+"""More than a front or the bus process may hang before it is killed (``bridge/service/front_process.py``,
 ``WatchdogSec``). Where zenoh ends the connection of one that only stood still, what was asked over it is
 lost, and its client waits for its time-out. Who hangs is noticed by the deltas and signs that do not come."""
 

@@ -12,8 +12,8 @@ from typing import Any, Final, TypeVar, cast
 import msgspec
 
 from bridge.command import Action, Do, Event, Identity, Outcome, Rejection, Request
+from bridge.command.messages.request import COMMANDS
 from bridge.command.points import CONNECTION_COUNTS
-from bridge.command.request import COMMANDS
 from bridge.image import Point, Quality, Value
 
 SNAPSHOT: Final = "mirror/snapshot"

@@ -10,10 +10,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
 
-from bridge.beat import LOOK_EVERY_S, next_before_look
+from bridge.base.beat import LOOK_EVERY_S, next_before_look
+from bridge.base.errors import Unavailable
 from bridge.command import Code, Event, Outcome, PlantView
-from bridge.command.freshness import NEVER, TAKEN_LATE
-from bridge.errors import Unavailable
+from bridge.command.messages.freshness import NEVER, TAKEN_LATE
 from bridge.image import Feed, Point
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import LEASE_MS, close_to_others, prepare_folder

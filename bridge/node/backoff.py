@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.ratelimit import Pauses
+from bridge.base.ratelimit import Pauses
 
 BETWEEN_BOOTS_S: Final = 0.2
 _FIRST_S: Final = 1.0

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from bridge.canopen.dialogue import Dialogue, ask
 from bridge.canopen.nmt import NmtState
 from bridge.canopen.sdo import Priority, Result, SdoError
 from bridge.node import boot
-from bridge.node.sdo_channels import SdoChannels
-
-if TYPE_CHECKING:
-    from bridge.node.node import NodeCore
+from bridge.node.error_control import ErrorControl
+from bridge.node.places.sdo_channels import SdoChannels
 
 _Dialogue = Dialogue[boot.Action, bytes | None, boot.BootResult, SdoError | boot.BootError]
 
@@ -24,11 +22,24 @@ class _Awaited:
     deadline: float
 
 
+class Booted(Protocol):
+    """The node that is booted."""
+
+    @property
+    def error_control(self) -> ErrorControl: ...
+
+    def may_start(self) -> bool: ...
+
+    def carry_out(self, action: boot.Action, now: float) -> None: ...
+
+    def boot_ended(self, result: boot.BootResult | boot.BootError, now: float) -> None: ...
+
+
 class Booting:
     """One boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
     channel's own bookkeeping."""
 
-    def __init__(self, node: NodeCore, make: Callable[[], boot.Boot], sdo: SdoChannels) -> None:
+    def __init__(self, node: Booted, make: Callable[[], boot.Boot], sdo: SdoChannels) -> None:
         self._node = node
         self._make = make
         self._sdo = sdo

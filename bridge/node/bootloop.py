@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-from bridge.ratelimit import Pauses
+from bridge.base.ratelimit import Pauses
 
 _MANY: Final = 4
 _WITHIN_S: Final = 20.0

@@ -9,7 +9,7 @@ from typing import Final
 from bridge.canopen import emcy
 from bridge.canopen.frame import Frame
 from bridge.command import Drive, Event, Kind, Plant
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.drive import EmergencyReader
 from bridge.node.emergency_log import EmergencyLog
 

@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final
 
+from bridge.base.ratelimit import RateLimit
 from bridge.canopen.emcy import Emergency
-from bridge.ratelimit import RateLimit
 
 _HISTORY: Final = 8
 """As many as 1003h of most devices."""

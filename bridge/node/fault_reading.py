@@ -13,11 +13,11 @@ from typing import Final
 
 from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
 from bridge.command import Drive
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.drive import FAULTED
 from bridge.mapping.model import FaultParameter, Parameter
 from bridge.node.boot import parameter_value
-from bridge.node.sdo_channels import SdoChannels, channel_of
+from bridge.node.places.sdo_channels import SdoChannels, channel_of
 
 _LOOK_S: Final = 0.5
 _AGAIN_S: Final = 1.0

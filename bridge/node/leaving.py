@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.command.worst_case import takeover_ms
 from bridge.node.boot import BootMemory
 from bridge.node.owed_stop import OwedStop

@@ -10,11 +10,11 @@ from typing import Final
 
 from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
 from bridge.command import Drive
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.drive import DriveState, Key, ParameterSet
 from bridge.mapping.model import Meaning, ObjectRef, Parameter
 from bridge.node.boot import code_of, deciding_of, meanings_of, parameter_value
-from bridge.node.sdo_channels import SdoChannels, channel_of
+from bridge.node.places.sdo_channels import SdoChannels, channel_of
 
 _EVERY_S: Final = 8.0
 """How old an answer is when it is asked for again: with the time that this takes a change is found within

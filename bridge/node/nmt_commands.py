@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
 
 from bridge.canopen.nmt import NmtCommand
 from bridge.command import Action, Code, Drive, Event, Kind, Outcome, Plant, Reply, Request, Role
 from bridge.command.link import NodeState
+from bridge.command.node import Node
 from bridge.command.outputs import Outputs
+from bridge.node.leaving import Leaving
 from bridge.node.put_off import CANCELS_WORDS
-
-if TYPE_CHECKING:
-    from bridge.node.node import NodeCore
+from bridge.node.wire import NodeWire
 
 NMT: Final = {
     Action.RESET: NmtCommand.RESET_NODE,
@@ -25,8 +25,40 @@ _AFTER_RESET_S: Final = 1.0
 """A node that resets is asked again after this time if its boot-up message was not heard."""
 
 
+class CommandedNode(Protocol):
+    """A node that commands come for."""
+
+    @property
+    def node(self) -> Node: ...
+
+    @property
+    def state(self) -> NodeState: ...
+
+    @property
+    def wire(self) -> NodeWire: ...
+
+    @property
+    def leaving(self) -> Leaving: ...
+
+    def leave_operation(self, now: float) -> None: ...
+
+    def boot_next(self, at: float | None) -> None: ...
+
+    def say(self, text: str, now: float) -> None: ...
+
+    def set_state(self, state: NodeState, now: float) -> None: ...
+
+    def stop_drives(self, now: float) -> None: ...
+
+    def was_told(self, command: NmtCommand) -> None: ...
+
+    def carry_out_command(
+        self, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+    ) -> None: ...
+
+
 def answer(
-    request: Request, name: str, nodes: Sequence[NodeCore], plant: Plant, now: float, reply: Reply
+    request: Request, name: str, nodes: Sequence[CommandedNode], plant: Plant, now: float, reply: Reply
 ) -> bool:
     """A request for these nodes, ``name`` in the log; True where it was carried out and one frame is to be
     sent to them all.
@@ -70,7 +102,7 @@ def refusal(request: Request, commanded: Sequence[Drive | Outputs]) -> str | Non
 
 
 def carry_out(
-    node: NodeCore, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+    node: CommandedNode, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
 ) -> None:
     """Do what ``action`` asks of a node. ``send`` is false where one frame tells all nodes; ``at_once``: its
     drives have had their stopped words for long."""
@@ -87,7 +119,9 @@ def carry_out(
         node.boot_next(now)
 
 
-def _nmt(node: NodeCore, command: NmtCommand, who: str, now: float, *, send: bool, at_once: bool) -> None:
+def _nmt(
+    node: CommandedNode, command: NmtCommand, who: str, now: float, *, send: bool, at_once: bool
+) -> None:
     """NMT on a node that is switched off goes on the bus and changes nothing here."""
     if command is NmtCommand.START and node.state is not NodeState.OPERATIONAL:
         # It is booted first, and started at the end of that: an unchecked node gets no process data.

@@ -9,7 +9,7 @@ from typing import Final
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.command import Action, Plant
 from bridge.command.link import NodeState
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.config.download import Download
 from bridge.node import boot
 from bridge.node import nmt_commands as node_commands
@@ -19,9 +19,9 @@ from bridge.node.error_control import Sign
 from bridge.node.leaving import Leaving
 from bridge.node.neighbours import Neighbours
 from bridge.node.parameters.service import NodeParameters
+from bridge.node.places.sdo_channels import SdoChannels
 from bridge.node.process.stop_words import StopWords
 from bridge.node.put_off import CANCELS_WORDS
-from bridge.node.sdo_channels import SdoChannels
 from bridge.node.view import NodeView
 from bridge.node.wire import Listener, NodeWire
 

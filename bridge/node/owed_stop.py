@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from bridge.command.drive import Drive
 from bridge.command.follow import LastStop
+from bridge.command.node import Node
 from bridge.command.outputs import Outputs
-from bridge.command.plant import Node
 
 
 class OwedStop:

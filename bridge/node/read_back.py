@@ -13,7 +13,7 @@ from bridge.canopen import abort, width
 from bridge.canopen.sdo import Result, SdoError
 from bridge.command.output_following import Answer, Question, StoppedOutput
 from bridge.command.outputs import Outputs
-from bridge.node.sdo_channels import FIRST, SdoChannels
+from bridge.node.places.sdo_channels import FIRST, SdoChannels
 
 _EXPEDITED: Final = 4
 """Some servers answer every read of a number with so many bytes. Any other length is another object."""

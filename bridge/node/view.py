@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from bridge.canopen.nmt import NmtState
 from bridge.command import Event, Identification, Kind, Plant
 from bridge.command.link import NodeState
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.node.backoff import BackOff
 from bridge.node.boot import BootError
 from bridge.node.bootloop import BootLoop

@@ -13,13 +13,14 @@ from bridge.canopen.habits import HabitCounter, Odd
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoChannel
 from bridge.command import Drive, Event, Kind, Plant
+from bridge.command.node import Node
 from bridge.command.outputs import Outputs
-from bridge.command.plant import Node
 from bridge.node import boot
 from bridge.node.emergencies import Emergencies
 from bridge.node.error_control import ErrorControl, Sign
 from bridge.node.fault_reading import FaultReading
 from bridge.node.meaning_watch import MeaningWatch
+from bridge.node.places.sdo_channels import SdoChannels
 from bridge.node.process.inputs import connect_inputs
 from bridge.node.process.outputs import OutputPdos, connect_outputs
 from bridge.node.process.polling import Polling
@@ -28,7 +29,6 @@ from bridge.node.process.stop_words import StopWords
 from bridge.node.process.tpdo import node_tpdos
 from bridge.node.put_off import PutOff
 from bridge.node.read_back import ReadBack
-from bridge.node.sdo_channels import SdoChannels
 
 Handler = Callable[[Frame], None]
 _SDO_BYTES: Final = 8

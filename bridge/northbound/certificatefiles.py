@@ -12,7 +12,7 @@ from typing import Final
 
 from cryptography import x509
 
-from bridge.errors import Fault, FileFaults
+from bridge.base.errors import Fault, FileFaults
 from bridge.tomlfile.lines import key_lines
 
 _log = logging.getLogger(__name__)

@@ -10,8 +10,8 @@ import os
 import socket
 from typing import Any, Final
 
-from bridge.errors import OperationFailed, Unavailable, is_exhausted
-from bridge.quietlog import about
+from bridge.base.errors import OperationFailed, Unavailable, is_exhausted
+from bridge.base.quietlog import about
 
 _log = logging.getLogger(__name__)
 

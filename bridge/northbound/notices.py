@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import Final, Protocol
 
-from bridge.quietlog import about
+from bridge.base.quietlog import about
 
 _LONGEST: Final = 200
 

@@ -9,8 +9,8 @@ from typing import Final
 from argon2 import PasswordHasher, extract_parameters
 from argon2.exceptions import InvalidHashError, VerificationError
 
+from bridge.base.errors import Fault, FileFaults
 from bridge.config import UserTable
-from bridge.errors import Fault, FileFaults
 
 ANONYMOUS: Final = "anonymous"
 _HASHER = PasswordHasher()

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from bridge.command.freshness import HANG_MS, Look
+from bridge.command.messages.freshness import HANG_MS, Look
 
 PERIOD_S: Final = 0.01
 

@@ -4,7 +4,6 @@ them wears out, and backups of them. No bus in here."""
 from bridge.mapping.model import ObjectRef as ObjectRef
 from bridge.parameter.access import DriveParameters as DriveParameters
 from bridge.parameter.access import Reading as Reading
-from bridge.parameter.access import Transfer as Transfer
 from bridge.parameter.access import Written as Written
 from bridge.parameter.definition import Entry as Entry
 from bridge.parameter.error import ParameterError as ParameterError
@@ -13,3 +12,4 @@ from bridge.parameter.error import Why as Why
 from bridge.parameter.ledger import Ledger as Ledger
 from bridge.parameter.names import AxisNames as AxisNames
 from bridge.parameter.names import Names as Names
+from bridge.parameter.transfer import Transfer as Transfer

@@ -6,7 +6,7 @@ carries them out on the SDO channel of the drive (``node.parameters``, or the co
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,6 +19,7 @@ from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.ledger import Key, Ledger
 from bridge.parameter.names import Names
 from bridge.parameter.protection import Gate
+from bridge.parameter.transfer import Transfer
 
 FRESH_S: Final = 1.0
 """A value that was read this long ago is what the drive holds: it is not read again before a write."""
@@ -26,17 +27,6 @@ _RAM_ONLY_FRESH_S: Final = 10.0
 _SAVE: Final = b"save"
 MISSING: Final = (abort.NO_OBJECT, abort.NO_SUB)
 """Abort codes: no such object, no such sub-index."""
-
-
-@dataclass(frozen=True, slots=True)
-class Transfer:
-    """Read an object (``data`` None) or write it. ``of_node``: over the node's first SDO channel. A write is
-    not begun where ``why_not``, asked at that moment, has a reason."""
-
-    address: ObjectRef
-    data: bytes | None = None
-    of_node: bool = False
-    why_not: Callable[[], str] | None = None
 
 
 @dataclass(frozen=True, slots=True)

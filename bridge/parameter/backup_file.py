@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, cast
 
-from bridge.errors import Fault
+from bridge.base.errors import Fault
 from bridge.image import Value
 from bridge.tomlfile import TomlFile, dotted
 

@@ -15,7 +15,7 @@ from typing import Final
 from bridge.canopen import abort
 from bridge.image import Value
 from bridge.mapping.model import ObjectRef
-from bridge.parameter.access import MISSING, DriveParameters, Transfer, Written
+from bridge.parameter.access import MISSING, DriveParameters, Written
 from bridge.parameter.backup_file import IDENTITY
 from bridge.parameter.codec import encode_value
 from bridge.parameter.definition import Entry
@@ -23,6 +23,7 @@ from bridge.parameter.effect import Effect
 from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.names import Names
 from bridge.parameter.protection import Gate
+from bridge.parameter.transfer import Transfer
 
 _MOVING: Final = (Effect.COMMANDS, Effect.MAY_MOVE)
 _NO_VALUE: Final = "is neither a number nor a text"

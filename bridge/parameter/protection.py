@@ -9,25 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from bridge.mapping.aliases import COMMUNICATION, Alias, aliases
+from bridge.mapping.alias_places import Alias, aliases
+from bridge.mapping.aliases import COMMUNICATION
 from bridge.mapping.model import Family, ObjectRef, Parameter
 from bridge.mapping.own_places import places
 from bridge.mapping.parameters import indices
 from bridge.parameter.definition import Entry
 from bridge.parameter.effect import Effect, Verdict, judge
 from bridge.parameter.profiles import effect_of
-
-if TYPE_CHECKING:
-    from bridge.parameter.access import Transfer
+from bridge.parameter.transfer import Transfer
 
 _PROFILE: Final = 0xFFFF
 """The bits of 1000h that are the number of the profile (CiA 301 §7.5.2.1)."""
 _CIA_402: Final = 402
 _ORDER: Final = tuple(Effect)
 
-Asks = Callable[[Iterable[Entry]], "Generator[Transfer, tuple[bytes, float], None]"]
+Asks = Callable[[Iterable[Entry]], Generator[Transfer, tuple[bytes, float], None]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bridge.errors import Fault, FileFaults
+from bridge.base.errors import Fault, FileFaults
 from bridge.parameter import backups
 from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.factory import DESCRIPTIONS, factory

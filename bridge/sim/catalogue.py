@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
+from bridge.base.errors import OperationFailed
 from bridge.canopen.datatypes import REALS
 from bridge.eds import Description
-from bridge.errors import OperationFailed
 from bridge.mapping import Family, load_family
 from bridge.sim.adopted import adopt
 from bridge.sim.device import SimulatedDevice

@@ -12,9 +12,9 @@ from typing import Final, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from bridge.base.errors import OperationFailed
 from bridge.config.fields import RegularExpression
 from bridge.config.model import Table
-from bridge.errors import OperationFailed
 from bridge.tomlfile import TomlFile
 
 FrameKind = Literal["request", "answer", "error_control", "emcy", "tpdo"]

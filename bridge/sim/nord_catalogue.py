@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 from bridge.sim.device import SimulatedDevice
 from bridge.sim.nord_drive import NordDrive
 from bridge.sim.nord_interface import Kind

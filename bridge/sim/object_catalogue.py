@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 from bridge.sim.abort import SdoAbort
 from bridge.sim.cia402_drive import Cia402Drive
 from bridge.sim.dictionary import Dictionary, Number

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 from bridge.sim.stoeber_5000 import Stoeber5000
 
 _AXES: Final = 4

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
 
-from bridge.errors import Fault, FileFaults
+from bridge.base.errors import Fault, FileFaults
 from bridge.tomlfile.lines import Key, key_lines
 from bridge.tomlfile.messages import explain
 

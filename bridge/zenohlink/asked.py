@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import zenoh
 
@@ -15,8 +15,13 @@ from bridge.zenohlink.lane import Lane
 from bridge.zenohlink.message import Message
 from bridge.zenohlink.worker import ZENOH_ERRORS
 
-if TYPE_CHECKING:
-    from bridge.zenohlink.link import ZenohLink
+
+class Lanes(Protocol):
+    """Threads on which answers go out."""
+
+    def own_lane(self, like: Lane) -> Lane: ...
+
+    async def settle(self, lane: Lane | None = None) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +41,7 @@ class Asked:
     source: str
     """Id of the client's zenoh session, where the client gives it; not proved."""
     _query: zenoh.Query
-    _link: ZenohLink
+    _link: Lanes
     _lane: Lane
     _is_apart: bool = False
 

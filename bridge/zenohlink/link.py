@@ -14,7 +14,7 @@ from typing import Final, TypeVar, cast
 
 import zenoh
 
-from bridge.errors import OperationFailed, Unavailable
+from bridge.base.errors import OperationFailed, Unavailable
 from bridge.zenohlink.asked import Asked
 from bridge.zenohlink.lane import LIMIT, Job, Lane
 from bridge.zenohlink.message import Answer, Message, sentence

@@ -11,7 +11,7 @@ from typing import Final
 
 import zenoh
 
-from bridge.errors import Unavailable
+from bridge.base.errors import Unavailable
 from bridge.zenohlink.message import sentence
 
 LEASE_MS: Final = 1000

@@ -20,7 +20,7 @@ from typing import Final, Protocol, TypeVarTuple
 
 import zenoh
 
-from bridge.ratelimit import Pauses
+from bridge.base.ratelimit import Pauses
 from bridge.zenohlink.lane import Job, Lane
 from bridge.zenohlink.message import sentence
 from bridge.zenohlink.sockets import Connections

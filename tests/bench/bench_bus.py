@@ -13,8 +13,8 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.command.link import NodeState
 from bridge.node.boot import PdoPlan
+from bridge.node.places.words import Place
 from bridge.node.process.process_data import DrivePdos
-from bridge.node.process.words import Place
 from tests.bench.figures import cpu_us, milliseconds, show
 from tests.peers.foreign_slave import variable
 from tests.support.bench import Bench, write_site

@@ -15,12 +15,12 @@ from collections.abc import AsyncIterator, Callable
 
 import pytest
 
+from bridge.base.errors import Unavailable
 from bridge.can import netlink
 from bridge.can.burstend import Burst
 from bridge.can.interface import ControllerState
 from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.frame import ERROR, Frame
-from bridge.errors import Unavailable
 from tests.support.sniffer import Sniffer, sniffing
 
 LIMIT_S = 15.0

@@ -12,8 +12,8 @@ import can
 
 from bridge.can.listener import SocketCanListener
 from bridge.canopen.frame import REMOTE, Frame
-from bridge.page_buses import Buses
 from bridge.project import load_project
+from bridge.service.page.buses import Buses
 from tests.support import sites
 
 _CAN_FRAME = struct.Struct("=IB3x8s")

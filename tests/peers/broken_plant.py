@@ -18,7 +18,7 @@ from bridge.cli import logs
 from bridge.cli.simulation import simulated_nodes
 from bridge.config import BusTable
 from bridge.project import load_project
-from bridge.service import Service
+from bridge.service.bus_process import Service
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
 

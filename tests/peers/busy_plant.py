@@ -13,7 +13,7 @@ import sys
 import time
 from pathlib import Path
 
-from bridge import clock
+from bridge.base import clock
 from bridge.can.virtual import VirtualWire
 from bridge.cli import logs
 from bridge.command import Plant
@@ -21,7 +21,7 @@ from bridge.image import DataType
 from bridge.northbound.page.describe import layout_of
 from bridge.northbound.page.topics import topics_of
 from bridge.project import load_project
-from bridge.service import Service
+from bridge.service.bus_process import Service
 
 LIVE = 500
 SLOW_HZ, FAST_HZ = 5, 20

@@ -17,7 +17,7 @@ from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.mapping import Family, load_family
 from bridge.project import load_project
-from bridge.service import Service
+from bridge.service.bus_process import Service
 from bridge.sim.catalogue import simulate_node
 from bridge.sim.cia402_drive import Cia402Drive
 from bridge.sim.device import SimulatedDevice

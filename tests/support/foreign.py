@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bridge.base.errors import BridgeError
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import Result as SdoResult
 from bridge.canopen.sdo import SdoChannel
 from bridge.canopen.sdo_transfer import SdoError
 from bridge.derive.axes import axes_of
 from bridge.eds import Description, Entry, read_whole_device_file
-from bridge.errors import BridgeError
 from bridge.image import Quality
 from bridge.sim.generic_eds import plan_of_description
 from bridge.sim.generic_node import GenericNode

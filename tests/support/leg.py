@@ -11,8 +11,8 @@ from bridge.command.leg.outlook import next_deadline
 from bridge.command.leg.settings import LegSettings, leg_settings
 from bridge.command.leg.state import WANTS_STOP_WORD, Way
 from bridge.command.leg.step import initial, step
-from bridge.command.life_sign import LifeSign
-from bridge.command.telegram import TelegramDecoder
+from bridge.command.messages.life_sign import LifeSign
+from bridge.command.messages.telegram import TelegramDecoder
 from bridge.config import DriveTable
 from bridge.drive import DriveState, Meanings
 from bridge.image import Value

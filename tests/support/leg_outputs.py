@@ -11,9 +11,9 @@ from bridge.command import Action, Do, Outcome, Request, Write
 from bridge.command.leg.event import BridgeGap, Event, StartAnew, Time
 from bridge.command.leg.state import LegState
 from bridge.command.link import NodeState
+from bridge.command.messages.request import STOP_ACTIONS
 from bridge.command.output_words import OutputWords
 from bridge.command.outputs import OutputChannel
-from bridge.command.request import STOP_ACTIONS
 from bridge.config import OutputsTable, SafeValue
 from bridge.image import Value
 from bridge.mapping.device import Output

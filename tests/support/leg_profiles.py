@@ -11,7 +11,7 @@ from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import Stage, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.leg.table import Stimulus
-from bridge.command.telegram import TelegramDecoder
+from bridge.command.messages.telegram import TelegramDecoder
 from bridge.config import DriveTable
 from bridge.drive import DriveState, Meanings
 from bridge.mapping import load_family

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from bridge.command import Action, Do, Identity, Request, SetTimeout, Start, TakeControl, Write
-from bridge.command.life_sign import LifeSign
+from bridge.command.messages.life_sign import LifeSign
 from bridge.image import Value
 from tests.support import rig
 from tests.support.leg_seen import Rules

@@ -39,7 +39,7 @@ from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import LegState, Stage, Way
 from bridge.command.leg.step import step
 from bridge.command.leg.table import Cell, Stimulus
-from bridge.command.request import STOP_ACTIONS
+from bridge.command.messages.request import STOP_ACTIONS
 from bridge.drive import DriveState
 from tests.support.leg_deeds import HOLDS, Done
 from tests.support.leg_forget import Forgetting

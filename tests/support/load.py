@@ -14,7 +14,7 @@ from bridge.can.virtual import VirtualBus, VirtualWire
 from bridge.canopen.frame import Frame
 from bridge.command import Identity, Kind, Request, Source, Write
 from bridge.project import load_project
-from bridge.service import Service
+from bridge.service.bus_process import Service
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
 from tests.support import sites

@@ -12,7 +12,7 @@ from asyncua import Client, ua
 
 from bridge.command import Identification, Outcome, Plant, PlantView, Rejection, Request, Role
 from bridge.command.link import NodeState
-from bridge.command.request import DONE, NODE_ACTIONS, Code, Reply
+from bridge.command.messages.request import DONE, NODE_ACTIONS, Code, Reply
 from bridge.config import OpcUaTable
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support import sites

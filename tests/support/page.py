@@ -17,7 +17,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.frames import Frame, Opcode
 
 from bridge.command import Event, Outcome, Plant, Reply, Request
-from bridge.command.request import DONE
+from bridge.command.messages.request import DONE
 from bridge.config import Site
 from bridge.mapping import Family
 from bridge.northbound.listening import listen

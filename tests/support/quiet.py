@@ -7,8 +7,8 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from bridge.quietlog import QuietHandler
-from bridge.ratelimit import PAUSE_S
+from bridge.base.quietlog import QuietHandler
+from bridge.base.ratelimit import PAUSE_S
 
 
 class QuietLog:

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from bridge.base.errors import Unavailable
 from bridge.can import open_all
 from bridge.cli.app import make_app
-from bridge.errors import Unavailable
 from bridge.master.master import Master
 from bridge.witness import shell
 from tests.support import sites

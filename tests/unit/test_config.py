@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.config import Site, load_site
-from bridge.errors import FileFaults
 from bridge.mapping.site import load_site_and_families
 
 CONTRACT = """

@@ -14,7 +14,7 @@ import pytest
 from bridge.cli.signals import ENDING
 from bridge.lint import lint
 from bridge.project import load_project
-from bridge.service import _START_S
+from bridge.service.bus_process import _START_S
 
 ROOT = Path(__file__).parents[2]
 UNIT = ROOT / "systemd" / "drivebridge.service"

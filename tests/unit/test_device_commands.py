@@ -11,13 +11,13 @@ import cantools
 import pytest
 from typer.testing import CliRunner
 
+from bridge.base.errors import FileFaults
 from bridge.canopen.frame import Frame
 from bridge.cli.app import make_app
 from bridge.cli.parameter_drive import find
 from bridge.errands.bystander import Bystander, Standstill
 from bridge.errands.decode import Decoder
 from bridge.errands.parameter import ParameterErrand
-from bridge.errors import FileFaults
 from bridge.lint import family_dictionaries
 from bridge.parameter import Names, Reading
 from bridge.project import load_project

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from bridge.base.errors import Fault, FileFaults, OperationFailed
 from bridge.cli.app import make_app
 from bridge.cli.simulation import simulated_nodes
-from bridge.errors import Fault, FileFaults, OperationFailed
 from bridge.project import load_project
 from bridge.sim.cia402_drive import Cia402Drive
 from bridge.sim.generic_node import GenericNode

@@ -8,10 +8,10 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from bridge.base.errors import OperationFailed
 from bridge.cli.app import make_app
 from bridge.cli.faults import matching
 from bridge.drive.fault_words import Language
-from bridge.errors import OperationFailed
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names
 

@@ -12,21 +12,21 @@ from typing import Final, cast
 
 import pytest
 
+from bridge.base.notify import Notifier
+from bridge.base.quietlog import A_FEW
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Plant, Rejection, Request, Source, command_of
 from bridge.command.link import NodeState
 from bridge.config import ModbusTable, ZenohTable
-from bridge.eventlog import log_event
 from bridge.mirror.client import MirrorClient
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.session import Session
 from bridge.northbound.modbus.units import units_of
 from bridge.northbound.sources import source_of
 from bridge.northbound.zenoh.session import ZenohServer
-from bridge.notify import Notifier
-from bridge.parts import Parts
-from bridge.quietlog import A_FEW
+from bridge.service.event_log import log_event
+from bridge.service.parts import Parts
 from bridge.zenohlink import Message, zenoh_config
 from bridge.zenohlink.worker import Worker
 from tests.support import sites
@@ -369,7 +369,7 @@ async def test_a_part_that_fails_again_and_again(log: QuietLog, monkeypatch: pyt
         if not left:
             raise asyncio.CancelledError
 
-    monkeypatch.setattr("bridge.parts.asyncio.sleep", sleep)
+    monkeypatch.setattr("bridge.service.parts.asyncio.sleep", sleep)
     with pytest.raises(asyncio.CancelledError):
         await parts.keep(_Broken())
     assert sum("Traceback" in line for line in log.lines) == 1

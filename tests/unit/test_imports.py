@@ -14,7 +14,7 @@ from tests.support.process import REPOSITORY
 
 DEMO_SITE = REPOSITORY / "bridge" / "demo" / "site.toml"
 _OTHERS = (
-    "bridge.service",
+    "bridge.service.bus_process",
     "bridge.sim",
     "bridge.master",
     "bridge.node",
@@ -26,7 +26,9 @@ _OTHERS = (
 )
 
 
-@pytest.mark.parametrize(("word", "imported"), [("version", ""), ("run", "import bridge.opcua_front; ")])
+@pytest.mark.parametrize(
+    ("word", "imported"), [("version", ""), ("run", "import bridge.service.opcua_front; ")]
+)
 def test_a_command_does_not_import_the_others(word: str, imported: str) -> None:
     script = (
         f"import sys; from bridge.cli.app import make_app; make_app({word!r}); {imported}print(*sys.modules)"

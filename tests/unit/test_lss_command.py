@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from bridge.base.errors import OperationFailed
 from bridge.cli import lss
 from bridge.cli.app import make_app
-from bridge.errors import OperationFailed
 from tests.support.lss_slave import LssSlave
 from tests.unit.canopen.test_lss import NORD, OTHER, LssBus
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.cli.simulation import simulated_nodes
-from bridge.errors import FileFaults
 from bridge.project import Project, load_project
 from tests.support import sites
 from tests.support.bench import Bench

@@ -99,13 +99,13 @@ def test_of_a_file_that_only_an_import_runs_those_are_asked_that_run_its_folder(
 
 
 def test_what_no_test_notices_is_told_and_the_rest_is_not():
-    options = ("--jobs", "1", "--tests", "tests/unit/command/test_event.py")
-    files = ("bridge/command/event.py", "bridge/canopen/abort.py")
+    options = ("--jobs", "1", "--tests", "tests/unit/command/messages/test_event.py")
+    files = ("bridge/command/messages/event.py", "bridge/canopen/abort.py")
     command = (sys.executable, "-m", "tools.mutants", *options, *files)
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     head, *told, of_event, of_abort, _ = done.stdout.splitlines()
     assert head.startswith(f"{len(told) + 4} mutants, ")
-    assert of_event == "bridge/command/event.py: 0 of 4 were not noticed"
+    assert of_event == "bridge/command/messages/event.py: 0 of 4 were not noticed"
     assert of_abort == f"bridge/canopen/abort.py: {len(told)} of {len(told)} were not noticed"
     assert all(line.startswith("bridge/canopen/abort.py:") for line in told)

@@ -9,8 +9,8 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
+from bridge.base.errors import FileFaults
 from bridge.cli.app import make_app
-from bridge.errors import FileFaults
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.parameter import Names, ObjectRef

@@ -15,8 +15,8 @@ from bridge.cli.app import make_app
 from bridge.command import Kind, Plant
 from bridge.command.leg.state import WATCHDOG_STATES, Stage
 from bridge.command.leg.table import TABLE
+from bridge.command.messages.request import Code
 from bridge.command.points import CONTROLLER_STATES, NMT_STATES, NODE_STATES
-from bridge.command.request import Code
 from bridge.config import Reaction, Site
 from bridge.drive import DRIVE_STATES
 from bridge.image import Point, Quality

@@ -11,11 +11,11 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
+from bridge.base.errors import OperationFailed, Unavailable
 from bridge.can.cansockets import CanSockets
 from bridge.can.netlink import Link
 from bridge.canopen.frame import Frame
 from bridge.cli.app import make_app
-from bridge.errors import OperationFailed, Unavailable
 from tests.support.bench import ClockBus
 
 BUS = ["--interface", "socketcan", "--channel", "can7"]

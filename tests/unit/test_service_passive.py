@@ -10,7 +10,7 @@ import pytest
 
 from bridge.can.virtual import VirtualWire
 from bridge.project import load_project
-from bridge.service import Service
+from bridge.service.bus_process import Service
 from tests.support import sites
 
 

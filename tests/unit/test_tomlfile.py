@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict, Field
 
+from bridge.base.errors import FileFaults
 from bridge.config import load_site
-from bridge.errors import FileFaults
 from bridge.mapping import read_family
 from bridge.tomlfile import Key, TomlFile
 from bridge.tomlfile.lines import key_lines

@@ -18,10 +18,10 @@ from pathlib import Path
 import pytest
 from pymodbus.client import ModbusTcpClient
 
-from bridge import front_process, parts
-from bridge.errors import OperationFailed
-from bridge.front_process import Front, give_signs
-from bridge.notify import Notifier
+from bridge.base.errors import OperationFailed
+from bridge.base.notify import Notifier
+from bridge.service.bus_process import front_process, parts
+from bridge.service.front_process import Front, give_signs
 from tests.support import sites
 from tests.support.process import REPOSITORY, Process, drivebridge, running, until
 from tests.support.zenoh_peer import until as until_in_loop
@@ -124,7 +124,11 @@ async def test_a_front_that_grows_too_large_is_killed(monkeypatch: pytest.Monkey
 
 
 def as_front(script: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", f"from bridge.front_process import become_front, limit_memory; {script}"]
+    command = [
+        sys.executable,
+        "-c",
+        f"from bridge.service.front_process import become_front, limit_memory; {script}",
+    ]
     return subprocess.run(command, capture_output=True, text=True, check=False, cwd=REPOSITORY)
 
 

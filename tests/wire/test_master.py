@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 from tests.support.load import SYNC_PERIOD_S, loaded
 
 DEADMAN_S = 0.5

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from bridge.base.errors import Unavailable
 from bridge.command import (
     Action,
     Code,
@@ -36,7 +37,6 @@ from bridge.command import (
     Write,
 )
 from bridge.command.link import NodeState
-from bridge.errors import Unavailable
 from bridge.image import Image, Quality, Value
 from bridge.mirror import MirrorClient, MirrorPublisher, PointsChanged, protocol, socket_endpoint
 from bridge.mirror import client as mirror_client

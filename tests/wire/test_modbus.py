@@ -18,16 +18,16 @@ from typing import Any
 import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
-from bridge.auditlog import AuditLog
+from bridge.base.errors import Unavailable
 from bridge.command import Code, Identification, Outcome, Plant, PlantView, Reply, Request
 from bridge.command.link import FurtherTpdo, NodeState
 from bridge.config import ModbusTable
 from bridge.config.model import AuditTable
-from bridge.errors import Unavailable
 from bridge.northbound.modbus import session
 from bridge.northbound.modbus.registers import DriveMap
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
+from bridge.service.audit_log import AuditLog
 from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED, float_words, make_plant
 from tests.support.views import view_of

@@ -7,12 +7,12 @@ import time
 from pathlib import Path
 
 import pytest
+from bridge.service.bus_process.page import buses as page_buses
 
-from bridge import page_buses
 from bridge.canopen.frame import Frame
 from bridge.northbound.page.bus import Captured, IsGone
-from bridge.page_buses import Buses
 from bridge.project import load_project
+from bridge.service.page.buses import Buses
 from tests.support.page import Served, message, until
 
 DEMO = Path("bridge/demo/site.toml")

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import Unavailable
 from bridge.can.virtual import VirtualWire
 from bridge.command import Event, Kind
-from bridge.errors import Unavailable
-from bridge.front_process import FRONTS
-from bridge.parts import Ports
 from bridge.project import load_project
-from bridge.service import Service
+from bridge.service.bus_process import Service
+from bridge.service.front_process import FRONTS
+from bridge.service.parts import Ports
 from tests.support import sites
 from tests.support.process import free_port
 

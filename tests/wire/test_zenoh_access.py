@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import Unavailable
 from bridge.config import ZenohTable
-from bridge.errors import Unavailable
 from bridge.northbound.zenoh import ZenohServer
 from tests.support.views import view_of
 from tests.support.zenoh_peer import free_port

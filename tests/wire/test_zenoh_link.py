@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import OperationFailed, Unavailable
 from bridge.can.virtual import VirtualWire
-from bridge.errors import OperationFailed, Unavailable
 from bridge.mirror import protocol
 from bridge.project import load_project
-from bridge.service import Service
+from bridge.service.bus_process import Service
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 from bridge.zenohlink import link as link_module
 from bridge.zenohlink.publishers import Publishers

@@ -1,13 +1,13 @@
 """Telegrams of a drive with ``life_sign = true`` count for as long as the newest token that its owner has
-brought back: from when that was offered first, for the time-out (``bridge.command.life_sign``)."""
+brought back: from when that was offered first, for the time-out (``bridge.command.messages.life_sign``)."""
 
 from __future__ import annotations
 
 from typing import Final
 
 from bridge.command.leg.turn import Turn
-from bridge.command.request import Action, Code, Identity, Request
-from bridge.command.telegram import Refusal
+from bridge.command.messages.request import Action, Code, Identity, Request
+from bridge.command.messages.telegram import Refusal
 from bridge.image import Value
 
 _MISSING: Final = "the life sign is missing or too old: write supervision/life_sign to command/life_sign"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bridge.command.event import Kind
-from bridge.command.request import Identity, Outcome
+from bridge.command.messages.event import Kind
+from bridge.command.messages.request import Identity, Outcome
 
 
 @dataclass(frozen=True, slots=True)

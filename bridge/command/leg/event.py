@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bridge.command.leg.state import Way
-from bridge.command.request import Identity, Request
+from bridge.command.messages.request import Identity, Request
 from bridge.drive import DriveState
 
 

@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import Output, Way
-from bridge.command.request import Code, Outcome
+from bridge.command.messages.request import Code, Outcome
 
 SILENT: Final = "nothing is sent, so that the drive's own supervision stops it"
 SENT_BEFORE: Final = (

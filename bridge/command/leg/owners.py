@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.command.event import Kind
-from bridge.command.freshness import arrival_of
 from bridge.command.leg.event import Connection
 from bridge.command.leg.state import Owner, Timer
 from bridge.command.leg.turn import Turn
-from bridge.command.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Request, Role
-from bridge.command.telegram import Refusal
+from bridge.command.messages.event import Kind
+from bridge.command.messages.freshness import arrival_of
+from bridge.command.messages.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Request, Role
+from bridge.command.messages.telegram import Refusal
 
 _LEASE_MS: Final = (100, 600_000)
 GONE_S: Final = 10.0

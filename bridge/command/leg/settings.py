@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from bridge.command.life_sign import LifeSign
-from bridge.command.telegram import Telegram
+from bridge.command.messages.life_sign import LifeSign
+from bridge.command.messages.telegram import Telegram
 from bridge.config import IGNORE_ALL_S, DriveTable, Reaction
 from bridge.drive import ControlWords, ValueCodec
 from bridge.image import Value

@@ -9,7 +9,7 @@ from bridge.command.leg.event import Report
 from bridge.command.leg.state import AWAITS_REPORT, MAY_FOLLOW_LATE, UNHEARD, Stage, Start
 from bridge.command.leg.table import Deed, Stimulus
 from bridge.command.leg.turn import Turn
-from bridge.command.request import DONE, Code, Outcome
+from bridge.command.messages.request import DONE, Code, Outcome
 from bridge.drive import FAULTED, DriveState
 
 _LIMIT_S: Final = 3.0

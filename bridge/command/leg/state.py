@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum, StrEnum
 from typing import Final, NamedTuple
 
-from bridge.command.request import Identity
+from bridge.command.messages.request import Identity
 from bridge.drive import DriveState
 
 

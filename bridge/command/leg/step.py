@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from bridge.command.event import Kind
-from bridge.command.freshness import TAKEN_LATE, arrival_of, is_stale, limit_ms_of
 from bridge.command.leg import alive, order, owners, start
 from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.event import (
@@ -34,8 +32,10 @@ from bridge.command.leg.state import (
 )
 from bridge.command.leg.table import Deed, Stimulus
 from bridge.command.leg.turn import Turn, control_word
-from bridge.command.life_sign import LEAF
-from bridge.command.request import (
+from bridge.command.messages.event import Kind
+from bridge.command.messages.freshness import TAKEN_LATE, arrival_of, is_stale, limit_ms_of
+from bridge.command.messages.life_sign import LEAF
+from bridge.command.messages.request import (
     DONE,
     Action,
     Code,
@@ -47,7 +47,7 @@ from bridge.command.request import (
     TakeControl,
     Write,
 )
-from bridge.command.telegram import Refusal
+from bridge.command.messages.telegram import Refusal
 from bridge.drive import FAULTED
 from bridge.image import Value
 

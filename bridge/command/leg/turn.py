@@ -5,7 +5,6 @@ from __future__ import annotations
 from operator import attrgetter
 from typing import Final
 
-from bridge.command.event import Kind
 from bridge.command.leg import order
 from bridge.command.leg.effect import Effect, Heard, Ignored, LetGo, StartEnded, Tell, Tripped
 from bridge.command.leg.forwarded import Asked
@@ -26,7 +25,8 @@ from bridge.command.leg.state import (
     Trip,
 )
 from bridge.command.leg.table import TABLE, Deed, Stimulus
-from bridge.command.request import Code, Outcome
+from bridge.command.messages.event import Kind
+from bridge.command.messages.request import Code, Outcome
 from bridge.config import Reaction
 from bridge.drive import FAULTED, MOVING, ControlWords, DriveState
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.canopen import width
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.mapping import emcy_codes
 from bridge.node.boot.actions import (
     U8,

@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.canopen import cobid
 from bridge.canopen.pdo import MappingError, PdoCodec
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.mapping.device import Signal
 from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.actions import (

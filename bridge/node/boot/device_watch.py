@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import Final
 
 from bridge.canopen.dialogue import Read, optional
+from bridge.command.node import Node
 from bridge.command.output_words import OutputWords, Place
-from bridge.command.plant import Node
 from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, judge
 from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.actions import Action, BootResult, Step, number

@@ -10,7 +10,7 @@ from bridge.canopen import datatypes
 from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.node.boot.actions import Action, BootResult, Do, Signal, Step, number, wish
 from bridge.node.boot.status import BootError
 

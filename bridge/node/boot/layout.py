@@ -8,7 +8,7 @@ from typing import NamedTuple
 from bridge.canopen.pdo import PdoEntry
 from bridge.mapping.fields import ObjectRef
 from bridge.mapping.model import MappedObject, Pdo
-from bridge.node.process.words import WORD_BITS, Place
+from bridge.node.places.words import WORD_BITS, Place
 
 Layouts = Mapping[int, Sequence[MappedObject]]
 """By the word's place, the objects that may stand for it; those at one position belong together."""

@@ -9,7 +9,7 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.command import Drive
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.mapping.model import Family, Pdo, Slot
 from bridge.node.boot.actions import U8, Action, BootResult, Do, PdoPlan, Step, number, wish
 from bridge.node.boot.layout import factory_entries, layouts, match_words

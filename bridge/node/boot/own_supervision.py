@@ -8,7 +8,7 @@ from functools import partial
 from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import judge
 from bridge.mapping.model import Family
@@ -16,7 +16,7 @@ from bridge.mapping.own_places import OwnPlace, OwnWant, places, wanted
 from bridge.node.boot.actions import Action, BootResult, Do, Step, told_as, wish, write_number
 from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
-from bridge.node.sdo_channels import FIRST, channel_of
+from bridge.node.places.sdo_channels import FIRST, channel_of
 from bridge.parameter import ParameterError
 
 Raws = dict[tuple[int, int], int]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bridge.canopen.pdo import PdoCodec
-from bridge.node.process.words import Place
+from bridge.node.places.words import Place
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.config import PdoTable
 from bridge.config.model import pdo_table
 from bridge.image import DataType

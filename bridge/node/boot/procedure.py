@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.command.worst_case import takeover_ms
 from bridge.config import NodeTable
 from bridge.config.download import Download

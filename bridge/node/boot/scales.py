@@ -9,11 +9,11 @@ from bridge.canopen.datatypes import INTEGERS, NUMBERS
 from bridge.canopen.dialogue import optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.drive import Codes, deciding, is_scale, no_scale
 from bridge.mapping.model import Family, Meaning, ObjectRef, Parameter
 from bridge.node.boot.actions import Action, BootResult, WordFacts, go_on_without
-from bridge.node.sdo_channels import FIRST, channel_of
+from bridge.node.places.sdo_channels import FIRST, channel_of
 
 
 def meanings_of(drive: Drive) -> list[tuple[Meaning, int, ObjectRef]]:

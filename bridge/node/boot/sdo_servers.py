@@ -8,11 +8,11 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.nmt import NmtCommand
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.mapping.model import SdoServer
 from bridge.node.boot.actions import Action, BootResult, Do, Nmt, Step, number, told_as
 from bridge.node.boot.status import BootError
-from bridge.node.sdo_channels import opened_servers
+from bridge.node.places.sdo_channels import opened_servers
 
 _PARAMETER: Final = 0x1200
 _OFF: Final = cobid.PDO_DISABLED

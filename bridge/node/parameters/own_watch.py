@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bridge.command import Drive, HasParameters
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.image import Value
 from bridge.mapping.own_places import OwnPlace, ends_own_watch, places
 from bridge.parameter import Entry, ParameterError

@@ -12,7 +12,7 @@ from enum import Enum
 from typing import Final
 
 from bridge.command import HasParameters
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.parameter import Entry
 
 MOST_PER_S: Final = 20.0

@@ -29,12 +29,12 @@ from bridge.command import (
     WriteParameter,
 )
 from bridge.command.link import NodeState
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.node.parameters.own_watch import OwnWatch
 from bridge.node.parameters.polling import Came, ParameterPolling
 from bridge.node.parameters.run import Procedure, run
 from bridge.node.parameters.view import NO_CHANNEL, ParameterView
-from bridge.node.sdo_channels import FIRST, SdoChannels, parameter_places
+from bridge.node.places.sdo_channels import FIRST, SdoChannels, parameter_places
 from bridge.parameter import (
     DriveParameters,
     Entry,

@@ -7,7 +7,7 @@ from typing import Final
 
 from bridge.command import HasParameters
 from bridge.command.link import NodeState
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.image import Image, Quality
 from bridge.parameter import Entry, ObjectRef, ParameterError, Reading, Why
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.drive import ControlWords
 from bridge.node.boot import rpdo_plan
 from bridge.node.process.outputs import OutputPdos, OutputRpdo

@@ -13,12 +13,12 @@ from bridge.command import Drive
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.leg.state import Output
 from bridge.command.link import FurtherTpdo
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.config import BusTable
 from bridge.image import Quality
 from bridge.node.boot import BootResult, PdoPlan
+from bridge.node.places.words import WordMap
 from bridge.node.process.held import held_s
-from bridge.node.process.words import WordMap
 
 Reject = Callable[[Frame, str], None]
 

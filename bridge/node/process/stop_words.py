@@ -13,7 +13,7 @@ from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
 from bridge.canopen.pdo import PdoEntry
 from bridge.command import Drive
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.config.download import Download
 from bridge.config.model import pdo_table
 from bridge.mapping.model import Pdo

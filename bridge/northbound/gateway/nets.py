@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge import __version__
-from bridge.command.plant import Node
+from bridge.command.node import Node
 from bridge.config import BusTable
 from bridge.northbound.gateway.session import Net
 

@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
+from bridge.base.quietlog import about
 from bridge.command import Action, Code, Identity, Outcome, Rejection, Request
-from bridge.command.freshness import NOW_S
+from bridge.command.messages.freshness import NOW_S
 from bridge.config import WordOrder
 from bridge.northbound.modbus.device_unit import DeviceUnit
 from bridge.northbound.modbus.drive_unit import DriveUnit
@@ -36,7 +37,6 @@ from bridge.northbound.modbus.unit import BridgeUnit, Unit
 from bridge.northbound.modbus.units import Units
 from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
-from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
+from bridge.base.quietlog import about
 from bridge.command import Identity, Role, Source
 from bridge.config import ModbusTable
 from bridge.northbound.admission import Admission, Limits, Stage, Visitor
@@ -22,7 +23,6 @@ from bridge.northbound.notices import teller
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
-from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
 

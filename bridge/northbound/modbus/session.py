@@ -13,17 +13,15 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import Any, Final, Protocol, cast
 
 from bridge.command import Identity
-from bridge.command.freshness import Inflow
+from bridge.command.messages.freshness import Inflow
 from bridge.northbound.admission import Visitor
 from bridge.northbound.modbus.dispatch import WRITES, Answer, Dispatcher
+from bridge.northbound.modbus.rounds import Rounds
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
-
-if TYPE_CHECKING:
-    from bridge.northbound.modbus.server import ModbusServer
 
 STALL_LIMIT_S: Final = 5.0
 """How long a client may leave its answers unread; then it is disconnected."""
@@ -157,6 +155,21 @@ class Conversation:
             self._on_late_answer()
 
 
+class Clients(Protocol):
+    """Those of the server: who may connect, and whose turn it is."""
+
+    @property
+    def rounds(self) -> Rounds: ...
+
+    def admit(self, session: Session, host: str, port: int) -> Identity | None: ...
+
+    def leave(self, session: Session) -> None: ...
+
+    def on_write(self, session: Session, identity: Identity) -> None: ...
+
+    def on_fault(self, session: Session, fault: str) -> None: ...
+
+
 class Session(asyncio.BufferedProtocol):
     """Pumps bytes between a socket and a ``Conversation``. ``clock`` is the plant's.
 
@@ -165,7 +178,7 @@ class Session(asyncio.BufferedProtocol):
     """
 
     def __init__(
-        self, dispatcher: Dispatcher, server: ModbusServer, clock: Callable[[], float], pulse: Pulse
+        self, dispatcher: Dispatcher, server: Clients, clock: Callable[[], float], pulse: Pulse
     ) -> None:
         self._dispatcher = dispatcher
         self._server = server

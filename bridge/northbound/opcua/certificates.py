@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.serialization import (
     load_pem_private_key,
 )
 
-from bridge.errors import Fault, FileFaults
+from bridge.base.errors import Fault, FileFaults
 from bridge.northbound.opcua.selfsigned import KEY_BITS, new_key, self_signed
 
 _log = logging.getLogger(__name__)

@@ -9,14 +9,14 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from typing import Final
 
+from bridge.base.guard import Guard
+from bridge.base.ratelimit import RateLimit
 from bridge.command import Event, Kind
-from bridge.guard import Guard
 from bridge.northbound.opcua.eventfilter import Occurrence
 from bridge.northbound.opcua.library import ObjectIds, node_id, text, ua, variant
 from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.values import source_time
-from bridge.ratelimit import RateLimit
 
 BASE_TYPE: Final = "DriveEventType"
 _BURST: Final = 20

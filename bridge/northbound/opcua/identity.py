@@ -14,8 +14,8 @@ from urllib.parse import quote
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 
+from bridge.base.errors import Fault, FileFaults, Unavailable
 from bridge.config import OpcUaTable
-from bridge.errors import Fault, FileFaults, Unavailable
 from bridge.northbound.opcua.certificates import (
     OwnCertificate,
     load_own,

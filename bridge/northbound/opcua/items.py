@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Final
 
-from bridge.beat import LOOK_EVERY_S
+from bridge.base.beat import LOOK_EVERY_S
 from bridge.northbound.opcua.eventfilter import EventFilter, Occurrence
 from bridge.northbound.opcua.filters import ChangeFilter
 from bridge.northbound.opcua.library import (

@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 from typing import Final
 
-from bridge.quietlog import about
+from bridge.base.quietlog import about
 
 _LIBRARY: Final = "asyncua"
 _TOLD_BY_US: Final = "Got malformed header"

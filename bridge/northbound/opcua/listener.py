@@ -13,9 +13,9 @@ from asyncua.common.connection import TransportLimits
 from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
 from asyncua.ua.ua_binary import uatcp_to_binary
 
-from bridge import clock
+from bridge.base import clock
 from bridge.command import Role
-from bridge.command.freshness import Inflow
+from bridge.command.messages.freshness import Inflow
 from bridge.northbound.admission import Admission, Stage, Visitor
 from bridge.northbound.opcua.admission import limits as admission_limits
 from bridge.northbound.opcua.inbox import Inbox

@@ -8,7 +8,7 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.command.request import PARAMETER_ACTIONS, Action, Code, Identity, Request, command_of
+from bridge.command.messages.request import PARAMETER_ACTIONS, Action, Code, Identity, Request, command_of
 from bridge.image import Value
 from bridge.northbound.opcua.library import AttributeIds, ServiceError, StatusCodes, get, make, status, ua
 from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode

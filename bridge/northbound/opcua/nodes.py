@@ -12,7 +12,7 @@ from enum import Enum
 from functools import cache
 from typing import Final
 
-from bridge.command.request import Action
+from bridge.command.messages.request import Action
 from bridge.image import Point
 
 GROUPS: Final = ("command", "status", "actual", "parameter", "supervision", "identity")

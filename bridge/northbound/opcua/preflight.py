@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.base.errors import FileFaults
 from bridge.config import OpcUaTable
-from bridge.errors import FileFaults
 from bridge.northbound.certificatefiles import check_validity, placed
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.identity import server_identity

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Sequence
 from typing import Final
 
-from bridge.beat import next_look
-from bridge.guard import Guard
+from bridge.base.beat import next_look
+from bridge.base.guard import Guard
 from bridge.image import Image
 from bridge.northbound.opcua.address_space import AllWatched
 from bridge.northbound.opcua.events import EventSender

@@ -11,7 +11,7 @@ from cryptography.hazmat.primitives.asymmetric.padding import MGF1, OAEP
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 from cryptography.hazmat.primitives.hashes import SHA1, SHA256
 
-from bridge.command.request import Identity, Role, Source
+from bridge.command.messages.request import Identity, Role, Source
 from bridge.config import OpcUaTable
 from bridge.northbound.logins import PasswordChecks
 from bridge.northbound.opcua.certificates import TrustedCertificates, fingerprint

@@ -13,10 +13,10 @@ from asyncua.common.connection import TransportLimits
 from asyncua.server.server import Server as LibraryServer
 
 import bridge
-from bridge import clock
+from bridge.base import clock
+from bridge.base.errors import OperationFailed
 from bridge.command import Kind
 from bridge.config import OpcUaTable
-from bridge.errors import OperationFailed
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua import decoding
 from bridge.northbound.opcua.certificates import TrustedCertificates

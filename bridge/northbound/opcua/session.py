@@ -19,8 +19,8 @@ from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession, SessionState
 from asyncua.server.subscription_service import SubscriptionService
 
-from bridge.command.request import Action, Identity, Role, Source
-from bridge.guard import Guard
+from bridge.base.guard import Guard
+from bridge.command.messages.request import Action, Identity, Role, Source
 from bridge.northbound.opcua.admission import MOST_CONNECTIONS
 from bridge.northbound.opcua.browsing import Browser
 from bridge.northbound.opcua.encoding import Results

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from bridge.command.request import Identity
+from bridge.command.messages.request import Identity
 from bridge.northbound.opcua.encoding import weight
 from bridge.northbound.opcua.eventfilter import Occurrence
 from bridge.northbound.opcua.items import EventItem, Item, Monitoring, ValueItem

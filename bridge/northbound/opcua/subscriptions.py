@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.beat import cycle_by
+from bridge.base.beat import cycle_by
 from bridge.northbound.opcua.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.northbound.opcua.monitoring import MonitoredItems, code_of, loop_time
 from bridge.northbound.opcua.publishing import PublishRequest

@@ -25,9 +25,9 @@ from asyncua.server.uaprocessor import UaProcessor
 from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, uatcp_to_binary
 from cryptography.hazmat.primitives.serialization import Encoding
 
-from bridge import clock
-from bridge.command.freshness import NEVER
-from bridge.command.request import Identity
+from bridge.base import clock
+from bridge.command.messages.freshness import NEVER
+from bridge.command.messages.request import Identity
 from bridge.northbound.opcua import decoding
 from bridge.northbound.opcua.admission import Stage
 from bridge.northbound.opcua.encoding import encode

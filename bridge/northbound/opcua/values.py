@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 from bridge.command import Rejection
-from bridge.command.request import Code, Identity, Outcome
+from bridge.command.messages.request import Code, Identity, Outcome
 from bridge.image import DataType, Image, Point, Quality, Reading, Value
 from bridge.northbound.opcua.library import GOOD, StatusCodes, data_value, status, ua, variant
 

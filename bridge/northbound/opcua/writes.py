@@ -16,7 +16,8 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.command.request import (
+from bridge.base.quietlog import about
+from bridge.command.messages.request import (
     Action,
     Code,
     Command,
@@ -32,7 +33,6 @@ from bridge.northbound.opcua.library import GOOD, AttributeIds, ServiceError, St
 from bridge.northbound.opcua.nodes import VariableNode
 from bridge.northbound.opcua.values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.view import View
-from bridge.quietlog import about
 
 _log = logging.getLogger(__name__)
 

@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 from bridge.northbound.page.sessions import Session
 
 LONGEST_S: Final = 60

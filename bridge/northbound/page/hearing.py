@@ -15,7 +15,7 @@ from typing import Annotated, Any, Final, Protocol
 
 import msgspec
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 
 MOST_ROWS: Final = 100
 """Frames in one message."""

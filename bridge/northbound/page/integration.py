@@ -12,8 +12,8 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from bridge.base.errors import OperationFailed
 from bridge.config import Site
-from bridge.errors import OperationFailed
 
 Export = Callable[[], str]
 """Makes the text of a file; raises ``OperationFailed`` where that needs what is not here."""

@@ -17,8 +17,8 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from bridge.base.errors import FileFaults
 from bridge.config import NodeTable, Site
-from bridge.errors import FileFaults
 from bridge.image import Value
 from bridge.mapping import Family
 from bridge.northbound.page.guards import MOST_FILE

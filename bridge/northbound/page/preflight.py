@@ -8,8 +8,8 @@ from typing import Final
 
 from cryptography import x509
 
+from bridge.base.errors import Fault, FileFaults
 from bridge.config import PageTable
-from bridge.errors import Fault, FileFaults
 from bridge.northbound.certificatefiles import check_validity, placed
 
 _PEM: Final = "a PEM file; of a certificate with those between it and its authority behind it"

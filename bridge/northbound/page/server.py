@@ -14,7 +14,7 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 from bridge.northbound.listening import until_deaf
 from bridge.northbound.notices import teller
 from bridge.northbound.page.guards import MOST_HEAD

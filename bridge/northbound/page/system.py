@@ -12,8 +12,8 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
+from bridge.base.guard import Guard
 from bridge.command import Role
-from bridge.guard import Guard
 from bridge.northbound.page.sessions import Session
 
 MOST_LINES = 500

@@ -13,9 +13,9 @@ from typing import Any, Final
 import msgspec
 from starlette.websockets import WebSocket
 
+from bridge.base.guard import Guard
 from bridge.command import Event
 from bridge.condition.layout import Layout
-from bridge.guard import Guard
 from bridge.image import Image
 from bridge.northbound.page.hearing import Hearings
 from bridge.northbound.page.sessions import Session, Sessions

@@ -13,11 +13,11 @@ from typing import Annotated, Any, Final
 
 import msgspec
 
+from bridge.base.ratelimit import RateLimit
 from bridge.command import Action, Code, Do, Identity, Outcome, Request, Role, Source
-from bridge.command.request import COMMANDS
+from bridge.command.messages.request import COMMANDS
 from bridge.northbound.page.hearing import Wish
 from bridge.northbound.view import View
-from bridge.ratelimit import RateLimit
 
 MOST_BYTES: Final = 16_384
 """Of one message."""

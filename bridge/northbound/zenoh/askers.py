@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-from bridge.command.freshness import Inflow, Look
+from bridge.command.messages.freshness import Inflow, Look
 
 _MOST: Final = 256
 """Clients that are remembered; the one that has been silent longest is forgotten first."""

@@ -21,7 +21,7 @@ from bridge.command import (
     WriteParameter,
     command_of,
 )
-from bridge.command.request import NMT_ACTIONS, NODE_ACTIONS
+from bridge.command.messages.request import NMT_ACTIONS, NODE_ACTIONS
 from bridge.image import Point, Value
 from bridge.northbound.zenoh.users import ANONYMOUS, NAME, WANTED_NAME
 

@@ -18,10 +18,11 @@ from typing import Final
 
 import zenoh
 
+from bridge.base.errors import Unavailable
+from bridge.base.quietlog import about
 from bridge.command import Code, Event, Identity, Outcome, Rejection, Reply, Request, Source
-from bridge.command.request import STOP_ACTIONS
+from bridge.command.messages.request import STOP_ACTIONS
 from bridge.config import ZenohTable
-from bridge.errors import Unavailable
 from bridge.image import Quality, Reading
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.sources import source_of
@@ -34,7 +35,6 @@ from bridge.northbound.zenoh.gets import Gets
 from bridge.northbound.zenoh.publication import Publication
 from bridge.northbound.zenoh.sessions import Sessions
 from bridge.northbound.zenoh.users import ANONYMOUS, Users, read_users
-from bridge.quietlog import about
 from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from bridge.base.errors import Unavailable
 from bridge.config import ZenohTable
-from bridge.errors import Unavailable
 
 ANONYMOUS: Final = "anonymous"
 NAME: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")

@@ -15,8 +15,8 @@ from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.command.link import NodeState
 from bridge.node.boot import PdoPlan
+from bridge.node.places.words import Place
 from bridge.node.process.process_data import DrivePdos
-from bridge.node.process.words import Place
 from tests.bench.canopen_node import with_four_words
 from tests.bench.figures import show
 from tests.support.bench import Bench, write_site

@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-import bridge.service
+import bridge.service.bus_process
 from bridge.can import Bus
 from bridge.can.socketcan import SocketCanBus
 from bridge.cli.serve import run
@@ -52,7 +52,7 @@ def main(at: Ports) -> None:
     def make_bus(table: BusTable) -> Bus:
         return bus(at.channel)
 
-    bridge.service.make_bus = make_bus
+    bridge.service.bus_process.make_bus = make_bus
     run(site(at, Path.cwd()), role="all", parent=0, signs=None, listening=None, verbose=False)
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import Unavailable
 from bridge.can.listener import LOST, RECORD, SocketCanListener, TapListener, listener_of
 from bridge.can.virtual import VirtualBus, VirtualWire
 from bridge.can.wiretap import Wiretap
 from bridge.canopen.frame import REMOTE, Frame
-from bridge.errors import Unavailable
 
 
 @asynccontextmanager

@@ -16,9 +16,9 @@ from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.mapping.model import Pdo
 from bridge.node.boot import PdoPlan, factory_entries, layouts, match_words
+from bridge.node.places.words import Place
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.process.remote_polling import RemotePolling
-from bridge.node.process.words import Place
 from tests.support.bench import Bench, write_site
 
 NORD = load_family("nord/sk-tu4-cao")

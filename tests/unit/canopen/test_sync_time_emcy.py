@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.base.errors import FileFaults
 from bridge.can.interface import ControllerState
 from bridge.canopen import time_stamp
 from bridge.canopen.emcy import Emergency
@@ -19,7 +20,6 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.sync import SyncWindow, sync_frames
 from bridge.canopen.time_stamp import TimeProducer
 from bridge.command import Kind
-from bridge.errors import FileFaults
 from bridge.node.emergency_log import EmergencyLog
 from tests.support.bench import NOON_NS, Bench, write_site
 

@@ -9,9 +9,9 @@ import pytest
 
 from bridge.command.deadlines import Deadlines
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.event import Event, Kind
 from bridge.command.following import Following
 from bridge.command.link import NodeState
+from bridge.command.messages.event import Event, Kind
 from bridge.command.plant import Plant
 from bridge.config import load_site
 from tests.support import sites

@@ -10,7 +10,7 @@ import pytest
 
 from bridge.command import Action, Start, Write
 from bridge.command.leg.event import ActualWords
-from bridge.command.telegram import Telegram
+from bridge.command.messages.telegram import Telegram
 from bridge.config import Reaction
 from bridge.drive import DriveState
 from tests.support.leg import Leg, settings_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.command import Action, Do, Request
-from bridge.command.freshness import NEVER, Inflow, Look, is_stale, way_ms
+from bridge.command.messages.freshness import NEVER, Inflow, Look, is_stale, way_ms
 from tests.support.rig import PLC
 
 BEGIN = Look(0.0, 0.0)

@@ -12,7 +12,7 @@ from bridge.command.leg.effect import Heard
 from bridge.command.leg.state import Output, Stage
 from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
 from bridge.command.leg.turn import Turn
-from bridge.command.request import Identity
+from bridge.command.messages.request import Identity
 from tests.support import leg_space
 from tests.support.leg_profiles import CYCLIC, MOST, space
 from tests.support.leg_words import POSITION

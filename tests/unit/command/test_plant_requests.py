@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.command import (
     Action,
     Code,
@@ -25,7 +26,6 @@ from bridge.command import (
 )
 from bridge.command.link import NodeState
 from bridge.config import Site
-from bridge.errors import FileFaults
 from bridge.image import Quality, Reading
 from tests.support import sites
 from tests.support.rig import ENABLE, ENABLED, OPERATOR, PLC, READY, SHUT_DOWN

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Action, Command, Identity, Outcome, Request, Role, Source, Start, command_of
-from bridge.command.request import SetTimeout, TakeControl, Write, WriteParameter
+from bridge.command.messages.request import SetTimeout, TakeControl, Write, WriteParameter
 from bridge.config import load_site
 from bridge.image import Quality, Reading, Value
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout

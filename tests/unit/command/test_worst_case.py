@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command.freshness import GRAIN_MS
+from bridge.command.messages.freshness import GRAIN_MS
 from bridge.command.worst_case import Wire, stop_time, sync_wait_ms, takeover_ms
 from bridge.config import BusTable, DriveTable
 from tests.support.docs import REPOSITORY

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from bridge.base.errors import FileFaults
 from bridge.config import load_site
 from bridge.config.download import COMMANDS, Download, parse_concise_dcf, to_concise_dcf
-from bridge.errors import FileFaults
 
 # Store and restore (1010h, 1011h) come back as commands, which are not read back.
 downloads = st.builds(

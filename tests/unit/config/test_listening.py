@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.config import load_site
-from bridge.errors import FileFaults
 from bridge.lint import Severity, lint
 from tests.support import sites
 

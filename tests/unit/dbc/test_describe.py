@@ -8,10 +8,10 @@ from collections.abc import Mapping
 import cantools
 import pytest
 
+from bridge.base.errors import OperationFailed
 from bridge.config import Site
 from bridge.dbc import BusDescription, Message, Signal, describe
 from bridge.dbc.write import dbc_text
-from bridge.errors import OperationFailed
 from bridge.lint import family_dictionaries
 from bridge.lint.bus import view_bus
 from bridge.mapping import Family, load_family

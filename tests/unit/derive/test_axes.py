@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import OperationFailed
 from bridge.command import Action, Identity, Outcome, Request, Role, Source, WriteParameter
 from bridge.derive import derive_family
 from bridge.drive import DriveState
-from bridge.errors import OperationFailed
 from bridge.mapping.axes import on_axis
 from bridge.sim.nmt_slave import NmtState
 from tests.support.invented_eds import (

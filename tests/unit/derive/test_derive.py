@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import OperationFailed
 from bridge.command import Outcome, Request, Start
 from bridge.derive import derive_family
 from bridge.drive import DriveState
 from bridge.eds import read_device
-from bridge.errors import OperationFailed
 from bridge.mapping import Family
 from bridge.parameter import Names, ObjectRef
 from bridge.parameter.effect import Effect

@@ -10,10 +10,10 @@ from cantools import database
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from bridge.base.errors import OperationFailed
 from bridge.command import Outcome, Request, Start
 from bridge.derive import derive_family
 from bridge.drive import DriveState
-from bridge.errors import OperationFailed
 from bridge.exports import dbc_file, modbus_table
 from bridge.project import load_project
 from tests.support.bench import PLC

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults, OperationFailed
 from bridge.command import Identity, Outcome, Request, Role, Source, WriteParameter
 from bridge.derive import derive_family
 from bridge.derive.device import GENERIC
-from bridge.errors import FileFaults, OperationFailed
 from bridge.lint import Severity, lint
 from bridge.mapping.loader import read_family
 from bridge.project import load_project

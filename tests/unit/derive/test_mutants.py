@@ -11,10 +11,10 @@ from typing import Final
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bridge.base.errors import FileFaults, OperationFailed
 from bridge.cli.family import new
 from bridge.eds.model import Report
 from bridge.eds.text import decode
-from bridge.errors import FileFaults, OperationFailed
 from bridge.mapping.loader import mappings_dir, read_family
 from tests.support.invented_eds import FIXED, SPIN, eds
 

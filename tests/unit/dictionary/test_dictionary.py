@@ -10,9 +10,9 @@ import pytest
 from canopen.objectdictionary import ODRecord, ODVariable
 from typer.testing import CliRunner
 
+from bridge.base.errors import FileFaults
 from bridge.cli.app import make_app
 from bridge.dictionary import as_eds, load_dictionary
-from bridge.errors import FileFaults
 from bridge.mapping.loader import family_names, load_family, mappings_dir
 from bridge.parameter import Names
 

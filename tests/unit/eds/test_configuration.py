@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.config.download import to_concise_dcf
 from bridge.eds import configuration, read_configuration, read_device
-from bridge.errors import FileFaults
 from bridge.project import load_project
 
 DCF = """[DeviceComissioning]

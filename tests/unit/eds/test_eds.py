@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.eds import Access, DataType, Description, Finding, Severity, Value, read_device, read_device_file
 from bridge.eds.pdos import pdos
-from bridge.errors import FileFaults
 
 HEAD = """[DeviceInfo]
 VendorName=Acme

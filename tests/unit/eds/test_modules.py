@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.eds import Description, read_device
-from bridge.errors import FileFaults
 from tests.support.couplers import (
     EMPTY,
     INPUTS,

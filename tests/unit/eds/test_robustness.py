@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from bridge.base.errors import FileFaults
 from bridge.cli.app import make_app
 from bridge.eds import configuration, read_device
 from bridge.eds.pdos import pdos
-from bridge.errors import FileFaults
 from bridge.mapping.loader import mappings_dir
 from tests.unit.eds.test_configuration import DCF
 from tests.unit.eds.test_xdd import XDD

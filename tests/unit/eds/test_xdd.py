@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.eds import Access, DataType, Severity, Value, configuration, read_device
-from bridge.errors import FileFaults
 
 XDD = """<?xml version="1.0" encoding="utf-8"?>
 <ISO15745ProfileContainer xmlns="http://www.canopen.org/xml/1.1"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.errors import FileFaults
+from bridge.base.errors import FileFaults
 from bridge.lint import Severity, WorstCase, lint
 from bridge.project import load_project
 from tests.support import sites

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.errors import FileFaults
+from bridge.base.errors import FileFaults
 from bridge.lint import Severity, lint
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names, mapping_folders

@@ -10,7 +10,7 @@ import pytest
 from bridge.config.download import Download
 from bridge.lint import Severity, lint
 from bridge.mapping import load_family
-from bridge.mapping.aliases import aliases
+from bridge.mapping.alias_places import aliases
 from bridge.mapping.loader import family_names, mapping_folders
 from bridge.project import load_project
 from tests.support import sites

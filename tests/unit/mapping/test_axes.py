@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.errors import FileFaults
+from bridge.base.errors import FileFaults
 from bridge.mapping import Family
 from bridge.mapping.axes import MOST_AXES, on_axis, on_first
 from bridge.mapping.loader import read_family

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.drive import FaultWords
 from bridge.drive.fault_words import listed_faults
-from bridge.errors import FileFaults
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names, mappings_dir, read_family
 from bridge.mapping.model import Family

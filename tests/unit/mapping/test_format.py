@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.errors import FileFaults
+from bridge.base.errors import FileFaults
 from bridge.mapping import Family, family_names, load_family, read_family
 from bridge.mapping.loader import mapping_folders, mappings_dir
 from bridge.mapping.parameters import ParameterNames, object_of

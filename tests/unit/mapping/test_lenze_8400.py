@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.drive import ControlWords, DriveState, StatusWords
-from bridge.errors import FileFaults
 from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.mapping.match import Found, best_match

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.errors import FileFaults
+from bridge.base.errors import FileFaults
 from bridge.mapping.loader import lineage, mappings_dir
 
 BASE = ["cia402/base", "generic/fault-advice"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.errors import FileFaults
+from bridge.base.errors import FileFaults
 from bridge.mapping import family_names, load_family, read_family
 from bridge.mapping.loader import mappings_dir
 from bridge.mapping.model import pattern_bits

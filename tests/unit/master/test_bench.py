@@ -11,7 +11,7 @@ from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
 from bridge.command import Action, Code, Outcome, ReadParameter, Request
-from bridge.command.plant import Enforce
+from bridge.command.node import Enforce
 from bridge.image import Quality
 from bridge.mapping.model import IdentityRule
 from bridge.master.line import Line

@@ -14,7 +14,7 @@ from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Code, Identity, Outcome, Request, Role, Source, command_of
 from bridge.command.link import NodeState
-from bridge.command.request import STOP_ACTIONS
+from bridge.command.messages.request import STOP_ACTIONS
 from bridge.image import Value
 from bridge.master.listening import Listening
 from bridge.sim.stoeber_5000 import Stoeber5000
@@ -22,7 +22,7 @@ from tests.support.bench import Bench, write_site
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
 from tests.unit.node.test_stoeber_posi import DRIVE as LIFT
 from tests.unit.node.test_stoeber_posi import bench_with
-from tests.unit.northbound.page.test_page_said import BOOK
+from tests.unit.northbound.page.test_said import BOOK
 
 OTHER: Final = Identity(Source.OPCUA, "ann", Role.ENGINEER)
 TWIN: Final = Frame(0x77F, b"\x05")

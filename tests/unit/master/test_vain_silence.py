@@ -9,7 +9,7 @@ import pytest
 
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Code, Event, Identity, Outcome, Request, Role, Source, WriteParameter
-from bridge.command.request import STOP_ACTIONS
+from bridge.command.messages.request import STOP_ACTIONS
 from bridge.command.worst_case import stop_time
 from bridge.config import load_site
 from bridge.drive import DriveState

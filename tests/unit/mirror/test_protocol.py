@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.base.errors import Unavailable
 from bridge.command import (
     Action,
     Code,
@@ -30,9 +31,8 @@ from bridge.command import (
     Write,
     WriteParameter,
 )
+from bridge.command.messages.request import COMMANDS
 from bridge.command.points import CONNECTION_COUNTS
-from bridge.command.request import COMMANDS
-from bridge.errors import Unavailable
 from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
 from bridge.mirror.endpoint import prepare_folder

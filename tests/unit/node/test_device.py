@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.canopen.frame import Frame
 from bridge.command import (
     Code,
@@ -19,7 +20,6 @@ from bridge.command import (
     Write,
     WriteParameter,
 )
-from bridge.errors import FileFaults
 from bridge.image import Quality, Reading
 from tests.support.bench import Bench
 from tests.support.devices import ENCODER, device_bench, encoder

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Outcome, Request, command_of
-from bridge.command.telegram import Refusal
+from bridge.command.messages.telegram import Refusal
 from bridge.image import Quality
 from bridge.sim.abort import AbortCode, SdoAbort
 from bridge.sim.dictionary import Entry

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
 from bridge.canopen import abort
 from bridge.config import NodeTable
 from bridge.errands.parameter import ParameterErrand
-from bridge.errors import FileFaults
 from bridge.image import Value
 from bridge.mapping import load_family
 from bridge.node.parameters.run import Procedure

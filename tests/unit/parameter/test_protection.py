@@ -16,7 +16,8 @@ from bridge.command import Action, Code, Identity, Outcome, Request, Role, Sourc
 from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.mapping import load_family
-from bridge.mapping.aliases import COMMUNICATION, aliases
+from bridge.mapping.alias_places import aliases
+from bridge.mapping.aliases import COMMUNICATION
 from bridge.mapping.loader import family_names
 from bridge.parameter import DriveParameters, Entry, Ledger, Names, ObjectRef, ParameterError, backups
 from bridge.parameter.definition import leaf_of

@@ -10,10 +10,10 @@ from unittest.mock import Mock
 import pytest
 from typer.testing import CliRunner
 
+from bridge.base.errors import OperationFailed
 from bridge.cli.app import make_app
 from bridge.cli.parameter_drive import Target
 from bridge.derive import derive_family
-from bridge.errors import OperationFailed
 from bridge.mapping import load_family
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, Transfer, TransferFailed, Why
 from bridge.parameter.protection import Gate

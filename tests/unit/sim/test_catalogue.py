@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 from bridge.sim.catalogue import simulate_node
 from bridge.sim.nord_single import NordSingle
 from bridge.sim.nord_tu4 import NordTu4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 from bridge.mapping import family_names
 from bridge.sim.catalogue import simulate_node
 from bridge.sim.cia402_drive import Cia402Drive

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import OperationFailed
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Outcome, Request, Start
 from bridge.config import load_site
 from bridge.drive import DriveState
-from bridge.errors import OperationFailed
 from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.mapping.loader import mapping_folders

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults, OperationFailed
 from bridge.canopen.frame import Frame
-from bridge.errors import FileFaults, OperationFailed
 from bridge.sim.habit import Rule, load_habit, shipped_habits
 from bridge.sim.habit_player import HabitPlayer
 from bridge.sim.nord_tu4 import NordTu4

@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import pytest
 
+from bridge.base.errors import Unavailable
 from bridge.can.interface import BusStatus
 from bridge.canopen.frame import Frame
-from bridge.errors import Unavailable
 from bridge.sim.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
 

@@ -18,7 +18,7 @@ import pytest_asyncio
 from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary
 
-from bridge.errors import OperationFailed
+from bridge.base.errors import OperationFailed
 from bridge.mirror import MirrorClient, MirrorPublisher, socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.opcua.session import Session

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from asyncua import Client, ua
 
+from bridge.base.errors import Unavailable
 from bridge.command import Write
-from bridge.errors import Unavailable
 from bridge.image import Quality
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support.opcua_client import call, node, word, write, write_all, write_value

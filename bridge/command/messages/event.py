@@ -1,0 +1,63 @@
+"""Events that people want to know of: trips, lost nodes, refused writes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from bridge.base.ratelimit import PerSecond
+
+
+class Kind(StrEnum):
+    WATCHDOG = "watchdog"
+    EMERGENCY = "emergency"
+    NODE_LOST = "node_lost"
+    NODE_BACK = "node_back"
+    REFUSED = "refused"
+    OWNER = "owner"
+    BUS = "bus"
+    CONFIGURATION = "configuration"
+    FRONT = "front"
+    INTRUDER = "intruder"
+    CAUSE = "cause"
+    """What several others have in common."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """``source`` is a drive, a node or a bus by its name in the site; ``severity`` is that of OPC UA
+    (1 … 1000, Part 5 §6.4.2); ``time`` is monotonic. ``cause`` is what has brought it about, as a phrase;
+    empty where nothing known has."""
+
+    time: float
+    kind: Kind
+    source: str
+    severity: int
+    message: str
+    cause: str = ""
+
+    @property
+    def text(self) -> str:
+        """The message with its cause."""
+        return f"{self.message} (because: {self.cause})" if self.cause else self.message
+
+
+REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))
+"""Kinds that somebody can cause at will."""
+_MOST_A_SECOND: Final = 10
+
+
+class EventGate:
+    """Keeps a client that is refused again and again, or a babbling node, from flooding the listeners. What
+    is left out is still counted where it happens."""
+
+    def __init__(self) -> None:
+        self._limits: dict[tuple[str, Kind], PerSecond] = {}
+
+    def admits(self, event: Event) -> bool:
+        """Whether this event is passed on: of kinds that repeat, at most ten a second of each source."""
+        if event.kind not in REPEATING:
+            return True
+        limit = self._limits.setdefault((event.source, event.kind), PerSecond(_MOST_A_SECOND))
+        return limit.allows(event.time)

@@ -1,0 +1,233 @@
+"""A write to a drive's command group, decoded: names and values to process words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from bridge.command.messages.request import Code
+from bridge.drive import ControlWords, Meanings, ParameterSet, ValueCodec, Written, codecs
+from bridge.image import Value
+from bridge.mapping.model import Family, Slot
+
+_WORD_MASK = 0xFFFF
+
+
+class Refusal(Exception):
+    """A request is not carried out and changes nothing; ``code`` and ``message`` are its outcome."""
+
+    def __init__(self, code: Code, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+        self.message = message
+
+
+@dataclass(frozen=True, slots=True)
+class Telegram:
+    """``control_word`` is None where none was written. Words are 16-bit integers."""
+
+    control_word: int | None
+    setpoints: tuple[int, ...]
+
+
+class _Setpoints:
+    """What a write has set so far, by the word's place: which bits, and to what."""
+
+    def __init__(self) -> None:
+        self._masks: dict[int, int] = {}
+        self._bits: dict[int, int] = {}
+
+    def put(self, leaf: str, written: tuple[Written, ...]) -> None:
+        """All of it or, where the same bits have been written otherwise, nothing: that raises ``Refusal``."""
+        for one in written:
+            mask, bits = self._masks.get(one.place, 0), self._bits.get(one.place, 0)
+            if (bits ^ one.bits) & mask & one.mask:
+                raise Refusal(Code.OUT_OF_RANGE, f"{leaf} and the word it is made from do not agree")
+        for one in written:
+            self._masks[one.place] = self._masks.get(one.place, 0) | one.mask
+            self._bits[one.place] = self._bits.get(one.place, 0) | one.bits
+
+    @property
+    def places(self) -> frozenset[int]:
+        """Those of the words that have been written."""
+        return frozenset(self._masks)
+
+    def over(self, before: tuple[int, ...]) -> tuple[int, ...]:
+        """``before`` with what was written."""
+        after = list(before)
+        for place, mask in self._masks.items():
+            after[place] = after[place] & ~mask | self._bits[place]
+        return tuple(after)
+
+
+class TelegramDecoder:
+    """Knows the command group of one drive. ``meanings`` and ``unserved``, which has the reason for each word
+    or value that the node cannot take, are read at each write: they fill at boot-up. ``reported`` gives the
+    drive's status word, None while the drive is not heard."""
+
+    def __init__(
+        self,
+        name: str,
+        family: Family,
+        slot: Slot,
+        meanings: Meanings,
+        unserved: Mapping[str, str],
+        reported: Callable[[], int | None] = lambda: None,
+    ) -> None:
+        self._name = name
+        self._meanings = meanings
+        self._unserved = unserved
+        self._reported = reported
+        self._words = ControlWords(family.control_word)
+        self._names = words = family.process.rpdo[1:]
+        carried = family.carried(slot)[0]
+        self._setpoints = {word: place for place, word in enumerate(words) if word in carried}
+        self._values = {codec.model.name: codec for codec in codecs(family, slot, "command", words, {})}
+        self._set = ParameterSet(family.control_word.parameter_set_bits)
+        described = {meaning.word for meaning in family.meaning if meaning.group == "command"}
+        described |= {
+            word
+            for codec in self._values.values()
+            if family.depends_on_set(codec.model)
+            for word in codec.model.word_names
+        }
+        self._of_set = [place for place, word in enumerate(words) if word in described]
+        """The places of words whose meaning or scale depends on the parameter set."""
+        self._reported_set = ParameterSet(family.status_word.parameter_set_bits)
+
+    def decode(self, values: Mapping[str, Value], before: tuple[int, ...], held: int) -> Telegram:
+        """The words to be sent; setpoints that are not written stay as ``before``. ``held`` is the control
+        word that counts where none is written. Raises ``Refusal``."""
+        control_word = _as_word("control_word", values["control_word"]) if "control_word" in values else None
+        word = held if control_word is None else control_word
+        in_set, was = self._set.of(word), self._set.of(held)
+        stops = control_word is not None and not self._words.enables(word)
+        setpoints = _Setpoints()
+        # The raw words first: where a scaled value contradicts one, it is the scaled one that is wrong.
+        for leaf, value in sorted(values.items(), key=lambda item: item[0] in self._values):
+            if leaf == "control_word":
+                continue
+            try:
+                written = self._written(leaf, value, in_set)
+                if in_set == was:
+                    written = self._as_reported(leaf, value, word, written)
+                setpoints.put(leaf, written)
+            except Refusal:
+                if not (stops and self._goes_by_the_drive(leaf, value)):
+                    raise
+        after = setpoints.over(before)
+        if in_set != was:
+            after = self._in_other_set(before, after, setpoints.places, was, word)
+        return Telegram(control_word, after)
+
+    def _written(self, leaf: str, value: Value, in_set: int) -> tuple[Written, ...]:
+        place, codec = self._setpoints.get(leaf), self._values.get(leaf)
+        if place is not None:
+            self._check_carried(leaf, (place,))
+            return (Written(place, _WORD_MASK, _as_word(leaf, value)),)
+        if codec is None:
+            known = ", ".join(["control_word", *self._setpoints, *self._values])
+            raise Refusal(Code.UNKNOWN_POINT, f"{self._name}/command has no {leaf!r}; it has {known}")
+        found, lack = self._meanings.codec(codec, in_set)
+        self._check_carried(leaf, found.places)
+        if lack:
+            raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {lack.why}")
+        return _from_value(found, value)
+
+    def _goes_by_the_drive(self, leaf: str, value: Value) -> bool:
+        """Whether parameters of the drive say what the value means, which somebody may change while it runs.
+        A word that does not enable is not refused for what was right until then: it may be a stop."""
+        codec = self._values.get(leaf)
+        is_number = isinstance(value, int | float)
+        return is_number and codec is not None and bool(codec.model.code or codec.model.full)
+
+    def _check_carried(self, leaf: str, places: tuple[int, ...]) -> None:
+        for name in (leaf, *(self._names[place] for place in places)):
+            why = self._unserved.get(f"command/{name}")
+            if why:
+                raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {why}")
+
+    def _as_reported(
+        self, leaf: str, value: Value, word: int, written: tuple[Written, ...]
+    ) -> tuple[Written, ...]:
+        """A scaled value is taken as the parameter set that the control word asks for has it. Where the drive
+        is in another one, it would take the same words for something else: a word that enables is refused,
+        and with any other, which may be a stop, it gets zero. Raises ``Refusal``."""
+        in_set, status = self._set.of(word), self._reported()
+        reported = in_set if status is None else self._reported_set.of(status)
+        if reported == in_set or leaf not in self._values:
+            return written
+        try:
+            same = self._written(leaf, value, reported) == written
+        except Refusal:
+            same = False
+        if same:
+            return written
+        if self._words.enables(word):
+            message = f"{leaf}: parameter set {in_set} is commanded, and the drive is in set {reported}"
+            raise Refusal(Code.NOT_READY, message)
+        return tuple(replace(one, bits=0) for one in written)
+
+    def _in_other_set(
+        self, before: tuple[int, ...], after: tuple[int, ...], written: frozenset[int], was: int, word: int
+    ) -> tuple[int, ...]:
+        """The setpoints with this control word, which changes the parameter set: what is not written keeps
+        its value in its unit. Where that is not known, a drive that is to run is not switched, and one that
+        is not gets zero. Raises ``Refusal``."""
+        in_set = self._set.of(word)
+        kept = list(after)
+        left = {place for place in self._of_set if before[place] and place not in written}
+        taken = set(written)
+        for place in left:
+            kept[place] = 0
+        for codec in self._values.values():
+            old, lack = self._meanings.codec(codec, was)
+            if lack or not left.intersection(old.places):
+                continue
+            new, lack = self._meanings.codec(codec, in_set)
+            if lack or taken.intersection(new.places):
+                continue
+            try:
+                parts = new.to_words(old.from_words(before))
+            except ValueError:
+                continue
+            for part in parts:
+                kept[part.place] = kept[part.place] & ~part.mask | part.bits
+            taken.update(new.places)
+            left.difference_update(old.places)
+        if left and self._words.enables(word):
+            names = ", ".join(self._names[place] for place in sorted(left))
+            message = f"what {names} means in parameter set {in_set} is not known: write it with the switch"
+            raise Refusal(Code.NOT_CONFIGURED, message)
+        return tuple(kept)
+
+
+def _from_value(codec: ValueCodec, value: Value) -> tuple[Written, ...]:
+    model = codec.model
+    is_bit = model.bit is not None and isinstance(value, bool)
+    try:
+        return codec.to_words(int(value) if is_bit else _as_number(model.name, value))
+    except ValueError as error:
+        raise Refusal(Code.OUT_OF_RANGE, f"{model.name} {error} {model.unit}".rstrip()) from None
+
+
+def _as_number(leaf: str, value: object) -> float:
+    """``value`` as a number; callers on the network may send anything."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise Refusal(Code.OUT_OF_RANGE, f"{leaf} takes a number")
+    try:
+        return float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        return math.inf
+
+
+def _as_word(leaf: str, value: object) -> int:
+    """``value`` as a 16-bit word. Negative numbers are refused: -1 would be sent as FFFFh, which acknowledges
+    and enables. Signed numbers belong to the scaled values."""
+    number = _as_number(leaf, value)
+    if not 0 <= number <= _WORD_MASK:
+        raise Refusal(Code.OUT_OF_RANGE, f"{leaf} takes 0…65535, not {number:g}")
+    if not number.is_integer():
+        raise Refusal(Code.OUT_OF_RANGE, f"{leaf} takes a whole number, not {number:g}")
+    return int(number)

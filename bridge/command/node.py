@@ -1,0 +1,94 @@
+"""A configured node: its drives, or the device that it is instead, and what has parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from bridge.command.device import Device
+from bridge.command.drive import Drive
+from bridge.command.messages.request import Action, Identity
+from bridge.command.outputs import Outputs
+from bridge.config import BusTable, NodeTable
+from bridge.mapping.axes import profile_of
+from bridge.mapping.model import Family, ObjectRef
+from bridge.parameter import AxisNames, Names
+
+Enforce = Callable[[str, Action, str, float], None]
+"""Does something to a node in the bridge's own name; the second text says why."""
+
+
+class HasParameters(Protocol):
+    """A drive, or a node that is none."""
+
+    name: str
+
+    @property
+    def is_enabled(self) -> bool:
+        """What it moves is in motion or may be: parameters on which that rests are left alone."""
+        ...
+
+    def refusal(self, identity: Identity) -> str:
+        """Why ``identity`` may not command it; empty where it may."""
+        ...
+
+    def on_refused(self, now: float) -> None:
+        """A request about it was refused elsewhere, and counts as one that is refused here."""
+        ...
+
+    def on_sdo_refused(self, abort_code: int, now: float) -> None:
+        """It has refused an SDO that a client had asked for."""
+        ...
+
+    def on_parameter(self, name: str, setting: float, now: float) -> None:
+        """Its own setting of a parameter, in set 1, that decides what process data mean."""
+        ...
+
+
+@dataclass(slots=True)
+class Node:
+    """A configured node and its drives, or the device that it is instead."""
+
+    bus: BusTable
+    table: NodeTable
+    family: Family
+    axis_names: AxisNames
+    drives: list[Drive] = field(default_factory=list[Drive])
+    device: Device | None = None
+
+    @property
+    def name(self) -> str:
+        return self.table.name
+
+    @property
+    def names(self) -> Names:
+        """The parameters of the node, or of its first axis."""
+        return self.axis_names.of()
+
+    def names_of(self, who: HasParameters) -> Names:
+        """The parameters of one of those that the node has."""
+        return self.axis_names.of(who.slot.axis) if isinstance(who, Drive) else self.names
+
+    def is_of(self, who: HasParameters, ref: ObjectRef) -> bool:
+        """Whether an object is one of who has parameters, and no other drive's of the node: of a node with
+        several axes those of its profile."""
+        if not isinstance(who, Drive) or all(one.slot.axis == 1 for one in self.drives):
+            return True
+        return ref.index in profile_of(who.slot.axis)
+
+    @property
+    def with_parameters(self) -> Sequence[HasParameters]:
+        return [self.device] if self.device else self.drives
+
+    @property
+    def commanded(self) -> Sequence[Drive | Outputs]:
+        """What it has that somebody commands."""
+        if self.device:
+            return [self.device.outputs] if self.device.outputs else []
+        return self.drives
+
+    def on_heard_again(self) -> None:
+        """It could not be heard for a while, and goes on as it was."""
+        for drive in self.drives:
+            drive.on_heard_again()

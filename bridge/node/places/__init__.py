@@ -1,0 +1,1 @@
+"""Where a node's parameters and words are: its SDO channels, and the places in its PDOs."""

@@ -1,0 +1,130 @@
+"""The audit log of the service: entries of the plant as JSON lines (``docs/reference/audit-log.md``)."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from bridge.base.guard import Guard
+from bridge.command import Event, Kind, Plant
+from bridge.command.audit import AuditEntry
+from bridge.config import Site
+from bridge.image import Value
+from bridge.service.audit_file import AuditFile
+
+_PERIOD_S: Final = 0.5
+_LONGEST_TEXT: Final = 300
+"""Callers on the network may send anything: long texts are cut."""
+_encode = msgspec.json.Encoder().encode
+
+
+def as_line(entry: AuditEntry, epoch_ns: int) -> bytes:
+    """One line with its line break, ASCII except for names that clients give themselves."""
+    who, ending = entry.identity, entry.ending
+    seconds, ns = divmod(epoch_ns, 1_000_000_000)
+    at = datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%dT%H:%M:%S")
+    line: dict[str, object] = {
+        "t": f"{at}.{ns // 1000:06d}Z",
+        "mono": round(entry.time, 6),
+        "source": who.source.label,
+    }
+    # Empty where one line stands for several requests that differ in it.
+    where_known: dict[str, object] = {
+        "user": _cut(who.user),
+        "role": who.role.name.lower() if who.user else None,
+        "target": _cut(entry.target),
+        "action": _cut(entry.action),
+        "code": ending.code,
+        "forwarded": ending.forwarded,
+        "address": _cut(who.address),
+        "old": {_cut(leaf): _shown(value) for leaf, value in entry.old.items()},
+        "new": {_cut(leaf): _shown(value) for leaf, value in entry.new.items()},
+        "message": _cut(ending.message),
+        "count": entry.count if entry.count != 1 else None,
+    }
+    known = {key: value for key, value in where_known.items() if value or value is False}
+    return _encode(line | known) + b"\n"
+
+
+def _cut(text: str) -> str:
+    # A lone surrogate has no UTF-8.
+    text = text.encode("utf-8", "replace").decode("utf-8")
+    return text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]}…"
+
+
+def _shown(value: Value) -> Value:
+    return _cut(value) if isinstance(value, str) else value
+
+
+class AuditLog:
+    """Writes all requests to ``plant``. ``clock`` is monotonic, ``epoch`` turns such a time into ns since
+    1970 UTC. Lost lines are counted in ``bridge/audit_lost``.
+
+    ``refused`` takes what was refused, so that a client that is refused again and again pushes nothing out of
+    ``file``.
+    """
+
+    def __init__(
+        self, plant: Plant, site: Site, clock: Callable[[], float], epoch: Callable[[float], int]
+    ) -> None:
+        settings = site.audit
+        self._plant = plant
+        self._clock = clock
+        self._epoch = epoch
+        self._guard = Guard("audit log")
+        path = Path(settings.file) if settings.file else Path(site.site.state_dir) / "audit.jsonl"
+        self.file = AuditFile(path, settings.max_bytes, settings.keep)
+        refused = path.with_name(f"{path.stem}-refused{path.suffix}")
+        self.refused = AuditFile(refused, settings.max_bytes, settings.keep)
+        self._files = (self.file, self.refused)
+        self._faults = ["" for _ in self._files]
+        self._settings = settings
+        plant.set("bridge/audit_lost", 0, plant.began)
+
+    def start(self) -> None:
+        if self._settings.enabled:
+            for file in self._files:
+                file.start()
+            every = self._settings.every_telegram
+            self._plant.audit.tell_to(self._on_entry, every_telegram=every)
+
+    def close(self) -> None:
+        if self._settings.enabled:
+            self._plant.audit.sum_up(self._clock())
+            self._plant.audit.tell_to(None)
+            for file in self._files:
+                file.close()
+
+    async def run(self) -> None:
+        """Until cancelled: summaries, and whether lines are lost."""
+        while True:
+            await asyncio.sleep(_PERIOD_S)
+            self.look(self._clock())
+
+    def look(self, now: float) -> None:
+        self._plant.audit.on_time(now)
+        self._plant.set(
+            "bridge/audit_lost", sum(file.all_lost for file in self._files) + self._guard.faults, now
+        )
+        for place, file in enumerate(self._files):
+            fault = file.fault
+            if fault != self._faults[place]:
+                self._faults[place] = fault
+                self._tell(file, fault, now)
+
+    def _tell(self, file: AuditFile, fault: str, now: float) -> None:
+        severity, message = 300, f"the audit log is written again; {file.all_lost} lines are missing"
+        if fault:
+            severity, message = 600, f"the audit log is not written: {file.path}: {fault}"
+        self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", severity, message))
+
+    def _on_entry(self, entry: AuditEntry) -> None:
+        file = self.refused if entry.is_refused else self.file
+        # The caller gets its outcome, whatever becomes of the line.
+        with self._guard:
+            file.put(as_line(entry, self._epoch(entry.time)))

@@ -1,0 +1,280 @@
+"""Composition root of the bus process: the only place that knows all parts."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import logging
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import AsyncExitStack, suppress
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from bridge import __version__
+from bridge.base import clock
+from bridge.base.errors import BridgeError, OperationFailed, Unavailable
+from bridge.base.notify import Notifier
+from bridge.can import Bus, open_bus
+from bridge.can.softbus import SoftBus
+from bridge.can.wiretap import Wiretap
+from bridge.command import Plant, PlantView
+from bridge.config import BusTable
+from bridge.lint import Severity, lint
+from bridge.master.ending import Ending
+from bridge.master.master import Master
+from bridge.master.network import Network
+from bridge.master.standstill import Alarm
+from bridge.mirror.endpoint import socket_endpoint, tap_path
+from bridge.mirror.publisher import MirrorPublisher
+from bridge.northbound.gateway.nets import net_of
+from bridge.northbound.gateway.server import GatewayServer
+from bridge.northbound.listening import Port
+from bridge.northbound.modbus.server import ModbusServer
+from bridge.northbound.modbus.units import units_of
+from bridge.northbound.zenoh.preflight import check_ports
+from bridge.project import Project, count
+from bridge.service.audit_log import AuditLog
+from bridge.service.event_log import log_event
+from bridge.service.front_process import FRONTS, Front
+from bridge.service.parts import Parts, Ports, ServerPart
+from bridge.service.plant_condition import PlantCondition
+from bridge.service.preflight import check_files
+from bridge.service.wear import WearKeeper
+
+_log = logging.getLogger(__name__)
+
+_START_S: Final = 45.0
+"""How long "ready" waits for fronts that neither serve nor fail; less than the unit's TimeoutStartSec."""
+
+_NOBODY_HURRIES_MS: Final = 1000
+
+MakeBus = Callable[[BusTable], Bus]
+
+
+def make_bus(table: BusTable) -> Bus:
+    """The bus of a site file. Raises ``BridgeError`` for a virtual one, which only a demo can have."""
+    if table.interface == "virtual":
+        raise BridgeError(
+            f"bus {table.name} is virtual: it exists only inside one process; use `drivebridge demo`"
+        )
+    return open_bus(table.name, table.interface, table.channel or "", table.bitrate)
+
+
+class Service:
+    """The bus process of one site.
+
+    ``make_bus`` gives the buses. Of what the site serves by fronts, ``fronts`` are started: without any, this
+    process serves Modbus alone. ``alarm`` is the master's.
+    """
+
+    def __init__(
+        self,
+        project: Project,
+        make_bus: MakeBus = make_bus,
+        *,
+        fronts: Collection[str] = FRONTS,
+        alarm: Alarm | None = None,
+    ) -> None:
+        self.project = project
+        site = project.site
+        self.plant = Plant(site, project.families, __version__, clock.now())
+        self.plant.on_event(log_event)
+        self.wear = WearKeeper(self.plant.eeprom_writes, Path(site.site.state_dir))
+        self.audit = AuditLog(self.plant, site, clock.now, clock.epoch_ns)
+        self.notifier = Notifier()
+        networks = [
+            (make_bus(table), Network(table, self.plant, clock.epoch_ns, project.downloads))
+            for table in site.bus
+        ]
+        self._networks = [network for _, network in networks]
+        self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm, clock.suspended_s)
+        self.view = PlantView(self.plant, clock.now, clock.epoch_ns, self.master.carry_out, self.master.wake)
+        self.condition = PlantCondition(self.plant, project.families, clock.now, clock.epoch_ns)
+        self.modbus = (
+            ModbusServer(self.view, units_of(self.plant), site.modbus, clock.now) if site.modbus else None
+        )
+        endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
+        period_ms = site.zenoh.period_ms if site.zenoh else _NOBODY_HURRIES_MS
+        self.mirror = MirrorPublisher(self.view, endpoint, clock.now, period_ms / 1000)
+        folder = Path(site.site.runtime_dir)
+        taps = {table.name: tap_path(folder, site.site.name, table.name) for table in site.bus}
+        self.gateways = self._make_gateways(taps)
+        self._taps = [
+            Wiretap(bus, taps[bus.name])
+            for bus, _ in networks
+            if (site.page or bus.name in self.gateways) and isinstance(bus, SoftBus)
+        ]
+        """For the page and for clients of the gateway, of buses that no other process can listen to."""
+        self._tasks: list[asyncio.Task[None]] = []
+        self._ending: Ending | None = None
+        drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")
+        self.parts = Parts(self.plant, self.notifier, clock.now, f"{drives} on {buses}")
+        self._opened = Ports()
+        self.fronts: list[Front] = []
+        self._ports: dict[str, Port] = {}
+        """Of the fronts: a front that dies leaves its port to the next."""
+        if "opcua" in fronts and site.opcua:
+            self._add_front("opcua", Port(site.opcua.listen, "opcua.listen"))
+        if "page" in fronts and site.page:
+            self._add_front("page", Port(site.page.listen, "page.listen"))
+        self._zenoh = site.zenoh if "zenoh" in fronts else None
+        if self._zenoh:
+            self._add_front("zenoh")
+
+    def _make_gateways(self, taps: Mapping[str, Path]) -> dict[str, GatewayServer]:
+        """By bus; ``taps`` are where the frames of each are passed on."""
+        site = self.project.site
+        folder = Path(site.site.runtime_dir).absolute()
+        return {
+            table.name: GatewayServer(
+                self.view,
+                net_of(table, number, self.plant.nodes.values(), taps[table.name]),
+                folder / f"{site.site.name}-{table.name}.gateway",
+                None if table.gateway == "socket" else table.gateway,
+                clock.now,
+            )
+            for number, table in enumerate(site.bus, 1)
+            if table.gateway
+        }
+
+    def _add_front(self, role: str, port: Port | None = None) -> None:
+        """``port`` is what this process holds for it."""
+        if port:
+            self._ports[role] = port
+        command = ["run", str(self.project.path), "--role", role]
+        most_mb = self.project.site.site.front_memory_mb
+        listening = port.socket if port else None
+        self.fronts.append(Front(role, command, watched=True, listening=listening, most_mb=most_mb))
+
+    async def run(self, ready: Callable[[], None] = lambda: None) -> None:
+        """Serve until cancelled; ``ready`` is called as soon as the buses are open.
+
+        Raises ``FileFaults`` where a file cannot be used, ``Unavailable`` where a bus or all ports cannot be
+        opened (with ``site.all_ports``: one of them), and ``OperationFailed`` when the master has failed. A
+        server or a front that cannot be started or fails later is started again.
+        """
+        self._say_what_is_doubtful()
+        async with AsyncExitStack() as stack:
+            stack.callback(self._say_end)
+            check_files(self.project.site, self.project.path, fronts=bool(self.fronts))
+            self.wear.keep()
+            stack.callback(self.wear.keep)
+            self.audit.start()
+            stack.callback(self.audit.close)
+            await self._open_ports(stack)
+            stack.push_async_callback(self._end_tasks)
+            # What is there now stays: the collector need not look at it again and again. Before the bus is
+            # opened, because the first look takes longer than a round may be late.
+            gc.collect()
+            gc.freeze()
+            await self.master.start()
+            # Whatever ends the service: the drives stop before anything else ends.
+            stack.push_async_callback(self._stop)
+            ready()
+            await self._serve()
+
+    async def _open_ports(self, stack: AsyncExitStack) -> None:
+        """Ports first: a service that cannot be reached has no business on the bus. One that cannot be opened
+        is tried again while the others are served, unless the site needs all."""
+        ports, needs_all = self._opened, self.project.site.site.all_ports
+        if self.modbus:
+            stack.push_async_callback(self.modbus.close)
+            await ports.open("modbus", self.modbus.start)
+        for role, port in self._ports.items():
+            stack.callback(port.close)
+            await ports.open(role, port.open)
+        if self._zenoh:
+            await ports.open("zenoh", partial(check_ports, self._zenoh))
+        ports.check(needs_all=needs_all)
+        await self.mirror.start()
+        stack.push_async_callback(self.mirror.close)
+        # After the mirror, which sees that the folder of their sockets is ours alone.
+        for name, gateway in self.gateways.items():
+            stack.push_async_callback(gateway.close)
+            await ports.open(f"gateway {name}", gateway.start)
+        ports.check(needs_all=needs_all)
+        for tap in self._taps:
+            stack.push_async_callback(tap.close)
+            try:
+                await tap.start()
+            except Unavailable as error:
+                _log.warning("the page will not show the traffic of a bus: %s", error)
+
+    def halt(self) -> None:
+        """Stop all drives now, and take no command any more but stops. ``run`` is to be cancelled next."""
+        self.master.halt(clock.now())
+
+    async def _serve(self) -> None:
+        """Until cancelled, or until a task ends: each runs for ever, or raises when its part has failed."""
+        parts = [*self._servers(), *self.fronts]
+        self.parts.expect(parts)
+        works = {
+            "master": self.master.failed(),
+            "EEPROM counts": self.wear.run(),
+            "audit log": self.audit.run(),
+            "condition": self.condition.run(),
+            "start": self._start(),
+            **{part.name: self.parts.keep(part) for part in parts},
+        }
+        self._tasks = [asyncio.create_task(work, name=name) for name, work in works.items()]
+        done, _ = await asyncio.wait(self._tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            if not task.cancelled():
+                task.result()
+        raise OperationFailed(f"the service has lost a task: {', '.join(task.get_name() for task in done)}")
+
+    def _servers(self) -> Iterator[ServerPart]:
+        has = self._opened.has
+        if self.modbus:
+            yield ServerPart("modbus", "the Modbus server", self.modbus, is_started=has("modbus"))
+        for bus, gateway in self.gateways.items():
+            name = f"gateway {bus}"
+            yield ServerPart(name, f"the gateway of {bus}", gateway, is_started=has(name))
+        yield ServerPart("mirror", "the link to the fronts", self.mirror)
+
+    async def _start(self) -> None:
+        """Ready is who serves what the site file says, or can say what it does not serve."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self.parts.all_known(), _START_S)
+        self.notifier.ready(self.parts.status)
+        await asyncio.get_running_loop().create_future()
+
+    async def _end_tasks(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def _say_what_is_doubtful(self) -> None:
+        """A site with a doubtful prediction is run all the same: stopping a plant over it would be worse. The
+        prediction for each bus becomes part of the published times of what is commanded there."""
+        verdict = lint(self.project.site, self.project.families, self.project.path, self.project.downloads)
+        for finding in verdict.findings:
+            level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
+            _log.log(level, "%s", finding.fault)
+        for load in verdict.loads:
+            _log.info("%s", load)
+        commanded = {one.name: one for node in self.plant.nodes.values() for one in node.commanded}
+        for case in verdict.worst_cases:
+            commanded[case.drive].on_wire(case.wire, clock.now())
+
+    async def _stop(self) -> None:
+        self.halt()
+        passive = [network.bus.name for network in self._networks if network.charge.is_left]
+        if passive:
+            _log.info("passive on %s: another bridge is in charge, nothing is sent there", ", ".join(passive))
+        if len(passive) < len(self._networks):
+            _log.info("stopping all drives%s", " of the other buses" if passive else "")
+        self.notifier.stopping()
+        try:
+            self._ending = await self.master.stop_drives(clock.now())
+        finally:
+            await self.master.close()
+
+    def _say_end(self) -> None:
+        """The last lines of the log."""
+        if self._ending is not None:
+            level = logging.INFO if self._ending.is_good else logging.ERROR
+            for line in self._ending.lines:
+                _log.log(level, "%s", line)
+        _log.info("stopped")

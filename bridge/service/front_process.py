@@ -1,0 +1,264 @@
+"""Front processes: started, heard, killed where they hang or grow too large, and stopped.
+
+A front is heavy and may crash; it holds nothing up. It is a child of the bus process, with a lower
+priority, and dies with it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ctypes
+import os
+import resource
+import signal
+import socket
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+from bridge.base.errors import BridgeError, OperationFailed
+
+SIGN_PERIOD_S: Final = 1.0
+_SILENT_LOOKS: Final = 5
+"""Between more looks than these, and since the last sign, this many seconds have passed for certain."""
+_REASON: Final = b"!"
+"""On the pipe of signs: what follows is why the front ends."""
+_LONGEST_REASON: Final = 1000
+_STOP_S: Final = 3.0
+FRONTS: Final = ("opcua", "page", "zenoh")
+"""Roles of all fronts of the service."""
+_NICE: Final = 5
+_PROMPT: Final = ("zenoh",)
+"""Roles whose clients command drives over and over, and wait for each answer: as important as the bus process
+itself, which is ahead of them all the same where its unit gives it a real-time priority."""
+_FIRST_TO_GO: Final = 500
+"""``oom_score_adj`` (proc(5)): where the machine or the unit has no memory left, a front is what the kernel
+kills, and not the process that stops the drives."""
+_MB: Final = 1024 * 1024
+_BEYOND: Final = 2
+"""A front that grows faster than it is looked at is refused memory beyond this many times its limit."""
+_PR_SET_PDEATHSIG: Final = 1
+
+
+class Front:
+    """One front process: ``python -m bridge`` with ``arguments`` and our process id.
+
+    A ``watched`` one is given a pipe (``--signs``) on which it shows that its event loop runs, and says why
+    it ends. ``listening`` gives the socket that it is to serve on (``--listening``), which stays ours, too.
+    One that holds more than ``most_mb`` of memory is killed.
+    """
+
+    def __init__(
+        self,
+        role: str,
+        arguments: Sequence[str],
+        *,
+        watched: bool = False,
+        listening: Callable[[], socket.socket] | None = None,
+        most_mb: int | None = None,
+    ) -> None:
+        self.name = role
+        self.title = f"the {role} front"
+        self._arguments = list(arguments)
+        self._watched = watched
+        self._listening = listening
+        self._most_mb = most_mb
+        self._process: asyncio.subprocess.Process | None = None
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid if self._process else None
+
+    async def run_once(self, serves: Callable[[], None]) -> str:
+        """Run it until it ends; how that was, as the end of a sentence. ``serves`` is called at its first
+        sign of life; of one that is not watched, when it has run for a second. Cancelled, it is ended."""
+        ear = None
+        try:
+            ear = _Ear(serves) if self._watched else None
+            process = self._process = await self._spawn(ear)
+            return await self._wait(process, ear, serves)
+        except (BridgeError, OSError, RuntimeError) as error:
+            # No port, no process or no thread to be had: the machine is at its limits, which may pass. A
+            # child that nobody waits for loses its pipe, and ends by that.
+            return f"cannot be started: {error}"
+        finally:
+            if ear:
+                ear.close()
+            await self._stop()
+
+    async def _spawn(self, ear: _Ear | None) -> asyncio.subprocess.Process:
+        arguments, files = [*self._arguments, "--parent", str(os.getpid())], list[int]()
+        if ear:
+            arguments += ["--signs", str(ear.mouth)]
+            files.append(ear.mouth)
+        if self._listening:
+            files.append(self._listening().fileno())
+            arguments += ["--listening", str(files[-1])]
+        process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "bridge",
+            *arguments,
+            stdin=asyncio.subprocess.DEVNULL,
+            pass_fds=files,
+            # What a terminal sends to everybody is for the bus process: its drives stop first.
+            process_group=0,
+            # The bus process alone talks to systemd's watchdog.
+            env={k: v for k, v in os.environ.items() if k not in ("NOTIFY_SOCKET", "WATCHDOG_USEC")},
+        )
+        if ear:
+            ear.let_go()
+        return process
+
+    async def _wait(
+        self, process: asyncio.subprocess.Process, ear: _Ear | None, serves: Callable[[], None]
+    ) -> str:
+        """Until it ends, or is killed because it hangs."""
+        # One wait for all looks: of each that is given up, asyncio keeps a future until the process ends.
+        ended = asyncio.create_task(process.wait())
+        try:
+            while ear is None or ear.silent_looks <= _SILENT_LOOKS:
+                if (await asyncio.wait({ended}, timeout=SIGN_PERIOD_S))[0]:
+                    return f"ended ({_how(ended.result())})" + (
+                        f": {ear.reason}" if ear and ear.reason else ""
+                    )
+                if self._most_mb is not None and (held_mb := _resident_mb(process.pid)) > self._most_mb:
+                    await _kill(process, ended)
+                    return f"held {held_mb} MB of memory, more than {self._most_mb} MB, and was killed"
+                if ear:
+                    ear.look()
+                else:
+                    serves()
+            await _kill(process, ended)
+        finally:
+            ended.cancel()
+        return f"gave no sign of life for {_SILENT_LOOKS * SIGN_PERIOD_S:g} s and was killed"
+
+    async def _stop(self) -> None:
+        process = self._process
+        if process is None or process.returncode is not None:
+            return
+        with contextlib.suppress(ProcessLookupError):
+            process.terminate()
+        try:
+            await asyncio.wait_for(process.wait(), _STOP_S)
+        except TimeoutError:
+            with contextlib.suppress(ProcessLookupError):
+                process.kill()
+            await process.wait()
+
+
+class _Ear:
+    """Our end of the pipe on which one front gives its signs of life.
+
+    Silence is counted in looks and not in time: where this process itself was stopped for a while, the
+    front's signs wait in the pipe, or it was stopped too.
+    """
+
+    def __init__(self, serves: Callable[[], None]) -> None:
+        self.silent_looks = 0
+        self.reason = ""
+        self._has_heard = False
+        self._serves = serves
+        self._loop = asyncio.get_running_loop()
+        self._end, self.mouth = os.pipe()
+        self._mouth_is_ours = True
+        os.set_blocking(self._end, False)
+        self._loop.add_reader(self._end, self._hear)
+
+    def look(self) -> None:
+        """One that is still starting may take its time."""
+        self.silent_looks += self._has_heard
+
+    def let_go(self) -> None:
+        """The front has its end now."""
+        if self._mouth_is_ours:
+            self._mouth_is_ours = False
+            os.close(self.mouth)
+
+    def close(self) -> None:
+        self.let_go()
+        self._loop.remove_reader(self._end)
+        os.close(self._end)
+
+    def _hear(self) -> None:
+        try:
+            heard = os.read(self._end, 4096)
+        except BlockingIOError:
+            return
+        signs, bang, reason = heard.partition(_REASON)
+        if bang:
+            self.reason = reason.decode("utf-8", "replace")
+        if signs:
+            self.silent_looks = 0
+            if not self._has_heard:
+                self._has_heard = True
+                self._serves()
+        if not heard:
+            self._loop.remove_reader(self._end)
+
+
+async def give_signs(pipe: int) -> None:
+    """A front's signs of life, from its event loop, until cancelled.
+
+    Raises ``OperationFailed`` where nobody listens any more.
+    """
+    os.set_blocking(pipe, False)
+    while True:
+        try:
+            os.write(pipe, b".")
+        except BlockingIOError:
+            pass  # there are enough to read
+        except BrokenPipeError:
+            raise OperationFailed("the bus process has given this front up") from None
+        await asyncio.sleep(SIGN_PERIOD_S)
+
+
+def give_reason(pipe: int, reason: str) -> None:
+    """A front's last words: why it ends."""
+    with contextlib.suppress(OSError):
+        os.write(pipe, _REASON + " ".join(reason.split()).encode("utf-8", "replace")[:_LONGEST_REASON])
+
+
+def become_front(parent: int, role: str) -> None:
+    """Called by a front about itself: less important than the bus process, and not to outlive it."""
+    if role not in _PROMPT:
+        with contextlib.suppress(OSError):
+            os.nice(_NICE)
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text(str(_FIRST_TO_GO), encoding="ascii")
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+        if parent and os.getppid() != parent:  # it died before we asked
+            raise SystemExit(0)
+
+
+def limit_memory(most_mb: int) -> None:
+    """Called by a front about itself: memory far beyond ``most_mb`` is refused to it, and that is its end."""
+    with contextlib.suppress(OSError, ValueError):
+        most = _BEYOND * most_mb * _MB
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+
+async def _kill(process: asyncio.subprocess.Process, ended: asyncio.Task[int]) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        process.kill()
+    await ended
+
+
+def _resident_mb(pid: int) -> int:
+    """Memory that the process holds, in MB; 0 where that cannot be read, because it has just ended."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0
+    return pages * resource.getpagesize() // _MB
+
+
+def _how(code: int) -> str:
+    if code < 0:
+        with contextlib.suppress(ValueError):
+            return signal.Signals(-code).name
+    return f"exit status {code}"

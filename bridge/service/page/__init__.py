@@ -1,0 +1,1 @@
+"""What the page is given beside the plant: buses, captures, the system."""

@@ -1,0 +1,109 @@
+"""Composition root of the page's front: a web server on the mirror image, and nothing else."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from contextlib import AsyncExitStack
+from importlib.util import find_spec
+from pathlib import Path
+
+from bridge.base import clock
+from bridge.base.errors import OperationFailed
+from bridge.config import Site
+from bridge.drive import FaultWords
+from bridge.drive.fault_words import listed_faults
+from bridge.exports import dbc_file, modbus_table, opcua_table, zenoh_table
+from bridge.lint import dictionary_files
+from bridge.mapping import Family
+from bridge.mirror.client import MirrorClient
+from bridge.mirror.endpoint import socket_endpoint
+from bridge.northbound.listening import ListeningSocket, listen
+from bridge.northbound.page.integration import Export
+from bridge.northbound.page.server import PageServer
+from bridge.northbound.page.web import Backstage, FaultTexts, Page
+from bridge.parameter.ledger_file import LedgerFile
+from bridge.project import Project
+from bridge.service.front_process import give_signs
+from bridge.service.page.buses import Buses
+from bridge.service.page.system import SystemOf
+
+_log = logging.getLogger(__name__)
+
+
+def fault_texts(families: dict[str, Family]) -> FaultTexts:
+    """In German; English is what the points say."""
+    return {"de": {name: _in_german(family) for name, family in families.items()}}
+
+
+def _kept_sessions(site: Site) -> Path:
+    """Beside the socket of the mirror: the folder is ours alone, and empty after a boot."""
+    return Path(site.site.runtime_dir).absolute() / f"{site.site.name}-page.sessions"
+
+
+def exports_of(project: Project) -> dict[str, Export]:
+    """What ``drivebridge export`` prints, by the names of files."""
+    tables = {"modbus": modbus_table, "opcua": opcua_table, "zenoh": zenoh_table}
+    if project.site.zenoh is None:
+        del tables["zenoh"]
+    exports: dict[str, Export] = {}
+    for name, table in tables.items():
+        exports[f"{name}.csv"] = lambda table=table: table(project).as_csv()
+        exports[f"{name}.json"] = lambda table=table: table(project).as_json()
+    # The library for them is an extra: what cannot be made is not offered.
+    for place, bus in enumerate(project.site.bus if find_spec("cantools") else ()):
+        exports[f"{bus.name}.dbc"] = lambda place=place: dbc_file(project, place)
+    return exports
+
+
+def backstage_of(project: Project) -> Backstage:
+    """What the page shows of the files, the buses and the system of ``project``."""
+    buses = Buses(project, clock.epoch_ns)
+    return Backstage(
+        fault_texts(project.families),
+        exports_of(project),
+        buses.ears(),
+        buses.layouts(),
+        buses.capture,
+        LedgerFile(Path(project.site.site.state_dir)).totals,
+        dictionary_files(project.families, project.path),
+        SystemOf(project),
+    )
+
+
+def _in_german(family: Family) -> dict[str, dict[str, str]]:
+    words = FaultWords(family, "de")
+    listed = [words.listed(name) for name in listed_faults(family)]
+    return {one.number: {"text": str(one), "cause": one.cause, "remedy": one.remedy} for one in listed}
+
+
+async def run_page(project: Project, signs: int | None = None, listening: int | None = None) -> None:
+    """Serve until cancelled, with signs of life on the pipe ``signs`` as soon as it serves; on the socket
+    ``listening`` where the bus process holds the port.
+
+    Raises ``PointsChanged`` where the bus process comes back with other points: this front has to start anew
+    then.
+    """
+    site = project.site
+    if site.page is None:
+        raise OperationFailed("the site file has no [page] table")
+    async with AsyncExitStack() as stack:
+        endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
+        mirror = MirrorClient(endpoint, clock.now, "page")
+        await mirror.open()
+        stack.push_async_callback(mirror.close)
+        table = site.page
+        key = "page.listen"
+        bound = listen(table.listen, key) if listening is None else ListeningSocket(listening, key)
+        page = Page(mirror, site, project.families, backstage_of(project), clock.now, _kept_sessions(site))
+        server = PageServer(page, bound, table.certificate, table.private_key)
+        await server.start()
+        stack.push_async_callback(server.close)
+        scheme = "http" if table.certificate is None else "https"
+        _log.info("the page is served on %s://%s", scheme, table.listen)
+        async with asyncio.TaskGroup() as tasks:
+            tasks.create_task(mirror.run(), name="mirror")
+            tasks.create_task(mirror.failed(), name="mirror link")
+            tasks.create_task(server.failed(), name="listening socket")
+            if signs is not None:
+                tasks.create_task(give_signs(signs), name="signs of life")

@@ -1,0 +1,179 @@
+"""The parts of the service beside its buses: servers and fronts. One that fails is reported and restarted.
+
+No failure of a part ends the service: clients of the other parts go on moving drives.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Final, Protocol
+
+from bridge.base.errors import BridgeError, Unavailable
+from bridge.base.notify import Notifier
+from bridge.base.quietlog import about
+from bridge.base.ratelimit import Pauses
+from bridge.command import Event, Kind, Plant
+
+_log = logging.getLogger(__name__)
+
+_FIRST_PAUSE_S: Final = 0.2
+_LAST_PAUSE_S: Final = 10.0
+_STABLE_S: Final = 30.0
+"""A part that has served for this long starts again with the first pause."""
+_LONGEST_REASON: Final = 300
+_FAILING: Final = "bridge/fronts_failing"
+
+
+class Part(Protocol):
+    """``name`` is what the point calls it, ``title`` what sentences do."""
+
+    name: str
+    title: str
+
+    async def run_once(self, serves: Callable[[], None]) -> str:
+        """Start it where it has ended, call ``serves`` (once or more) when it can be used, and wait until it
+        ends: how, as the end of a sentence. May raise."""
+        ...
+
+
+class Server(Protocol):
+    async def start(self) -> None: ...
+
+    async def failed(self) -> None: ...
+
+
+class Ports:
+    """What can be opened at the start. One port that is taken, or an address that is not there yet, does not
+    keep a plant from being served on the others: it is tried again with the parts."""
+
+    def __init__(self) -> None:
+        self._opened: set[str] = set()
+        self._failed: dict[str, str] = {}
+
+    async def open(self, name: str, start: Callable[[], Awaitable[object]]) -> None:
+        """Start what serves under ``name``."""
+        try:
+            await start()
+        except Unavailable as error:
+            self._failed[name] = str(error)
+        else:
+            self._opened.add(name)
+
+    def has(self, name: str) -> bool:
+        """Whether it has been opened."""
+        return name in self._opened
+
+    def check(self, *, needs_all: bool) -> None:
+        """Raises ``Unavailable`` where none could be opened, or where one could not and the site
+        ``needs_all``: a service that cannot be reached has no business on the bus."""
+        if self._failed and (needs_all or not self._opened):
+            raise Unavailable("\n".join(self._failed.values()))
+
+
+class ServerPart:
+    """A server of this process, which ``is_started`` already or is to be started first."""
+
+    def __init__(self, name: str, title: str, server: Server, *, is_started: bool = True) -> None:
+        self.name = name
+        self.title = title
+        self._server = server
+        self._is_started = is_started
+
+    async def run_once(self, serves: Callable[[], None]) -> str:
+        if not self._is_started:
+            await self._server.start()
+        self._is_started = False
+        serves()
+        await self._server.failed()
+        return "has ended"
+
+
+class Parts:
+    """Keeps the parts going, and reports which fail: point, events, and systemd's status line.
+
+    ``clock`` is the plant's; ``status`` is the rest of the status line.
+    """
+
+    def __init__(self, plant: Plant, notifier: Notifier, clock: Callable[[], float], status: str) -> None:
+        self._plant = plant
+        self._notifier = notifier
+        self._clock = clock
+        self._status = status
+        self._failing: dict[str, str] = {}
+        self._pauses = Pauses()
+        self._told: set[str] = set()
+        self._unknown: set[str] = set()
+        self._all_known = asyncio.Event()
+        plant.set(_FAILING, "", plant.began)
+
+    @property
+    def status(self) -> str:
+        """One line for whoever looks after the service."""
+        return f"{self._status}; not served: {self._failing_text}" if self._failing else self._status
+
+    @property
+    def _failing_text(self) -> str:
+        return "; ".join(f"{name}: {self._failing[name]}" for name in sorted(self._failing))
+
+    def expect(self, parts: Sequence[Part]) -> None:
+        """Whom ``all_known`` waits for."""
+        self._unknown = {part.name for part in parts}
+        self._look()
+
+    async def all_known(self) -> None:
+        """Wait until each part has served or failed for the first time."""
+        await self._all_known.wait()
+
+    async def keep(self, part: Part) -> None:
+        """Keep ``part`` going until cancelled; restart it after each end, with growing pauses."""
+        pause_s = _FIRST_PAUSE_S
+        while True:
+            began = time.monotonic()
+            how = await self._run_once(part)
+            if time.monotonic() - began > _STABLE_S:
+                pause_s = _FIRST_PAUSE_S
+            self._fails(part, " ".join(how.split())[:_LONGEST_REASON], pause_s)
+            await asyncio.sleep(pause_s)
+            pause_s = min(pause_s * 2, _LAST_PAUSE_S)
+
+    async def _run_once(self, part: Part) -> str:
+        try:
+            return await part.run_once(lambda: self._serves(part))
+        except (BridgeError, OSError) as error:
+            return f"has failed: {error}"
+        except Exception as error:  # noqa: BLE001 - one of them must not stop the drives of the others
+            _log.exception("unexpected", extra=about(part.name))
+            return f"has failed: {error!r}"
+
+    def _fails(self, part: Part, how: str, pause_s: float) -> None:
+        """An event at most once a minute: one that never comes up must not fill a disk."""
+        self._failing[part.name] = how
+        now = self._clock()
+        self._settled(part, now)
+        if self._pauses.take(now, part.name) is not None:
+            self._told.add(part.name)
+            message = f"{part.title} {how}; it is started again in {pause_s:.1f} s"
+            self._plant.report(Event(now, Kind.FRONT, "bridge", 700, message))
+
+    def _serves(self, part: Part) -> None:
+        if part.name not in self._failing and part.name not in self._unknown:
+            return
+        self._failing.pop(part.name, None)
+        now = self._clock()
+        self._settled(part, now)
+        if part.name in self._told:
+            self._told.discard(part.name)
+            self._plant.report(Event(now, Kind.FRONT, "bridge", 200, f"{part.title} serves again"))
+
+    def _settled(self, part: Part, now: float) -> None:
+        self._unknown.discard(part.name)
+        self._look()
+        self._plant.set(_FAILING, self._failing_text, now)
+        self._notifier.status(self.status)
+
+    def _look(self) -> None:
+        if not self._unknown:
+            self._all_known.set()

@@ -1,0 +1,52 @@
+"""Events: all that matter, and no flood."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from bridge.command import Event, Kind
+from bridge.command.messages.event import EventGate
+
+
+def event(kind: Kind, time: float, source: str = "conveyor/fu1") -> Event:
+    return Event(time, kind, source, 300, "")
+
+
+def test_a_client_that_is_refused_a_thousand_times_is_told_of_ten_times_a_second():
+    gate = EventGate()
+    told = [gate.admits(event(Kind.REFUSED, n / 500)) for n in range(1000)]
+    assert sum(told) == 20
+
+
+def test_who_floods_hides_nobody_else():
+    gate = EventGate()
+    for _ in range(100):
+        gate.admits(event(Kind.REFUSED, 5.0))
+    assert gate.admits(event(Kind.REFUSED, 5.0, "conveyor/fu2"))
+    assert gate.admits(event(Kind.EMERGENCY, 5.0))
+
+
+REPEATING = (Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER)
+"""What somebody on the network or on the bus can bring about at will."""
+
+
+@pytest.mark.parametrize("kind", REPEATING)
+def test_what_anybody_can_repeat_is_told_ten_times_a_second(kind: Kind):
+    gate = EventGate()
+    assert [gate.admits(event(kind, 5.0)) for _ in range(11)] == [True] * 10 + [False]
+    assert not gate.admits(event(kind, 5.99))
+    assert gate.admits(event(kind, 6.0)), "another second"
+
+
+@pytest.mark.parametrize("kind", [kind for kind in Kind if kind not in REPEATING])
+def test_what_happens_to_a_drive_is_always_told(kind: Kind):
+    gate = EventGate()
+    assert all(gate.admits(event(kind, 5.0)) for _ in range(100))
+
+
+def test_the_text_has_the_cause_behind_the_message_where_one_is_known():
+    lost = Event(5.0, Kind.NODE_LOST, "conveyor", 700, "node lost")
+    assert lost.text == "node lost"
+    assert replace(lost, cause="can0 is silent").text == "node lost (because: can0 is silent)"

@@ -1,0 +1,238 @@
+"""The nodes of the points: as if asyncua had made and held each of them, and yet almost nothing is held."""
+
+from __future__ import annotations
+
+import gc
+import random
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace
+
+from bridge.command import Plant
+from bridge.image import DataType, Image, Point
+from bridge.mapping import family_names
+from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.tree import Tree
+from bridge.project import load_project
+from tests.support import sites
+from tests.support.families import FamilySite
+from tests.support.opcua_held import HeldTree, copy_of, standard_space
+from tests.support.opcua_site import make_plant
+
+NAMESPACE = 2
+DEMO = Path(__file__).parents[4] / "bridge/demo/site.toml"
+VALUE = ua.AttributeIds.Value
+
+
+def epoch(time: float) -> int:
+    return round(time * 1e9)
+
+
+def tree_in(space: AddressSpace, image: Image) -> Tree:
+    return Tree(space, NAMESPACE, image, epoch, layout(image.points))
+
+
+def of_all_families(folder: Path) -> Plant:
+    return of_project(FamilySite(folder, family_names(), "opcua").path)
+
+
+def of_project(path: Path) -> Plant:
+    project = load_project(path)
+    return Plant(project.site, project.families, "1.2.3")
+
+
+PLANTS: dict[str, Callable[[Path], Plant]] = {
+    "four drives": lambda _: make_plant(),
+    "all families": of_all_families,
+    "demo": lambda _: of_project(DEMO),
+}
+
+
+@pytest.fixture(scope="module")
+def standard() -> AddressSpace:
+    return standard_space()
+
+
+@pytest.fixture
+def image() -> Image:
+    return make_plant().image
+
+
+@pytest.fixture
+def space(standard: AddressSpace) -> AddressSpace:
+    return copy_of(standard)
+
+
+@pytest.fixture
+def tree(space: AddressSpace, image: Image) -> Tree:
+    return tree_in(space, image)
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_clients_see_what_asyncua_would_have_held(name: str, standard: AddressSpace, tmp_path: Path) -> None:
+    image = PLANTS[name](tmp_path).image
+    held = HeldTree(copy_of(standard), NAMESPACE, image)
+    space = copy_of(standard)
+    tree_in(space, image)
+    ids = [ua.NodeId(ua.ObjectIds.ObjectsFolder), ua.NodeId(ua.ObjectIds.Server), *held.ids]
+    random.Random(1).shuffle(ids)
+    for where in ids:
+        assert where in space
+        assert held.seen(where, space) == held.seen(where), where
+
+
+def test_a_property_has_the_time_at_which_the_server_started(tree: Tree, space: AddressSpace) -> None:
+    units = [ua.NodeId(f"conveyor/fu{n}/actual/frequency/EngineeringUnits", NAMESPACE) for n in (1, 2)]
+    first, second = (space.read_attribute_value(where, VALUE) for where in units)
+    assert first.SourceTimestamp == first.ServerTimestamp == second.SourceTimestamp is not None
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        ua.NodeId("", NAMESPACE),
+        ua.NodeId("conveyor/fu9", NAMESPACE),
+        ua.NodeId("conveyor/fu1/actual/frequency/EUInformation", NAMESPACE),
+        ua.NodeId("conveyor/fu1", NAMESPACE + 1),
+        ua.NodeId(b"conveyor/fu1", NAMESPACE),
+        ua.NodeId(7, NAMESPACE),
+    ],
+)
+def test_what_is_not_there_is_not_found(tree: Tree, space: AddressSpace, where: ua.NodeId) -> None:
+    assert where not in space
+    assert space.get(where) is None
+    with pytest.raises(KeyError):
+        space[where]
+
+
+def test_two_nodes_of_one_id_are_an_error(space: AddressSpace) -> None:
+    word = Point(name="bridge/word", data_type=DataType.UINT16, bits=("low",))
+    with pytest.raises(ValueError, match="two nodes have the id 'bridge/word'"):
+        tree_in(space, Image([word, Point(name="bridge/word/low", data_type=DataType.BOOL)]))
+
+
+class TestWatching:
+    @pytest.mark.parametrize(
+        ("name", "attribute"),
+        [
+            ("bus/can0/load", VALUE),
+            ("bus/can0/load", ua.AttributeIds.NodeId),
+            ("bus/can0/load", ua.AttributeIds.DisplayName),
+            ("bus/can0/load", ua.AttributeIds.DataType),
+            ("bus/can0/load/EngineeringUnits", VALUE),
+            ("conveyor/fu1", ua.AttributeIds.EventNotifier),
+        ],
+    )
+    def test_any_attribute_can_be_watched_twice_and_no_more(
+        self, tree: Tree, space: AddressSpace, name: str, attribute: ua.AttributeIds
+    ) -> None:
+        def callbacks() -> dict[int, Any]:
+            return dict(space[where].attributes[attribute].datachange_callbacks)
+
+        where = ua.NodeId(name, NAMESPACE)
+        handles = [space.add_datachange_callback(where, attribute, print)[1] for _ in range(2)]
+        assert list(callbacks()) == handles
+        for handle in handles:
+            space.delete_datachange_callback(handle)
+        assert not callbacks()
+
+    def test_reading_watches_nothing(self, tree: Tree, space: AddressSpace) -> None:
+        space.read_attribute_value(ua.NodeId("bus/can0/load", NAMESPACE), VALUE)
+        assert not tree.watched
+
+    def test_a_word_and_its_bits_are_found_by_their_point(
+        self, tree: Tree, space: AddressSpace, image: Image
+    ) -> None:
+        word = "conveyor/fu1/status/status_word"
+        for name in (f"{word}/fault", word):
+            space.add_datachange_callback(ua.NodeId(name, NAMESPACE), VALUE, print)
+        image.set(image.index[word], 0b1000, 1.0)
+        watched = tree.watched[image.index[word]]
+        assert [watched[place].read().Value for place in sorted(watched)] == [
+            ua.Variant(0b1000, ua.VariantType.UInt16),
+            ua.Variant(True, ua.VariantType.Boolean),
+        ]
+
+
+class TestWhatIsHeld:
+    """Objects for one drive, counted; all drives are of the same kind."""
+
+    @staticmethod
+    def image_of(*slots: str) -> Image:
+        drives = [sites.drive(slot, "opcua", 0) for slot in slots]
+        return sites.plant_of(sites.site(sites.bus(sites.node(*drives)), sites.opcua())).image
+
+    @staticmethod
+    def left_by(act: Callable[[], object]) -> Counter[str]:
+        """The objects that are there since, by their types."""
+        before = objects()
+        kept = act()
+        after = objects()
+        del kept
+        return after - before
+
+    @staticmethod
+    def browse(space: AddressSpace, name: str) -> list[ua.NodeId]:
+        return list(below(space, ua.NodeId(name, NAMESPACE)))
+
+    def test_before_anybody_looks_it_is_one_small_object_for_each_node_that_is_no_property(
+        self, standard: AddressSpace
+    ) -> None:
+        one, two = self.image_of("fu1"), self.image_of("fu1", "fu2")
+        spaces = [copy_of(standard) for _ in range(3)]
+        tree_in(spaces[0], two)
+        of_one = self.left_by(lambda: tree_in(spaces[1], one))
+        of_two = self.left_by(lambda: tree_in(spaces[2], two))
+        drive = of_two - of_one
+        points = [point for point in two.points if point.name.startswith("conveyor/fu2/")]
+        bits = [bit for point in points for bit in point.bits if bit]
+        methods = 11
+        assert drive["VariableNode"] == len(points) + len(bits)
+        assert drive["_TreeNode"] == len(points) + len(bits) + drive["ObjectNode"] + methods
+        # What the server refers to it with, as to all that sends events.
+        assert (drive["NodeId"], drive["ReferenceDescription"], drive["Name"]) == (2, 1, 1)
+        for kind in ("AttributeValue", "DataValue", "Variant", "NodeData"):
+            assert drive[kind] <= 2, "its name"
+        assert drive.total() <= 2.5 * drive["_TreeNode"], drive
+
+    def test_who_browses_leaves_the_references_downwards_and_who_reads_leaves_nothing(
+        self, space: AddressSpace
+    ) -> None:
+        def read() -> None:
+            for where in nodes:
+                for attribute in list(space[where].attributes):
+                    space.read_attribute_value(where, attribute)
+
+        def look() -> int:
+            return len(self.browse(space, "conveyor/fu2"))
+
+        tree_in(space, self.image_of("fu1", "fu2"))
+        nodes = self.browse(space, "conveyor/fu1")
+        read()
+        browsed = self.left_by(look)
+        assert browsed["ReferenceDescription"] == browsed["NodeId"] == look() - 1
+        assert not browsed["Name"], (
+            "drives have the same, and its own is in what the server refers to it with"
+        )
+        assert not browsed["AttributeValue"]
+        assert not self.left_by(look)
+        nodes = self.browse(space, "conveyor/fu2")
+        assert not self.left_by(read)
+
+
+def objects() -> Counter[str]:
+    gc.collect()
+    return Counter(type(one).__name__ for one in gc.get_objects() if type(one) is not Counter)
+
+
+def below(space: AddressSpace, where: ua.NodeId) -> Iterator[ua.NodeId]:
+    yield where
+    hierarchy = [ua.NodeId(ua.ObjectIds.HasComponent), ua.NodeId(ua.ObjectIds.HasProperty)]
+    for one in space[where].references:
+        if one.IsForward and one.ReferenceTypeId in hierarchy:
+            yield from below(space, one.NodeId)

@@ -1,0 +1,226 @@
+"""What the bridge itself says, in German on the page: nobody adds a message without its phrase."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from bridge.canopen import abort
+from bridge.canopen.habits import HABITS
+from bridge.canopen.sdo_ways_back import WAYS_BACK
+from bridge.command.link import NodeState
+from bridge.command.messages.request import Action, Code
+from bridge.drive import DriveState
+from bridge.mapping import emcy_codes
+from bridge.node.boot import status
+from tests.support.phrases import SLOT, Book, is_looked_up, read
+from tests.support.said import WORD, WORDS, texts_of
+
+FILE: Final = Path("bridge/northbound/page/static/js/texts/said-de.json")
+PAIRS: Final = read(FILE)
+BOOK: Final = Book(PAIRS)
+
+COVERED: Final = (
+    "bridge/command",
+    "bridge/node",
+    "bridge/master",
+    "bridge/drive",
+    "bridge/parameter",
+    "bridge/mirror/client.py",
+    "bridge/mirror/publisher.py",
+    "bridge/northbound/page/bus.py",
+    "bridge/northbound/page/viewer.py",
+    "bridge/northbound/page/parameters.py",
+    "bridge/canopen/abort.py",
+    "bridge/canopen/datatypes.py",
+    "bridge/canopen/duplicate.py",
+    "bridge/canopen/nmt.py",
+    "bridge/canopen/pdo.py",
+    "bridge/canopen/sdo_transfer.py",
+    "bridge/can/errorframe.py",
+    "bridge/can/explain.py",
+    "bridge/can/listener.py",
+    "bridge/lint",
+    "bridge/mapping/device.py",
+    "bridge/mapping/emcy_codes.py",
+    "bridge/service/parts.py",
+    "bridge/service/plant_condition.py",
+    "bridge/service/front_process.py",
+    "bridge/service/page/buses.py",
+)
+APART: Final = (
+    "bridge/lint/report.py",
+    "bridge/command/points.py",  # descriptions of points
+    "bridge/command/leg/state.py",  # what its states mean, for the documentation
+    "bridge/command/leg/table.py",
+    "bridge/command/follow.py",
+    "bridge/drive/fault_words.py",  # in both languages itself
+    "bridge/master/ending.py",  # the log's last lines
+    "bridge/parameter/error.py",
+    "bridge/parameter/backup_file.py",  # the command line and its files
+    "bridge/parameter/backups.py",
+    "bridge/parameter/ledger_file.py",
+    "bridge/parameter/number_text.py",
+    "bridge/parameter/set_file.py",
+)
+UNSAID: Final[dict[str, tuple[str, ...]]] = {
+    "bridge/command/messages/event.py": ("Zq zq (because: 7Xq)",),
+    "bridge/command/plant.py": ("Zq zq on 7Xq", "more than 247 drives have no Modbus unit id"),
+    "bridge/command/worst_case.py": (
+        "how much older the owner's last telegram may be than the bridge assumes",
+    ),
+    "bridge/drive/meaning.py": ("7Xq of  Zq zq",),
+    "bridge/drive/own_supervision.py": ("7Xq = 7Xq ms", "7Xq × 100D:00 = 7Xq ms × 7Xq"),
+    "bridge/master/master.py": ("the master has failed: Zq zq",),
+    "bridge/master/watch.py": ("master", "stranger 7Xq", "duplicate 7Xq"),
+    "bridge/mirror/publisher.py": ("Zq zq (is this site already being run?)",),
+    "bridge/northbound/page/bus.py": ("seconds = 1…7Xq, format = 7Xq",),
+    "bridge/northbound/page/viewer.py": ("bus 7Xq", "visitor#7Xq"),
+    "bridge/can/errorframe.py": ("7Xq in 7Xq",),
+    "bridge/lint/contradictions.py": ("7Xq, which is 7Xq,",),
+    "bridge/lint/own.py": (
+        "RPDO periods",
+        ", and sdo_channels = 7Xq, over which their own parameters are reached",
+    ),
+    "bridge/parameter/ledger.py": ("10 min",),
+    "bridge/parameter/names.py": ("parameter set",),
+    "bridge/service/parts.py": ("7Xq; not served: Zq zq",),
+}
+"""What is no message on the page: keys, logs, and parts of messages that are tested as a whole."""
+_COMMAND: Final = re.compile(r"(?:modprobe|ip link) .*")
+_ELSEWHERE: Final = re.compile(
+    "attachment; filename=|.*(predicted load .* kbit/s|dead controller|dead bridge)"
+)
+"""Heads of answers, and what the check says on the command line alone."""
+_WORD: Final = re.compile(r"(?<![\w/.{-])[a-z]{3,}(?![\w/.}-])")
+_ENGLISH: Final = (" the ", " is ", " of ", " and ", " not ", " has ", " by ", " with ", " are ", " it ")
+
+
+def files() -> Iterator[Path]:
+    for name in COVERED:
+        path = Path(name)
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            if str(file) not in APART:
+                yield file
+
+
+def lacking(sample: str) -> list[str]:
+    """The parts of a text that no phrase is for and that are more than what is filled in."""
+    BOOK.said(sample)
+    return [part for part in BOOK.unknown if _is_english(part)]
+
+
+def _is_english(part: str) -> bool:
+    return not _COMMAND.fullmatch(part) and bool(_WORD.search(part.replace(WORDS, "").replace(WORD, "")))
+
+
+@pytest.mark.parametrize("file", list(files()), ids=str)
+def test_each_message_has_a_german_phrase(file: Path) -> None:
+    apart = UNSAID.get(str(file), ())
+    missing = {
+        f"{text.line}: {part}"
+        for text in texts_of(file)
+        if text.sample not in apart and not _ELSEWHERE.match(text.sample)
+        for part in lacking(text.sample)
+    }
+    assert not missing, "texts/said-de.json has no phrase for\n" + "\n".join(sorted(missing))
+
+
+def test_each_word_that_stands_in_messages_has_one() -> None:
+    words = [
+        *(state.value for state in NodeState),
+        *(state.label.replace("_", " ") for state in DriveState),
+        *(str(code) for code in Code),
+        *(str(action) for action in Action),
+        *abort.TEXTS.values(),
+        *status.TEXTS.values(),
+        *status.HINTS.values(),
+        *emcy_codes.register_text(0xBF).split(", "),
+    ]
+    known = {english for english, _ in PAIRS}
+    assert [word for word in words if word not in known and word.partition(": ")[0] not in known] == []
+
+
+def test_both_sides_have_the_same_slots() -> None:
+    for english, german in PAIRS:
+        slots = [match[0] for match in SLOT.finditer(english)]
+        assert len(set(slots)) == len(slots), english
+        assert sorted(slots) == sorted(match[0] for match in SLOT.finditer(german)), english
+
+
+def test_no_phrase_is_there_twice() -> None:
+    english = [
+        SLOT.sub(lambda slot: "{…}" if is_looked_up(slot[1]) else f"{{{slot[2]}}}", one) for one, _ in PAIRS
+    ]
+    assert [one for one in set(english) if english.count(one) > 1] == []
+
+
+def test_no_phrase_hides_a_later_one() -> None:
+    def sample(slot: re.Match[str]) -> str:
+        return WORDS if is_looked_up(slot[1]) or slot[2] == "…" else WORD
+
+    hidden = []
+    for phrase in BOOK.slotted:
+        found = BOOK.first(SLOT.sub(sample, phrase.english))
+        if found is not phrase:
+            hidden.append((phrase.english, found and found.english))
+    assert hidden == []
+
+
+def test_no_phrase_holds_what_texts_are_split_at() -> None:
+    assert [english for english, _ in PAIRS if "; " in english] == []
+
+
+def test_german_is_german() -> None:
+    for english, german in PAIRS:
+        bare = f" {SLOT.sub('', german)} "
+        assert not [word for word in _ENGLISH if word in bare], german
+        assert german == german.strip() and "<" not in german, german
+        assert english == english.strip()
+
+
+@pytest.mark.parametrize(
+    ("said", "german"),
+    [
+        ("node lost", "Knoten nicht erreichbar"),
+        (
+            "local:anna#1f may only read",
+            "local:anna#1f darf nur lesen",
+        ),
+        (
+            "the drive runs on: C00593/1 is 0 (no reaction): it runs on; "
+            "1016:01 is 0: it watches no heartbeat",
+            "der Antrieb läuft weiter: C00593/1 ist 0 (no reaction): er läuft weiter; "
+            "1016:01 ist 0: er überwacht keinen Heartbeat",
+        ),
+        (
+            "B: 1000h:00: no valid answer: SDO protocol timed out (05040000h)",
+            "B: 1000h:00: keine gültige Antwort: Zeitüberschreitung im SDO-Protokoll (05040000h)",
+        ),
+        (
+            "no acknowledge: nobody else on the bus, or another bit rate; 128 transmit and 0 receive errors",
+            "keine Bestätigung (ACK): niemand sonst am Bus, oder eine andere Bitrate; "
+            "128 Sende- und 0 Empfangsfehler",
+        ),
+        (
+            "not in the telegram in parameter set 2: P543.2 is 3 (what runs), P546.2 is 1",
+            "nicht im Telegramm in Parametersatz 2: P543.2 ist 3 (what runs), P546.2 ist 1",
+        ),
+        ("what nobody has written down yet", "what nobody has written down yet"),
+        ("", ""),
+    ],
+)
+def test_texts_are_put_together_from_phrases(said: str, german: str) -> None:
+    assert BOOK.said(said) == german
+
+
+@pytest.mark.parametrize("count", [1, 32])
+def test_each_habit_of_a_device_has_its_german_phrase(count: int) -> None:
+    for habit in HABITS.values():
+        assert lacking(habit.said(count, 8, 1)) == []
+    for way in WAYS_BACK:
+        assert lacking(f"block transfer is not used any more: {way.says}") == []

@@ -170,6 +170,9 @@ check-imports: $(VENV)/dev.stamp
 	@echo "== import rules"
 	@$(IN) -c 'from importlinter.cli import lint_imports_command as main; main()' --no-cache --no-logo
 
+house: $(VENV)/dev.stamp ## print what is measured of the code: rooms, circles, what is found in too many of them
+	@$(IN) -m tools.house
+
 format: $(VENV)/dev.stamp ## put the code into the format that check asks for
 	@$(IN) -m ruff check --fix
 	@$(IN) -m ruff format
@@ -219,5 +222,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types check-scripts \
+.PHONY: demo test unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
   check-imports format docs setup lock wheel clean help

@@ -20,7 +20,7 @@ from pymodbus.client import ModbusTcpClient
 
 from bridge.base.errors import OperationFailed
 from bridge.base.notify import Notifier
-from bridge.service.bus_process import front_process, parts
+from bridge.service import front_process, parts
 from bridge.service.front_process import Front, give_signs
 from tests.support import sites
 from tests.support.process import REPOSITORY, Process, drivebridge, running, until

@@ -7,11 +7,11 @@ import time
 from pathlib import Path
 
 import pytest
-from bridge.service.bus_process.page import buses as page_buses
 
 from bridge.canopen.frame import Frame
 from bridge.northbound.page.bus import Captured, IsGone
 from bridge.project import load_project
+from bridge.service.page import buses as page_buses
 from bridge.service.page.buses import Buses
 from tests.support.page import Served, message, until
 

@@ -9,7 +9,6 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from bridge.service.bus_process.page import system as page_system
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.hashes import SHA256
@@ -21,6 +20,7 @@ from hypothesis import strategies as st
 from bridge.northbound.page.system import CertificateFacts, Unreadable
 from bridge.northbound.passwords import hash_password
 from bridge.project import load_project
+from bridge.service.page import system as page_system
 from bridge.service.page.system import SystemOf, without_secrets
 from tests.support import sites
 

@@ -46,8 +46,8 @@ class Recording:
         self.image: Image = bridge.call(
             lambda: {
                 point.name: reading.value
-                for point in bridge.service.bus_process.plant.image.points
-                if (reading := bridge.service.bus_process.plant.image.read(point.name)).quality in SERVED
+                for point in bridge.service.plant.image.points
+                if (reading := bridge.service.plant.image.read(point.name)).quality in SERVED
             }
         )
         self.log = folder / "log"

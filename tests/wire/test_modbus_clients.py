@@ -54,13 +54,13 @@ def asked(bridge: FamilyBridge) -> list[Asked]:
 
 def _unread(bridge: FamilyBridge) -> list[str]:
     """Points that have no value yet and no reason why."""
-    image = bridge.service.bus_process.plant.image
+    image = bridge.service.plant.image
     states = ((name, image.read(name)) for name in image.index)
     return [name for name, state in states if state.quality is Quality.WAITING and not state.reason]
 
 
 def _runs(bridge: FamilyBridge) -> Iterator[Asked]:
-    plant = bridge.service.bus_process.plant
+    plant = bridge.service.plant
     index, image = plant.image.index, plant.image
     for drive_map in drive_maps(plant):
         for run in runs_of(drive_map.rows):

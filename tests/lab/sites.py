@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import json
+import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from tests.support import sites
 from tests.support.process import free_port, peer_called
+
+_FRONT_S: Final = 30.0
+"""So late the front of zenoh may be on a slow machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +32,15 @@ class LabSite:
 
 
 def ask(site: LabSite, *questions: str) -> list[list[dict[str, object]]]:
-    """Questions to zenoh from a second process: ``KEY=PAYLOAD``, or ``KEY=`` for the point itself."""
-    done = peer_called("zenoh_ask", site.zenoh_endpoint, *questions)
-    assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
+    """Questions to zenoh from a second process: ``KEY=PAYLOAD``, or ``KEY=`` for the point itself. The front
+    that answers may be there later than the bus process."""
+    end = time.monotonic() + _FRONT_S
+    while True:
+        done = peer_called("zenoh_ask", site.zenoh_endpoint, *questions)
+        answers = [json.loads(line) for line in done.stdout.splitlines()]
+        if done.returncode == 0 and all(answers):
+            return answers
+        assert time.monotonic() < end, f"no answer within {_FRONT_S} s: {answers} {done.stderr}"
 
 
 def values(site: LabSite, *points: str) -> list[object]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from asyncua import Client, ua
@@ -24,15 +25,14 @@ EXPECTED = [
 ]
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LabSite]:
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[LabSite]:
     """The whole product on vcan0: simulated node, bus process, OPC UA front. A controller has ten
     seconds, because a new process for each telegram takes its time in the lab."""
-    folder = tmp_path_factory.mktemp("lab")
-    site = lab_site(folder, timeout_ms=10_000, bus="deadman_ms = 400", node="sdo_channels = [2, 3]")
+    site = lab_site(tmp_path, timeout_ms=10_000, bus="deadman_ms = 400", node="sdo_channels = [2, 3]")
     with (
-        drivebridge(folder, "simulate", "simulate", str(site.path)) as simulation,
-        drivebridge(folder, "run", "run", str(site.path), notify=True) as bridge,
+        drivebridge(tmp_path, "simulate", "simulate", str(site.path)) as simulation,
+        drivebridge(tmp_path, "run", "run", str(site.path), notify=True) as bridge,
     ):
         simulation.wait_output("simulating")
         bridge.wait_ready()
@@ -112,13 +112,23 @@ async def test_by_opcua_with_an_asyncua_client(site: LabSite, bus: Sniffer) -> N
     check_frames(bus, "fu2")
 
 
+def commanded(site: LabSite, command: str) -> dict[str, object]:
+    """The answer to a command. One that has waited for longer than the owner may be silent changes nothing,
+    and is given again."""
+    for _ in range(5):
+        [[answer]] = ask(site, command)
+        if "may have waited on its way" not in str(answer):
+            return answer
+    raise AssertionError(f"always late: {answer}")
+
+
 def test_by_zenoh_with_a_second_process(site: LabSite, bus: Sniffer) -> None:
     top = "drives/lab/conveyor/fu3"
     wait_for_status(bus, "fu3", 0x40, 0)
-    [[first]] = ask(site, f'{top}/command={{"control_word": 1150, "setpoint_1": 0}}')
+    first = commanded(site, f'{top}/command={{"control_word": 1150, "setpoint_1": 0}}')
     assert first["ok"] is True, first
     wait_for_status(bus, "fu3", 0x31, 0)
-    [[second]] = ask(site, f'{top}/command={{"control_word": 1151, "setpoint_1": 8192}}')
+    second = commanded(site, f'{top}/command={{"control_word": 1151, "setpoint_1": 8192}}')
     assert second["forwarded"] is True, second
     wait_for_status(bus, "fu3", 0x37, 0x2000)
     [[frequency]] = ask(site, f"{top}/actual/frequency=")

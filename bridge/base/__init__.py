@@ -1,1 +1,1 @@
-"""What any part may need and knows nothing of drives: errors, the clock, limits and notices."""
+"""Errors, the clock, limits and notices: for any part, and without a word of drives."""

@@ -71,7 +71,7 @@ class Node:
         return self.axis_names.of(who.slot.axis) if isinstance(who, Drive) else self.names
 
     def is_of(self, who: HasParameters, ref: ObjectRef) -> bool:
-        """Whether an object is one of who has parameters, and no other drive's of the node: of a node with
+        """An object is that of one who has parameters, and no other drive's of the node: of a node with
         several axes those of its profile."""
         if not isinstance(who, Drive) or all(one.slot.axis == 1 for one in self.drives):
             return True
@@ -83,7 +83,7 @@ class Node:
 
     @property
     def commanded(self) -> Sequence[Drive | Outputs]:
-        """What it has that somebody commands."""
+        """Its drives, or the outputs of the device that it is."""
         if self.device:
             return [self.device.outputs] if self.device.outputs else []
         return self.drives

@@ -15,7 +15,7 @@ from bridge.derive.modes import CONTROL_WORD, PROFILE_402, STATUS_WORD, bits_of
 from bridge.eds import Description, Entry, Value
 from bridge.eds.model import Object
 from bridge.eds.pdos import PdoSummary, pdos
-from bridge.mapping.axes import MOST_AXES, STANDARDISED, on_axis, profile_of
+from bridge.mapping.axes import MOST_AXES, axis_of, on_axis, profile_of
 
 _DEVICE_TYPE: Final = 0x1000
 _DEVICE_TYPE_OF_AXIS: Final = 0x67FF
@@ -54,8 +54,8 @@ class View:
 
 
 def axes_of(description: Description) -> list[int]:
-    """Which logical devices are drives of the profile CiA 402: control and status word decide, as many files
-    leave 1000h at 0."""
+    """The logical devices that are drives of the profile CiA 402: control and status word decide, as many
+    files leave 1000h at 0."""
     return [axis for axis in range(1, MOST_AXES + 1) if _is_drive(description, axis)]
 
 
@@ -69,11 +69,6 @@ def _is_drive(description: Description, axis: int) -> bool:
     return all(bits_of(description, word) == 16 for word in words)
 
 
-def axis_number(index: int) -> int | None:
-    """The logical device whose object it is, None of what the node has in common."""
-    return 1 + (index - STANDARDISED.start) // len(profile_of(1)) if index in STANDARDISED else None
-
-
 def view_of(
     description: Description, axis: int, axes: Collection[int], taken: Collection[tuple[bool, int]]
 ) -> View:
@@ -85,7 +80,7 @@ def view_of(
     unmapped: set[int] = set()
     shared: list[str] = []
     for pdo in pdos(description):
-        carried = {axis_number(one.index) for one in pdo.mapped}
+        carried = {axis_of(one.index) for one in pdo.mapped}
         communication = _COMMUNICATION[pdo.receives] + pdo.number - 1
         mapping = communication + _MAPPING
         if (pdo.receives, pdo.number) in taken or (carried & others and axis not in carried):
@@ -98,7 +93,7 @@ def view_of(
     objects = [
         _seen(view, one, is_unmapped=one.index in unmapped)
         for one in description.objects
-        if one.index not in gone and axis_number(one.index) not in others
+        if one.index not in gone and axis_of(one.index) not in others
     ]
     objects = [_as_type(description, axis, one) if one.index == _DEVICE_TYPE else one for one in objects]
     alone = replace(description, objects=tuple(sorted(objects, key=lambda one: one.index)))
@@ -108,7 +103,7 @@ def view_of(
 def left_over(description: Description, axes: Collection[int]) -> Iterator[PdoSummary]:
     """PDOs that carry objects of other logical devices, and nothing of an axis."""
     for pdo in pdos(description):
-        carried = {axis_number(one.index) for one in pdo.mapped}
+        carried = {axis_of(one.index) for one in pdo.mapped}
         if carried - {None} and not carried & set(axes):
             yield pdo
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.derive.axes import View, axis_number, left_over
+from bridge.derive.axes import View, left_over
 from bridge.derive.device import identity_lines
 from bridge.derive.layout import Layout
 from bridge.derive.modes import MODE, MODE_DISPLAY, PROFILE_402, Mode
@@ -16,6 +16,7 @@ from bridge.derive.titles import name_of, title_of
 from bridge.derive.toml import one_line, string, strings, value, word
 from bridge.eds import DataType, Description, Entry
 from bridge.mapping import Family, load_family
+from bridge.mapping.axes import axis_of
 from bridge.mapping.checks import NODE_POINTS
 from bridge.mapping.process import REAL, Slot
 
@@ -40,7 +41,7 @@ _POLLED: Final = {
     DataType.INTEGER32: "int32",
 }
 _EVERY_MS: Final = 1000
-"""How often an input is asked for that no TPDO brings."""
+"""The time between two questions for an input that no TPDO brings."""
 _INTERPOLATION: Final = 0x60C2
 _CYCLIC: Final = (8, 9)
 
@@ -110,7 +111,7 @@ def _lines(
 
 
 def _left_out(description: Description, axes: Sequence[int]) -> Iterator[str]:
-    """What the mapping says nothing of."""
+    """Comments on RPDOs that the mapping says nothing of."""
     for pdo in left_over(description, axes):
         if pdo.receives:
             carried = ", ".join(f"{one.index:04X}h:{one.sub:02X}" for one in pdo.mapped)
@@ -118,7 +119,7 @@ def _left_out(description: Description, axes: Sequence[int]) -> Iterator[str]:
 
 
 def _inputs(description: Description, axes: Sequence[int]) -> Iterator[str]:
-    """What TPDOs tell that are of no axis: points of the node."""
+    """Points of the node: the objects of TPDOs that are of no axis."""
     tpdos = [pdo for pdo in left_over(description, axes) if not pdo.receives]
     names: set[str] = set(NODE_POINTS)
     for one in dict.fromkeys((one.index, one.sub) for pdo in tpdos for one in pdo.mapped):
@@ -145,7 +146,7 @@ def _inputs(description: Description, axes: Sequence[int]) -> Iterator[str]:
 
 
 def _entries(description: Description, drives: Sequence[Axis]) -> dict[str, tuple[Entry, str]]:
-    """What can be a parameter, with its title: of all axes, by the name that it has in each."""
+    """Every entry that can be a parameter, with its title: of all axes, by the name that it has in each."""
     found: dict[str, tuple[Entry, str]] = {}
     views = [drive.view.alone for drive in drives]
     axes = {drive.view.axis for drive in drives}
@@ -153,7 +154,7 @@ def _entries(description: Description, drives: Sequence[Axis]) -> dict[str, tupl
         for name, entry in entries_of(view):
             found.setdefault(name, (entry, _title(view, name, entry)))
     for name, entry in entries_of(description, (FURTHER_AXES,)):
-        if axis_number(entry.index) not in axes:
+        if axis_of(entry.index) not in axes:
             found[name] = entry, _title(description, name, entry)
     return found
 
@@ -164,7 +165,7 @@ def _title(description: Description, name: str, entry: Entry) -> str:
 
 
 def _without(views: Sequence[Description], base: Family, there: Set[str]) -> Iterator[str]:
-    """What the base has and this device has not."""
+    """Parameters and own supervision that the base has and this device has not."""
     needed = {*_NEEDED, *(one.parameter for one in base.meaning)}
     needed.update(name for value in base.value for name in (*value.scaled_by, *value.when, *value.steady))
     for parameter in base.parameter:
@@ -176,7 +177,7 @@ def _without(views: Sequence[Description], base: Family, there: Set[str]) -> Ite
 
 
 def _identity(description: Description) -> Iterator[str]:
-    """Of a device whose first logical device is no drive also the profile that 1000h has then."""
+    """The identity, with the profile that 1000h has where the first logical device is no drive."""
     profile = (description.number(0x1000) or 0) & 0xFFFF
     for line in identity_lines(description):
         yield line

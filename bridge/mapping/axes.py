@@ -20,6 +20,11 @@ def profile_of(axis: int) -> range:
     return range(start, start + PROFILE_SIZE)
 
 
+def axis_of(index: int) -> int | None:
+    """The axis, or the other logical device, whose object it is; None of what the node has in common."""
+    return 1 + (index - STANDARDISED.start) // PROFILE_SIZE if index in STANDARDISED else None
+
+
 def on_axis(index: int, axis: int) -> int:
     """The index that an axis has for an object of the first. What is no object of its profile is the
     node's, and all axes have it in common."""

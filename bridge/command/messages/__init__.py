@@ -1,1 +1,1 @@
-"""What is asked of a drive or an output, and what is told of it."""
+"""Requests to a drive or an output with their telegrams, and the events told of it."""

@@ -8,7 +8,7 @@ import pytest
 
 from bridge.base.errors import FileFaults
 from bridge.mapping import Family
-from bridge.mapping.axes import MOST_AXES, on_axis, on_first
+from bridge.mapping.axes import MOST_AXES, axis_of, on_axis, on_first
 from bridge.mapping.loader import read_family
 from bridge.mapping.own_places import places
 from bridge.parameter import Names
@@ -47,6 +47,7 @@ def test_an_axis_has_the_objects_of_its_logical_device(axis: int) -> None:
     for index in (0x6000, 0x6040, 0x67FF):
         assert on_axis(index, axis) == index + 0x800 * (axis - 1)
         assert on_first(on_axis(index, axis)) == index
+        assert axis_of(on_axis(index, axis)) == axis
     for index in (0x1000, 0x2010, 0x5FFF, 0x6800, 0xA000):
         assert on_axis(index, axis) == index, "the node's, whatever the axis"
 

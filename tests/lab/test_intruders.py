@@ -8,7 +8,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 import pytest
@@ -27,8 +27,8 @@ SILENCE_S = 1.2
 """The longest time after which a second bridge takes over: six times the 0.2 s that it listens."""
 NOISE_S = 2.0
 DEADMAN_S = 1.0
-ENABLED_MASK, ENABLED = 0x6F, 0x27
-"""NORD's status word (BU 2500 §6.5.1), as that of CiA 402."""
+FULL_SPEED = 0x4000
+"""NORD's actual speed and setpoint at 100 % (BU 2500 §6.5.4)."""
 
 
 class Lab:
@@ -102,6 +102,17 @@ def stops(bus: Sniffer, since: float) -> list[Seen]:
 
 def starts(bus: Sniffer, since: float) -> list[Seen]:
     return [frame for frame in bus.of(NMT, since) if frame.data[:1] == b"\x01"]
+
+
+def started_share(bus: Sniffer, since: float) -> float:
+    """The share of the time in which the node is operational: from each start to the next NMT command."""
+    commands = sorted(bus.of(NMT, since), key=lambda frame: frame.time)
+    started = sum(then.time - now.time for now, then in pairwise(commands) if now.data[0] == 0x01)
+    return started / (commands[-1].time - commands[0].time)
+
+
+def actual_speed(tpdo1: Seen) -> int:
+    return abs(int.from_bytes(tpdo1.data[2:4], "little", signed=True))
 
 
 def test_own_frames_are_never_an_intruders_however_the_words_change(make_lab) -> None:
@@ -240,11 +251,14 @@ def test_an_intruder_that_is_a_master_is_answered_as_often_as_it_starts_the_node
     lab.run_drive()
     lab.send(RPDO1, OTHER_ENABLE, period_s=0.02, count=400)
     begin = lab.send(NMT, "0105", period_s=0.02, count=150)
-    until(lambda: len(starts(lab.bus, begin)) >= 50, 60.0, "the intruder")
+    until(lambda: len(starts(lab.bus, begin)) >= 100, 60.0, "the intruder")
     answers = len(stops(lab.bus, begin)) / len(starts(lab.bus, begin))
     assert answers >= 0.5
-    said = [frame.word & ENABLED_MASK == ENABLED for frame in lab.bus.of(TPDO1, begin)]
-    assert sum(said) <= 0.6 * len(said)
+    assert started_share(lab.bus, begin) <= 0.5
+    speeds = [actual_speed(frame) for frame in lab.bus.of(TPDO1, begin)]
+    rises = [speed - lowest for speed, lowest in zip(speeds, accumulate(speeds, min), strict=True)]
+    assert max(rises) <= 0.1 * FULL_SPEED, "it brakes; each start drives it no longer than to the answer"
+    assert speeds[-1] <= 0.1 * FULL_SPEED
     lab.bridge.wait_output("another NMT master is on the bus: it sent start for node 5", 5.0)
     time.sleep(3.0)
     quiet = time.time()

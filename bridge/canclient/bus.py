@@ -22,8 +22,8 @@ from bridge.canclient.hearing import Hearing
 from bridge.canopen import abort, cobid
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.canopen.nmt import NmtCommand
-from bridge.sim.abort import SdoAbort
-from bridge.sim.sdo_server import SdoServer
+from bridge.sim.core.abort import SdoAbort
+from bridge.sim.core.sdo_server import SdoServer
 
 _log = logging.getLogger(__name__)
 

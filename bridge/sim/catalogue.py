@@ -10,16 +10,17 @@ from bridge.base.errors import OperationFailed
 from bridge.canopen.datatypes import REALS
 from bridge.eds import Description
 from bridge.mapping import Family, load_family
-from bridge.sim.adopted import adopt
-from bridge.sim.device import SimulatedDevice
-from bridge.sim.generic_eds import plan_of_description
-from bridge.sim.generic_family import pattern, plan_of_family
-from bridge.sim.generic_inputs import motions_of
-from bridge.sim.generic_node import GenericNode
-from bridge.sim.generic_plan import At
-from bridge.sim.nord_catalogue import NORD
-from bridge.sim.object_catalogue import MAPPINGS, cia402, lenze_8400_motec
-from bridge.sim.stoeber_catalogue import stoeber_5000, stoeber_5000_four_axes, stoeber_5000_posi
+from bridge.sim.cia402.cia402_catalogue import MAPPINGS, cia402
+from bridge.sim.core.device import SimulatedDevice
+from bridge.sim.generic.adopted import adopt
+from bridge.sim.generic.generic_eds import plan_of_description
+from bridge.sim.generic.generic_family import pattern, plan_of_family
+from bridge.sim.generic.generic_inputs import motions_of
+from bridge.sim.generic.generic_node import GenericNode
+from bridge.sim.generic.generic_plan import At
+from bridge.sim.lenze.lenze_catalogue import lenze_8400_motec
+from bridge.sim.nord.nord_catalogue import NORD
+from bridge.sim.stoeber.stoeber_catalogue import stoeber_5000, stoeber_5000_four_axes, stoeber_5000_posi
 
 NOTHING: Final[Mapping[At, int]] = MappingProxyType({})
 Factory = Callable[[int, Mapping[str, float]], SimulatedDevice]

@@ -10,8 +10,8 @@ import socket
 import struct
 import sys
 
-from bridge.sim.dictionary import Dictionary, Domain
-from bridge.sim.sdo_server import SdoServer
+from bridge.sim.core.dictionary import Dictionary, Domain
+from bridge.sim.core.sdo_server import SdoServer
 
 FRAME = struct.Struct("=IB3x8s")
 OBJECT = 0x1F20

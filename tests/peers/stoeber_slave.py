@@ -10,8 +10,8 @@ import signal
 import sys
 
 from bridge.can import open_bus
-from bridge.sim.shell import Simulation
-from bridge.sim.stoeber_5000 import Stoeber5000
+from bridge.sim.core.shell import Simulation
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 
 
 async def main(channel: str, node_id: int, bitrate: int) -> None:

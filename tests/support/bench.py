@@ -19,7 +19,7 @@ from bridge.mapping import Family, load_family
 from bridge.master.listening import Listening, listen_s
 from bridge.master.master import Master
 from bridge.master.network import Network
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support import sites
 
 NORD = load_family("nord/sk-tu4-cao")

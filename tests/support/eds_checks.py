@@ -8,7 +8,7 @@ from pathlib import Path
 import canopen
 
 from bridge.eds import Description, Entry
-from bridge.sim.dictionary import Number, Text
+from bridge.sim.core.dictionary import Number, Text
 
 Find = Callable[[int, int], object]
 """The simulated node's object of this index and subindex."""

@@ -14,9 +14,9 @@ from bridge.canopen.sdo_transfer import SdoError
 from bridge.derive.axes import axes_of
 from bridge.eds import Description, Entry, read_whole_device_file
 from bridge.image import Quality
-from bridge.sim.generic_eds import plan_of_description
-from bridge.sim.generic_node import GenericNode
-from bridge.sim.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.generic.generic_eds import plan_of_description
+from bridge.sim.generic.generic_node import GenericNode
 from tests.support.invented_eds import NODE_ID, DerivedBench
 
 _ANSWER_S = 0.5

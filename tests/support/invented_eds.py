@@ -10,8 +10,8 @@ from bridge.derive import Derived, derive_family
 from bridge.eds import Description, read_device
 from bridge.mapping import Family
 from bridge.mapping.loader import read_family
-from bridge.sim.generic_eds import plan_of_description
-from bridge.sim.generic_node import GenericNode
+from bridge.sim.generic.generic_eds import plan_of_description
+from bridge.sim.generic.generic_node import GenericNode
 from tests.support import sites
 from tests.support.bench import Bench
 

@@ -9,10 +9,10 @@ from bridge.command import Code
 from bridge.config import load_site
 from bridge.image import Reading
 from bridge.mapping import load_family
-from bridge.sim.nord_drive import NordDrive
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_single_settings import TU3
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_drive import NordDrive
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_single_settings import TU3
+from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support.bench import Bench
 
 SITE = """

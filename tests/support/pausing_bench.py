@@ -14,8 +14,8 @@ from bridge.can.kernelbursts import KernelBursts
 from bridge.canopen.frame import Frame
 from bridge.config import Site
 from bridge.mapping import load_family
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_single_settings import RJ45_54X
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_single_settings import RJ45_54X
 from tests.support.bench import Bench, ClockBus
 from tests.support.broadcast_manager import BroadcastManager
 

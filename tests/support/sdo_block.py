@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import Result, SdoChannel, SdoError
-from bridge.sim.dictionary import Dictionary, Domain
-from bridge.sim.sdo_server import SdoServer
+from bridge.sim.core.dictionary import Dictionary, Domain
+from bridge.sim.core.sdo_server import SdoServer
 
 REQUEST, REPLY = 0x605, 0x585
 LONG = bytes(range(256)) * 4

@@ -13,7 +13,7 @@ from bridge.exports import modbus_table
 from bridge.lint import lint
 from bridge.northbound.page.parameters import holders_of
 from bridge.project import Project, load_project
-from bridge.sim.generic_node import GenericNode
+from bridge.sim.generic.generic_node import GenericNode
 from tests.support import sites
 from tests.support.bench import Bench
 from tests.support.invented_eds import (

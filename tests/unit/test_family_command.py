@@ -11,8 +11,8 @@ from bridge.base.errors import Fault, FileFaults, OperationFailed
 from bridge.cli.app import make_app
 from bridge.cli.simulation import simulated_nodes
 from bridge.project import load_project
-from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.generic_node import GenericNode
+from bridge.sim.cia402.cia402_drive import Cia402Drive
+from bridge.sim.generic.generic_node import GenericNode
 from tests.support import sites
 from tests.support.invented import NAME, SPIN
 from tests.support.invented_eds import SPIN as INVENTED

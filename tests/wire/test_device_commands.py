@@ -18,10 +18,10 @@ from bridge.cli import bus as cli_bus
 from bridge.cli import drop_test
 from bridge.cli.app import make_app
 from bridge.sim.catalogue import simulate_description
-from bridge.sim.device import SimulatedDevice
-from bridge.sim.generic_node import GenericNode
-from bridge.sim.nmt_slave import NmtState
-from bridge.sim.shell import Simulation
+from bridge.sim.core.device import SimulatedDevice
+from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.shell import Simulation
+from bridge.sim.generic.generic_node import GenericNode
 from tests.support.devices import DEVICES, description_of
 
 RUN = CliRunner()

@@ -6,7 +6,7 @@ import canopen
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_tu4 import NordTu4
 
 
 class DirectNetwork(canopen.Network):

@@ -11,8 +11,8 @@ from canopen.sdo import SdoClient
 
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoChannel
-from bridge.sim.dictionary import Dictionary, Domain
-from bridge.sim.sdo_server import SdoServer
+from bridge.sim.core.dictionary import Dictionary, Domain
+from bridge.sim.core.sdo_server import SdoServer
 from tests.support.sdo_block import INDEX, LONG, REPLY, REQUEST
 
 Answer = Callable[[bytes], list[bytes]]

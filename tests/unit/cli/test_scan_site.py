@@ -21,9 +21,9 @@ from bridge.mapping import family_names, load_family
 from bridge.mapping.match import Found, Match, best_match
 from bridge.project import load_project
 from bridge.sim.catalogue import simulate_description, simulate_node
-from bridge.sim.device import SimulatedDevice
-from bridge.sim.generic_eds import plan_of_description
-from bridge.sim.generic_node import GenericNode
+from bridge.sim.core.device import SimulatedDevice
+from bridge.sim.generic.generic_eds import plan_of_description
+from bridge.sim.generic.generic_node import GenericNode
 from tests.support.devices import DEVICES
 from tests.support.invented_eds import BASIC, SPIN, U8, U16, U32, described, eds, identity, var
 

@@ -13,7 +13,7 @@ from bridge.command import Action, Identity, Outcome, Request, Role, Source, Wri
 from bridge.derive import derive_family
 from bridge.drive import DriveState
 from bridge.mapping.axes import on_axis
-from bridge.sim.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import NmtState
 from tests.support.invented_eds import (
     BASIC,
     SPIN,

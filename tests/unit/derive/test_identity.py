@@ -9,7 +9,7 @@ import pytest
 from bridge.derive import derive_family
 from bridge.derive.device import is_of, wanted_identity
 from bridge.eds import Description, read_device
-from bridge.sim.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import NmtState
 from tests.support.invented_eds import (
     BASIC,
     SPIN,

@@ -15,7 +15,7 @@ from bridge.derive.device import GENERIC
 from bridge.lint import Severity, lint
 from bridge.mapping.loader import read_family
 from bridge.project import load_project
-from bridge.sim.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import NmtState
 from tests.support import sites
 from tests.support.invented_eds import (
     BASIC,

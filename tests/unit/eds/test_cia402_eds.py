@@ -8,7 +8,7 @@ from bridge.eds import Description, read_device_file
 from bridge.eds.pdos import pdos
 from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mappings_dir
-from bridge.sim.cia402_drive import Cia402Drive
+from bridge.sim.cia402.cia402_drive import Cia402Drive
 from tests.support.eds_checks import compare_defaults, compare_types_and_access, entries, open_with_canopen
 
 FILE = mappings_dir() / "cia402" / "cia402.eds"

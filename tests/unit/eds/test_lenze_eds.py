@@ -8,8 +8,8 @@ from bridge.eds import Description, read_device_file
 from bridge.eds.pdos import pdos
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
-from bridge.sim.dictionary import Number
-from bridge.sim.lenze_motec import LenzeMotec
+from bridge.sim.core.dictionary import Number
+from bridge.sim.lenze.lenze_motec import LenzeMotec
 from tests.support.eds_checks import compare_defaults, compare_types_and_access, entries, open_with_canopen
 
 FILE = mappings_dir() / "lenze" / "8400-motec.eds"

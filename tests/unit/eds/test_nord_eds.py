@@ -10,10 +10,10 @@ from bridge.eds import Description, Entry, read_device_file
 from bridge.eds.pdos import pdos
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
-from bridge.sim.nord_node import NordNode
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_node import NordNode
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
+from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support.eds_checks import compare_defaults, compare_types_and_access, entries, open_with_canopen
 
 PROFILE = range(0x6000, 0xA000)

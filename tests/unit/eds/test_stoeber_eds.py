@@ -8,7 +8,7 @@ from bridge.eds import Description, read_device_file
 from bridge.eds.pdos import pdos
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
-from bridge.sim.stoeber_5000 import Stoeber5000
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from tests.support.eds_checks import compare_defaults, compare_types_and_access, entries, open_with_canopen
 
 FILE = mappings_dir() / "stoeber" / "5000.eds"

@@ -10,8 +10,8 @@ from bridge.drive import FaultWords
 from bridge.errands.fault_memory import Remembered, fault_memory
 from bridge.mapping import load_family
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, TransferFailed
-from bridge.sim.abort import SdoAbort
 from bridge.sim.catalogue import simulate_node
+from bridge.sim.core.abort import SdoAbort
 from tests.unit.sim.conftest import Bench
 
 Answers = Callable[[int, int], bytes]

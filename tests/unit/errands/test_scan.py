@@ -13,7 +13,7 @@ from bridge.errands.scan import FoundNode, Scanner
 from bridge.mapping import Family, load_family
 from bridge.mapping.match import Found, best_match
 from bridge.mapping.model import IdentityRule
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support.sdo_device import SdoDevice, u32
 
 LENZE = {

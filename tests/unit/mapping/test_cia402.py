@@ -13,8 +13,8 @@ from bridge.mapping.loader import mapping_folders, read_family
 from bridge.mapping.match import Found, best_match
 from bridge.mapping.site import load_site_and_families
 from bridge.parameter import Names
-from bridge.sim.cia402_states import Command, State, command_of
-from bridge.sim.object_catalogue import MAPPINGS
+from bridge.sim.cia402.cia402_catalogue import MAPPINGS
+from bridge.sim.cia402.cia402_states import Command, State, command_of
 from tests.support import sites
 
 FAMILIES = {name: load_family(f"cia402/{name}") for name in MAPPINGS}

@@ -8,7 +8,7 @@ from bridge.drive.scaling import scale_of
 from bridge.mapping import Family, family_names, load_family
 from bridge.mapping.match import Found, best_match
 from bridge.sim.catalogue import simulate_node
-from bridge.sim.nord_faults import _CODES, emcy_code
+from bridge.sim.nord.nord_faults import _CODES, emcy_code
 
 TU3_VIEWS = ("nord/sk-tu3-cao-pdo1", "nord/sk-tu3-cao", "nord/sk-tu3-cao-pdo3", "nord/sk-tu3-cao-pdo4")
 RJ45 = ("nord/sk-5xxe-rj45", "nord/sk-5xxe-rj45-encoder", "nord/sk-54xe-rj45", "nord/sk-54xe-rj45-encoder")

@@ -12,7 +12,7 @@ from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mapping_folders
 from bridge.mapping.model import pattern_bits
 from bridge.mapping.parameters import object_of
-from bridge.sim.stoeber_events import CODES
+from bridge.sim.stoeber.stoeber_events import CODES
 
 ONE = load_family("stoeber/5000")
 FOUR = load_family("stoeber/5000-four-axes")

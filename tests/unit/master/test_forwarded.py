@@ -17,7 +17,7 @@ from bridge.command.link import NodeState
 from bridge.command.messages.request import STOP_ACTIONS
 from bridge.image import Value
 from bridge.master.listening import Listening
-from bridge.sim.stoeber_5000 import Stoeber5000
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from tests.support.bench import Bench, write_site
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
 from tests.unit.node.test_stoeber_posi import DRIVE as LIFT

@@ -14,7 +14,7 @@ import pytest
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Request, Role, Source, Start
-from bridge.sim.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import NmtState
 from tests.support.bench import Bench, write_site
 from tests.unit.master.test_last_words import FAMILIES, SLACK_S, SYNC_S, TYPES, moving, speed
 

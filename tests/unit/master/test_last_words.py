@@ -15,12 +15,12 @@ from bridge.command.follow import LastStop
 from bridge.config import load_site
 from bridge.mapping import load_family
 from bridge.sim.catalogue import simulate_node
-from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.lenze_motec import LenzeMotec
-from bridge.sim.nmt_slave import NmtState
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_tu4 import NordTu4
-from bridge.sim.stoeber_5000 import Stoeber5000
+from bridge.sim.cia402.cia402_drive import Cia402Drive
+from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.lenze.lenze_motec import LenzeMotec
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from tests.support import sites
 from tests.support.bench import PLC, Bench
 from tests.unit.node.test_failed_boot import Restart

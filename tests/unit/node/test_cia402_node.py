@@ -13,9 +13,9 @@ from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
-from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.cia402_settings import Cia402Settings, Mode
-from bridge.sim.cia402_states import State
+from bridge.sim.cia402.cia402_drive import Cia402Drive
+from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
+from bridge.sim.cia402.cia402_states import State
 from tests.support.bench import PLC, Bench
 
 DRIVE = "axis/drive"

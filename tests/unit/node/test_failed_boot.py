@@ -14,16 +14,17 @@ from bridge.command import Outcome, Request, Start
 from bridge.command.link import NodeState
 from bridge.config import load_site
 from bridge.mapping import load_family
-from bridge.sim import cia402_states, nord_states
 from bridge.sim.catalogue import SIMULATED, simulate_node
-from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.lenze_drive import DeviceState
-from bridge.sim.lenze_motec import LenzeMotec
-from bridge.sim.nmt_slave import NmtState
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_tu4 import NordTu4
-from bridge.sim.stoeber_5000 import Stoeber5000
-from bridge.sim.stoeber_axis import AxisState
+from bridge.sim.cia402 import cia402_states
+from bridge.sim.cia402.cia402_drive import Cia402Drive
+from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.lenze.lenze_drive import DeviceState
+from bridge.sim.lenze.lenze_motec import LenzeMotec
+from bridge.sim.nord import nord_states
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
+from bridge.sim.stoeber.stoeber_axis import AxisState
 from tests.support import sites
 from tests.support.bench import PLC, Bench
 

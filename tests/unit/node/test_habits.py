@@ -12,7 +12,7 @@ from bridge.config import load_site
 from bridge.mapping import load_family
 from bridge.mapping.loader import mapping_folders
 from bridge.sim.catalogue import simulate_family
-from bridge.sim.habit import Habit, load_habit, shipped_habits
+from bridge.sim.core.habit import Habit, load_habit, shipped_habits
 from tests.support import sites
 from tests.support.bench import Bench
 from tests.unit.sim.test_generic_node import CYCLIC, LIGHT

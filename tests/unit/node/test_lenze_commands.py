@@ -10,8 +10,8 @@ import pytest
 from bridge.command import Action, Code, Identity, Kind, Outcome, Request, Role, Source, command_of
 from bridge.config import load_site
 from bridge.mapping import load_family
-from bridge.sim.lenze_motec import LenzeMotec
-from bridge.sim.lenze_settings import LenzeCodes
+from bridge.sim.lenze.lenze_motec import LenzeMotec
+from bridge.sim.lenze.lenze_settings import LenzeCodes
 from tests.support.bench import Bench
 from tests.unit.node.test_lenze_node import DRIVE, SITE, start
 

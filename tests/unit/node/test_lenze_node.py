@@ -11,9 +11,9 @@ from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
-from bridge.sim.lenze_drive import DeviceState, Reaction
-from bridge.sim.lenze_motec import LenzeMotec
-from bridge.sim.lenze_settings import LenzeCodes
+from bridge.sim.lenze.lenze_drive import DeviceState, Reaction
+from bridge.sim.lenze.lenze_motec import LenzeMotec
+from bridge.sim.lenze.lenze_settings import LenzeCodes
 from tests.support.bench import PLC, Bench
 
 NAME = "lenze/8400-motec"

@@ -8,7 +8,7 @@ import pytest
 
 from bridge.command import Code
 from bridge.image import Quality
-from bridge.sim.nord_drive import NordDrive
+from bridge.sim.nord.nord_drive import NordDrive
 from tests.support import nord_words
 from tests.support.nord_words import (
     ACTUAL,

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from bridge.command import Action, Code, Outcome, Request, command_of
 from bridge.command.messages.telegram import Refusal
 from bridge.image import Quality
-from bridge.sim.abort import AbortCode, SdoAbort
-from bridge.sim.dictionary import Entry
-from bridge.sim.nord_drive import NordDrive
-from bridge.sim.nord_interface import DriveAccess
-from bridge.sim.nord_parameters import PARAMETER_BASE, sub_index
+from bridge.sim.core.abort import AbortCode, SdoAbort
+from bridge.sim.core.dictionary import Entry
+from bridge.sim.nord.nord_drive import NordDrive
+from bridge.sim.nord.nord_interface import DriveAccess
+from bridge.sim.nord.nord_parameters import PARAMETER_BASE, sub_index
 from tests.support.bench import PLC
 from tests.support.nord_words import (
     ACTUAL,

@@ -12,8 +12,8 @@ from bridge.command import Action, Code
 from bridge.config import load_site
 from bridge.image import Quality, Reading
 from bridge.mapping import load_family
-from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.cia402_settings import Cia402Settings, Mode
+from bridge.sim.cia402.cia402_drive import Cia402Drive
+from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
 from tests.support.bench import Bench
 
 DRIVE = "axis/drive"

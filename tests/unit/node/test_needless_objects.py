@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command.link import NodeState
-from bridge.sim.habit import Habit, Rule
+from bridge.sim.core.habit import Habit, Rule
 from tests.support.bench import Bench, write_site
 from tests.unit.node.test_habits import CONFIGURE, REQUEST, bench_of, is_operational, status
 

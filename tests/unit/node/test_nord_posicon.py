@@ -13,9 +13,9 @@ from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.sim.catalogue import simulate_node
-from bridge.sim.nord_drive import NordDrive
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_drive import NordDrive
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support.bench import Bench
 
 MAPPING = "nord/sk-tu4-cao-posicon"

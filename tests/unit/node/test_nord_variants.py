@@ -12,11 +12,11 @@ from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
-from bridge.sim.nmt_slave import NmtState
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
-from bridge.sim.nord_states import State
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
+from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support.bench import Bench
 
 SITE = """

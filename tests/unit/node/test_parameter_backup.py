@@ -30,8 +30,8 @@ from bridge.parameter import (
 )
 from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.ledger import Saved
-from bridge.sim.nord_supervision import Presence
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_supervision import Presence
+from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support.gates import ENGINEER_AT_REST
 
 NORD = load_family("nord/sk-tu4-cao")

@@ -15,7 +15,7 @@ from bridge.command import Action, Code, Identity, Kind, Outcome, Request, Role,
 from bridge.drive import DriveState, OwnJudgement
 from bridge.image import Quality
 from bridge.parameter.ledger import MOST_WRITES, Saved
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support.bench import Bench, write_site
 
 ENGINEER = Identity(Source.OPCUA, "eve", Role.ENGINEER)

@@ -13,9 +13,9 @@ from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
-from bridge.sim.nmt_slave import NmtState
-from bridge.sim.stoeber_5000 import Stoeber5000
-from bridge.sim.stoeber_axis import AxisState
+from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
+from bridge.sim.stoeber.stoeber_axis import AxisState
 from tests.support.bench import PLC, Bench
 
 SITE = """

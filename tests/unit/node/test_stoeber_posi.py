@@ -12,9 +12,9 @@ from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
-from bridge.sim.stoeber_5000 import Stoeber5000
-from bridge.sim.stoeber_axis import AxisState
-from bridge.sim.stoeber_posi import HOME_AT, PositioningAxis
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
+from bridge.sim.stoeber.stoeber_axis import AxisState
+from bridge.sim.stoeber.stoeber_posi import HOME_AT, PositioningAxis
 from tests.support.bench import Bench
 
 MAPPING = "stoeber/5000-posi"

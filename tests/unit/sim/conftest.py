@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import REMOTE, Frame
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_tu4 import NordTu4
 
 NODE = 5
 RPDO = (0x205, 0x305, 0x405, 0x505)

@@ -15,10 +15,10 @@ from bridge.can.virtual import VirtualWire
 from bridge.canopen.frame import Frame
 from bridge.cli.simulation import simulation
 from bridge.config import load_site
-from bridge.sim.canopen_slave import CanopenSlave
-from bridge.sim.dictionary import Dictionary, Number
-from bridge.sim.pdo import ActiveTpdo
-from bridge.sim.shell import Simulation
+from bridge.sim.core.canopen_slave import CanopenSlave
+from bridge.sim.core.dictionary import Dictionary, Number
+from bridge.sim.core.pdo import ActiveTpdo
+from bridge.sim.core.shell import Simulation
 from tests.support.virtual_loop import VirtualLoop
 
 NODES = (5, 6, 7, 8)

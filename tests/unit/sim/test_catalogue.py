@@ -6,8 +6,8 @@ import pytest
 
 from bridge.base.errors import OperationFailed
 from bridge.sim.catalogue import simulate_node
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_tu4 import NordTu4
 
 
 def test_a_nord_node_takes_parameters_for_all_drives_and_for_one():

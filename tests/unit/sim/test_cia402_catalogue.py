@@ -7,7 +7,7 @@ import pytest
 from bridge.base.errors import OperationFailed
 from bridge.mapping import family_names
 from bridge.sim.catalogue import simulate_node
-from bridge.sim.cia402_drive import Cia402Drive
+from bridge.sim.cia402.cia402_drive import Cia402Drive
 
 FAMILIES = [name for name in family_names() if name.startswith("cia402/")]
 

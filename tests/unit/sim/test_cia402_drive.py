@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.cia402_settings import Cia402Settings, Mode
-from bridge.sim.cia402_states import State
+from bridge.sim.cia402.cia402_drive import Cia402Drive
+from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
+from bridge.sim.cia402.cia402_states import State
 
 MASTER = 0x77F
 STATUS_ENTRIES = (0x60410010, 0x60640020)

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, Frame
-from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.cia402_settings import Cia402Settings, Mode
+from bridge.sim.cia402.cia402_drive import Cia402Drive
+from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
 
 OWN_IDS = [0x000, 0x080, 0x205, 0x305, 0x405, 0x505, 0x605, 0x77F, 0x705 | REMOTE, 0x185 | REMOTE]
 INDICES = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.cia402_states import TRANSITIONS, Automaton, Command, Ramp, State, command_of
+from bridge.sim.cia402.cia402_states import TRANSITIONS, Automaton, Command, Ramp, State, command_of
 
 WORDS = {
     Command.SHUTDOWN: 0x0006,

@@ -11,9 +11,9 @@ from bridge.cli.simulation import simulated_nodes
 from bridge.config import read_site
 from bridge.mapping import Family
 from bridge.mapping.site import load_site_and_families
-from bridge.sim.device import SimulatedDevice
-from bridge.sim.generic_node import GenericNode
-from bridge.sim.nmt_slave import NmtState
+from bridge.sim.core.device import SimulatedDevice
+from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.generic.generic_node import GenericNode
 from tests.support import sites
 from tests.support.devices import DEVICES, ENCODER, IO_BLOCK
 

@@ -15,11 +15,11 @@ from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.mapping.loader import mapping_folders
 from bridge.sim.catalogue import SIMULATED, simulate_family
-from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.dictionary import Number
-from bridge.sim.generic_family import plan_of_family
-from bridge.sim.generic_node import GenericNode
-from bridge.sim.nmt_slave import NmtState
+from bridge.sim.cia402.cia402_drive import Cia402Drive
+from bridge.sim.core.dictionary import Number
+from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.generic.generic_family import plan_of_family
+from bridge.sim.generic.generic_node import GenericNode
 from tests.support import sites
 from tests.support.bench import PLC, Bench
 from tests.support.invented import NAME, SPIN

@@ -8,9 +8,9 @@ import pytest
 
 from bridge.base.errors import FileFaults, OperationFailed
 from bridge.canopen.frame import Frame
-from bridge.sim.habit import Rule, load_habit, shipped_habits
-from bridge.sim.habit_player import HabitPlayer
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.core.habit import Rule, load_habit, shipped_habits
+from bridge.sim.core.habit_player import HabitPlayer
+from bridge.sim.nord.nord_tu4 import NordTu4
 
 READ_1000 = Frame(0x605, bytes.fromhex("4000100000000000"))
 

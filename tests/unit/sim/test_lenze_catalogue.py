@@ -6,7 +6,7 @@ import pytest
 
 from bridge.base.errors import OperationFailed
 from bridge.sim.catalogue import simulate_node
-from bridge.sim.lenze_motec import LenzeMotec
+from bridge.sim.lenze.lenze_motec import LenzeMotec
 
 NAME = "lenze/8400-motec"
 

@@ -8,7 +8,7 @@ import pytest
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoChannel, SdoError
 from bridge.mapping import load_family
-from bridge.sim.lenze_motec import LenzeMotec
+from bridge.sim.lenze.lenze_motec import LenzeMotec
 
 LENZE = load_family("lenze/8400-motec")
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import REMOTE
-from bridge.sim.lenze_drive import DeviceState, Reaction
-from bridge.sim.lenze_motec import LenzeMotec
-from bridge.sim.lenze_settings import LenzeCodes
+from bridge.sim.lenze.lenze_drive import DeviceState, Reaction
+from bridge.sim.lenze.lenze_motec import LenzeMotec
+from bridge.sim.lenze.lenze_settings import LenzeCodes
 
 STOP, ENABLE, QUICK_STOP, INHIBIT, RESET = 0x0001, 0x0009, 0x000D, 0x0002, 0x0081
 HALF = 0x2000

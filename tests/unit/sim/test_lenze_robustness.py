@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, Frame
-from bridge.sim.lenze_drive import Reaction
-from bridge.sim.lenze_motec import LenzeMotec
-from bridge.sim.lenze_settings import LenzeCodes
+from bridge.sim.lenze.lenze_drive import Reaction
+from bridge.sim.lenze.lenze_motec import LenzeMotec
+from bridge.sim.lenze.lenze_settings import LenzeCodes
 
 OWN_IDS = [0x000, 0x080, 0x205, 0x305, 0x605, 0x645, 0x705, 0x77F, 0x185 | REMOTE, 0x705 | REMOTE]
 INDICES = [0x1000, 0x1003, 0x1005, 0x1006, 0x1014, 0x1016, 0x1017, 0x1018, 0x1201, 0x1400, 0x1401, 0x1600]

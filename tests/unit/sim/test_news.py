@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 import pytest
 
 from bridge.canopen.frame import REMOTE, Frame
-from bridge.sim.cia402_drive import Cia402Drive
-from bridge.sim.cia402_settings import Cia402Settings, Mode
-from bridge.sim.lenze_motec import LenzeMotec
-from bridge.sim.lenze_settings import LenzeCodes
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_single_settings import RJ45_5XX, TU3, Variant
-from bridge.sim.nord_tu4 import NordTu4
-from bridge.sim.stoeber_5000 import Stoeber5000
+from bridge.sim.cia402.cia402_drive import Cia402Drive
+from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
+from bridge.sim.lenze.lenze_motec import LenzeMotec
+from bridge.sim.lenze.lenze_settings import LenzeCodes
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_single_settings import RJ45_5XX, TU3, Variant
+from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 
 TURNS = 250
 RPDOS: tuple[int, ...] = (0x205, 0x305, 0x405, 0x505)

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.sim.nord_drive import NordDrive
-from bridge.sim.nord_parameters import PARAMETERS
-from bridge.sim.nord_ramp import step
-from bridge.sim.nord_states import State
+from bridge.sim.core.ramp import step
+from bridge.sim.nord.nord_drive import NordDrive
+from bridge.sim.nord.nord_parameters import PARAMETERS
+from bridge.sim.nord.nord_states import State
 
 
 class Driver:

@@ -14,9 +14,9 @@ from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.canopen.sdo import SdoChannel, SdoError
 from bridge.mapping import load_family
 from bridge.node.boot import factory_entries
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
+from bridge.sim.nord.nord_tu4 import NordTu4
 
 NODES = {
     "nord/sk-tu4-cao": lambda: NordTu4(5),

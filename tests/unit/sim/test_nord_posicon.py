@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.nord_drive import NordDrive
-from bridge.sim.nord_posicon import PositionControl, commission, target
-from bridge.sim.nord_states import State
+from bridge.sim.nord.nord_drive import NordDrive
+from bridge.sim.nord.nord_posicon import PositionControl, commission, target
+from bridge.sim.nord.nord_states import State
 
 REACHED = 0x0100
 TURNS_LEFT = 0x1000

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.nord_states import State
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_tu4 import NordTu4
 
 P168 = 0x20A8
 MISSING = "06020000"

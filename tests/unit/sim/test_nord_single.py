@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
-from bridge.sim.nord_states import State
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
+from bridge.sim.nord.nord_states import State
 
 P509, P513, P543, P544, P700, P701, P746 = 0x21FD, 0x2201, 0x221F, 0x2220, 0x22BC, 0x22BD, 0x22EA
 READY, RUN, ACKNOWLEDGE = "7E04", "7F04", "8004"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.sim.nord_states import State
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_tu4 import NordTu4
 
 P151, P160, P161, P162, P163, P164, P165, P166, P167 = 0x2097, *range(0x20A0, 0x20A8)
 P170, P173, P176, P177 = 0x20AA, 0x20AD, 0x20B0, 0x20B1

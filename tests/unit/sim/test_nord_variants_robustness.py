@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.canopen.frame import REMOTE, Frame
-from bridge.sim.nord_node import NordNode
-from bridge.sim.nord_single import NordSingle
-from bridge.sim.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_node import NordNode
+from bridge.sim.nord.nord_single import NordSingle
+from bridge.sim.nord.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
+from bridge.sim.nord.nord_tu4 import NordTu4
 
 NODES: dict[str, Callable[[], NordNode]] = {
     "tu3": lambda: NordSingle(5, TU3, p513_s=0.5, ripple=0.01),

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, Frame
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_tu4 import NordTu4
 
 OWN_IDS = [0x000, 0x080, 0x205, 0x305, 0x405, 0x505, 0x245, 0x605, 0x345, 0x705]
 OWN_IDS += [0x705 | REMOTE, 0x205 | REMOTE]

@@ -8,9 +8,9 @@ import canopen
 import pytest
 from canopen.sdo import SdoAbortedError, SdoClient
 
-from bridge.sim.dictionary import Cell, DataType, Dictionary, Domain, Number
-from bridge.sim.sdo_block_server import checksum
-from bridge.sim.sdo_server import SdoServer
+from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Domain, Number
+from bridge.sim.core.sdo_block_server import checksum
+from bridge.sim.core.sdo_server import SdoServer
 
 DATA = bytes(range(256)) * 5
 

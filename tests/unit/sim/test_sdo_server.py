@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.dictionary import Cell, DataType, Dictionary, Number, Text
-from bridge.sim.sdo_server import SdoServer
+from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Number, Text
+from bridge.sim.core.sdo_server import SdoServer
 
 
 def ask(server: SdoServer, request: str) -> str:

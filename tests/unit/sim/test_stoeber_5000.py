@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.sim.nmt_slave import NmtState
-from bridge.sim.stoeber_5000 import Stoeber5000
-from bridge.sim.stoeber_axis import AxisState
-from bridge.sim.stoeber_settings import coordinate
+from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
+from bridge.sim.stoeber.stoeber_axis import AxisState
+from bridge.sim.stoeber.stoeber_settings import coordinate
 
 ENABLE, ACKNOWLEDGE, QUICK_STOP = 1, 2, 4
 WRONG_STATE = "08000022"

@@ -6,7 +6,7 @@ import pytest
 
 from bridge.base.errors import OperationFailed
 from bridge.sim.catalogue import simulate_node
-from bridge.sim.stoeber_5000 import Stoeber5000
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 
 
 def test_parameters_for_all_axes_and_for_one():

@@ -9,9 +9,9 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.pdo import PdoEntry
 from bridge.canopen.sdo import SdoChannel
 from bridge.mapping import load_family
-from bridge.sim.dictionary import Dictionary, Domain
-from bridge.sim.sdo_server import SdoServer
-from bridge.sim.stoeber_5000 import Stoeber5000
+from bridge.sim.core.dictionary import Dictionary, Domain
+from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 
 SIXTEEN = bytes(range(1, 17))
 

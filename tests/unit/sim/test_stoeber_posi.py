@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.stoeber_5000 import Stoeber5000
-from bridge.sim.stoeber_axis import AxisState
-from bridge.sim.stoeber_posi import (
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
+from bridge.sim.stoeber.stoeber_axis import AxisState
+from bridge.sim.stoeber.stoeber_posi import (
     ABORTED,
     HOME_AT,
     LIMIT_AT,

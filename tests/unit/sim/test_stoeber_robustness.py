@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, Frame
-from bridge.sim.stoeber_5000 import Stoeber5000
+from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 
 OWN_IDS = [0x000, 0x080, 0x205, 0x305, 0x405, 0x505, 0x605, 0x625, 0x705, 0x705 | REMOTE, 0x205 | REMOTE]
 INDICES = [0x1000, 0x1005, 0x1006, 0x1008, 0x100C, 0x100D, 0x1010, 0x1014, 0x1015, 0x1017, 0x1018, 0x1020]

@@ -11,7 +11,7 @@ import pytest
 from bridge.command import Identity, Role, Source
 from bridge.northbound.modbus.pdu import ExceptionCode
 from bridge.northbound.modbus.registers import PARAMETERS, DriveMap, Table
-from bridge.sim.nord_supervision import Presence
+from bridge.sim.nord.nord_supervision import Presence
 from tests.support.bench import Bench, write_site
 from tests.support.views import dispatcher_of
 

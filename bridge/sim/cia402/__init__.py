@@ -1,0 +1,1 @@
+"""A drive of CiA 402 in its modes."""

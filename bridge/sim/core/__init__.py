@@ -1,0 +1,1 @@
+"""Parts of every simulated node: SDO server, PDOs, NMT, errors, habits. Knows no family."""

@@ -1,0 +1,1 @@
+"""Nodes made of a mapping file or of a device description."""

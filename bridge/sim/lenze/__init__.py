@@ -1,0 +1,1 @@
+"""The Lenze 8400 motec."""

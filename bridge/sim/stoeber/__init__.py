@@ -1,0 +1,1 @@
+"""The STÖBER 5000, with one axis and with four."""

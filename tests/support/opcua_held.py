@@ -10,8 +10,6 @@ from asyncua.server.standard_address_space import standard_address_space
 from asyncua.ua.ua_binary import struct_to_binary
 
 from bridge.image import Image
-from bridge.northbound.opcua.address_space import is_empty
-from bridge.northbound.opcua.library import make, node_id, text
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode, layout
 from bridge.northbound.opcua.structures import (
     point_attributes,
@@ -19,6 +17,8 @@ from bridge.northbound.opcua.structures import (
     property_nodes,
     value_type,
 )
+from bridge.uaserver.address_space import is_empty
+from bridge.uaserver.library import make, node_id, text
 
 Ids = ua.ObjectIds
 _CHANGED = (Ids.ObjectsFolder, Ids.Server)

@@ -9,7 +9,7 @@ from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_from_binary
 
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.northbound.opcua.session import Session
+from bridge.uaserver.session import Session
 
 
 async def ask(client: Client, service: str, **params: object) -> Any:

@@ -14,6 +14,7 @@ import pytest
 
 from bridge.base.notify import Notifier
 from bridge.base.quietlog import A_FEW
+from bridge.base.sources import source_of
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Plant, Rejection, Request, Source, command_of
@@ -23,7 +24,6 @@ from bridge.mirror.client import MirrorClient
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.session import Session
 from bridge.northbound.modbus.units import units_of
-from bridge.northbound.sources import source_of
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.service.event_log import log_event
 from bridge.service.parts import Parts

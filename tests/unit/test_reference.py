@@ -28,11 +28,11 @@ from bridge.northbound.modbus.registers import DriveMap, Row, Table
 from bridge.northbound.modbus.units import drive_maps, units_of
 from bridge.northbound.opcua.events import type_name
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
-from bridge.northbound.opcua.services import SERVICES
-from bridge.northbound.opcua.states import REFUSALS, Need, State
 from bridge.northbound.opcua.values import OUTCOME_STATUS, QUALITY_STATUS
 from bridge.northbound.zenoh.commands import MALFORMED, METHODS, NODE_METHODS
 from bridge.project import load_project
+from bridge.uaserver.services import SERVICES
+from bridge.uaserver.states import REFUSALS, Need, State
 from tests.support.docs import (
     page,
 )

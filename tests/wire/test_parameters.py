@@ -19,7 +19,7 @@ import pytest
 from asyncua.client.client import Client
 from pymodbus.client import ModbusTcpClient
 
-from bridge.northbound.opcua.library import StatusCodes, get, make, node_id, ua, variant
+from bridge.uaserver.library import StatusCodes, get, make, node_id, ua, variant
 from tests.support.passwords import cheap_hash
 from tests.support.process import drivebridge, drivebridge_called, free_port, peer_called, until
 

@@ -10,13 +10,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final, cast
 
+from bridge.base.admission import Admission, Limits, Stage, Visitor
 from bridge.base.errors import Unavailable
+from bridge.base.notices import teller
 from bridge.base.quietlog import about
 from bridge.command import Identity, Role, Source
-from bridge.northbound.admission import Admission, Limits, Stage, Visitor
 from bridge.northbound.gateway.session import Net, Session
 from bridge.northbound.listening import ListeningSocket, listen, until_deaf
-from bridge.northbound.notices import teller
 from bridge.northbound.view import View
 
 _log = logging.getLogger(__name__)

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Final
 
 from bridge.base.quietlog import about
+from bridge.base.sources import source_of
 from bridge.command import Action, Code, Identity, Outcome, Rejection, Request
 from bridge.command.messages.freshness import NOW_S
 from bridge.config import WordOrder
@@ -35,7 +36,6 @@ from bridge.northbound.modbus.pdu import (
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, MIRROR, Table, Words32
 from bridge.northbound.modbus.unit import BridgeUnit, Unit
 from bridge.northbound.modbus.units import Units
-from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
 
 _log = logging.getLogger(__name__)

@@ -10,18 +10,18 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
+from bridge.base.admission import Admission, Limits, Stage, Visitor
+from bridge.base.notices import teller
 from bridge.base.quietlog import about
+from bridge.base.sources import source_of
 from bridge.command import Identity, Role, Source
 from bridge.config import ModbusTable
-from bridge.northbound.admission import Admission, Limits, Stage, Visitor
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.rounds import Rounds
 from bridge.northbound.modbus.session import READ_MOST, Session
 from bridge.northbound.modbus.units import Units
-from bridge.northbound.notices import teller
 from bridge.northbound.pulse import Pulse
-from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
 
 _log = logging.getLogger(__name__)

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Protocol, cast
 
+from bridge.base.admission import Visitor
+from bridge.base.sources import source_of
 from bridge.command import Identity
 from bridge.command.messages.freshness import Inflow
-from bridge.northbound.admission import Visitor
 from bridge.northbound.modbus.dispatch import WRITES, Answer, Dispatcher
 from bridge.northbound.modbus.rounds import Rounds
 from bridge.northbound.pulse import Pulse
-from bridge.northbound.sources import source_of
 
 STALL_LIMIT_S: Final = 5.0
 """How long a client may leave its answers unread; then it is disconnected."""

@@ -1,4 +1,4 @@
-"""OPC UA: a pure layout of the points (``nodes``) and a thin server on asyncua (``server``).
+"""OPC UA: a pure layout of the points (``nodes``), served by ``bridge.uaserver``, which knows no points.
 
 Nothing is imported here: `drivebridge hash-password` must not wait for asyncua.
 """

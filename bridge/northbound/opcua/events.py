@@ -12,11 +12,11 @@ from typing import Final
 from bridge.base.guard import Guard
 from bridge.base.ratelimit import RateLimit
 from bridge.command import Event, Kind
-from bridge.northbound.opcua.eventfilter import Occurrence
-from bridge.northbound.opcua.library import ObjectIds, node_id, text, ua, variant
 from bridge.northbound.opcua.nodes import pascal_case
-from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.values import source_time
+from bridge.uaserver.eventfilter import Occurrence
+from bridge.uaserver.library import ObjectIds, node_id, text, ua, variant
+from bridge.uaserver.subscriptions import Subscriptions
 
 BASE_TYPE: Final = "DriveEventType"
 _BURST: Final = 20

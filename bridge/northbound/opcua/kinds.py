@@ -10,9 +10,16 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeManagementService
 
-from bridge.northbound.opcua.address_space import is_empty
-from bridge.northbound.opcua.hierarchy import related
-from bridge.northbound.opcua.library import (
+from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode
+from bridge.northbound.opcua.structures import (
+    PropertyNode,
+    point_attributes,
+    property_attributes,
+    value_type,
+)
+from bridge.uaserver.address_space import is_empty
+from bridge.uaserver.hierarchy import related
+from bridge.uaserver.library import (
     AttributeIds,
     ObjectIds,
     change,
@@ -23,13 +30,6 @@ from bridge.northbound.opcua.library import (
     text,
     ua,
     variant,
-)
-from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode
-from bridge.northbound.opcua.structures import (
-    PropertyNode,
-    point_attributes,
-    property_attributes,
-    value_type,
 )
 
 Node = ObjectNode | MethodNode | VariableNode | PropertyNode

@@ -10,7 +10,6 @@ from asyncua.server.address_space import AddressSpace
 
 from bridge.command.messages.request import PARAMETER_ACTIONS, Action, Code, Identity, Request, command_of
 from bridge.image import Value
-from bridge.northbound.opcua.library import AttributeIds, ServiceError, StatusCodes, get, make, status, ua
 from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode
 from bridge.northbound.opcua.values import (
     INTEGER_TYPES,
@@ -21,6 +20,7 @@ from bridge.northbound.opcua.values import (
 )
 from bridge.northbound.opcua.writes import ask
 from bridge.northbound.view import View
+from bridge.uaserver.library import AttributeIds, ServiceError, StatusCodes, get, make, status, ua
 
 _DIRECTIONS: Final = (-1, 0, 1)
 _AT_FAULT: Final = {Code.UNKNOWN_PARAMETER: 0, Code.READ_ONLY: 0, Code.WRITE_ONLY: 0, Code.OUT_OF_RANGE: 1}

@@ -9,8 +9,8 @@ from typing import Final
 from bridge.base.beat import next_look
 from bridge.base.guard import Guard
 from bridge.image import Image
-from bridge.northbound.opcua.address_space import AllWatched
 from bridge.northbound.opcua.events import EventSender
+from bridge.northbound.opcua.point_values import AllWatched
 
 _TAKE: Final = 500
 _BEFORE_YIELD: Final = 20

@@ -1,4 +1,4 @@
-"""The OPC UA server: brings layout, security and asyncua together."""
+"""The OPC UA server of the bridge: brings layout, users and the server together."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ import asyncio
 import gc
 import logging
 import socket
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
-
-from asyncua.common.connection import TransportLimits
-from asyncua.server.server import Server as LibraryServer
 
 import bridge
 from bridge.base import clock
@@ -18,53 +16,29 @@ from bridge.base.errors import OperationFailed
 from bridge.command import Kind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
-from bridge.northbound.opcua import decoding
+from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.identity import ServerIdentity, server_identity
-from bridge.northbound.opcua.library import ObjectIds, get, make, node_id, text, ua
-from bridge.northbound.opcua.librarylog import quieten
-from bridge.northbound.opcua.listener import WINDOW, Listener
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.publisher import Publisher
-from bridge.northbound.opcua.security import CheckedPolicy, Users, security_policies
-from bridge.northbound.opcua.selfdescription import built_at, describe
-from bridge.northbound.opcua.session import Server, Services
 from bridge.northbound.opcua.tree import Tree
+from bridge.northbound.opcua.users import Users, security_policies
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
+from bridge.uaserver import decoding
+from bridge.uaserver.bound import BoundServer
+from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
+from bridge.uaserver.librarylog import quieten
+from bridge.uaserver.listener import WINDOW
+from bridge.uaserver.session import Server
 
 NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
-_CHUNK: Final = 65535
-_MOST_CHUNKS: Final = 256
 
 _log = logging.getLogger(__name__)
-
-
-class _Outer(LibraryServer):
-    """asyncua's server on a socket that is bound already, with checked channels."""
-
-    def __init__(
-        self, inner: Server, bound: socket.socket, trusted: TrustedCertificates | None, pulse: Pulse
-    ) -> None:
-        super().__init__(iserver=inner)
-        self._pulse = pulse
-        self._inner = inner
-        self._bound = bound
-        self._trusted = trusted
-        self.limits = TransportLimits(_CHUNK, _CHUNK, _MOST_CHUNKS, _CHUNK * _MOST_CHUNKS)
-
-    async def start(self) -> None:
-        await self._setup_server_nodes()
-        policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
-        await self._inner.start()
-        describe(self._inner.aspace)
-        self.bserver = Listener(self._inner, self._bound, self.limits, self._pulse)
-        self.bserver.set_policies(policies)
-        await self.bserver.start()
 
 
 class OpcUaServer:
@@ -87,7 +61,7 @@ class OpcUaServer:
         self._folder = state_dir / "opcua"
         self._site_name = site_name
         self._users: Users | None = None
-        self._server: _Outer | None = None
+        self._server: BoundServer | None = None
         self._socket = bound
         self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
@@ -164,18 +138,18 @@ class OpcUaServer:
         quieten()
         decoding.install()
         inner = Server(no_security=self._settings.no_security)
-        inner.count = self._view.count
         inner.certificate, inner.private_key = own.certificate, own.private_key
-        server = _Outer(inner, bound, trusted, self._pulse)
+        server = BoundServer(inner, bound, trusted)
         await self._describe(server, own.application_uri, users)
         namespace = await server.register_namespace(NAMESPACE)
         image = self._view.image
         tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
-        inner.services = Services(
+        inner.application = Backend(
             users,
             Writer(self._view, inner.aspace, tree.writable),
             Caller(self._view, inner.aspace, tree.method),
             self._view,
+            self._pulse,
         )
         events = self._events(inner, tree)
         inner.subscriptions.prepare()
@@ -186,7 +160,7 @@ class OpcUaServer:
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
 
-    async def _describe(self, server: _Outer, application_uri: str, users: Users) -> None:
+    async def _describe(self, server: BoundServer, application_uri: str, users: Users) -> None:
         server.set_endpoint(self.endpoint_url)
         server.name = f"drivebridge {self._site_name}"
         server.application_type = ua.ApplicationType.Server
@@ -235,3 +209,9 @@ def _event_type(inner: Server, where: ua.NodeId, parent: ua.NodeId) -> ua.NodeId
     (result,) = inner.node_mgt_service.add_nodes([item])
     get(result, "StatusCode").check()
     return where
+
+
+def built_at() -> datetime:
+    """When the newest of the program's files was written."""
+    files = Path(bridge.__file__).parent.rglob("*.py")
+    return datetime.fromtimestamp(max(file.stat().st_mtime for file in files), UTC)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-from bridge.northbound.opcua.library import ObjectIds, make, node_id, text, ua, variant
 from bridge.northbound.opcua.nodes import (
     Argument,
     ArgumentType,
@@ -18,6 +17,7 @@ from bridge.northbound.opcua.nodes import (
 )
 from bridge.northbound.opcua.units import UNIT_NAMESPACE, unit_description, unit_id
 from bridge.northbound.opcua.values import VARIANT_TYPE
+from bridge.uaserver.library import ObjectIds, make, node_id, text, ua, variant
 
 READ: Final = 1
 READ_WRITE: Final = 3

@@ -10,7 +10,7 @@ from typing import Final
 from bridge.command import Rejection
 from bridge.command.messages.request import Code, Identity, Outcome
 from bridge.image import DataType, Image, Point, Quality, Reading, Value
-from bridge.northbound.opcua.library import GOOD, StatusCodes, data_value, status, ua, variant
+from bridge.uaserver.library import GOOD, StatusCodes, data_value, status, ua, variant
 
 EpochNs = Callable[[float], int]
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
-from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -29,19 +28,16 @@ from bridge.command.messages.request import (
     WriteParameter,
 )
 from bridge.image import Value
-from bridge.northbound.opcua.library import GOOD, AttributeIds, ServiceError, StatusCodes, get, status, ua
 from bridge.northbound.opcua.nodes import VariableNode
 from bridge.northbound.opcua.values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.view import View
+from bridge.uaserver.arrivals import received_at
+from bridge.uaserver.library import GOOD, AttributeIds, ServiceError, StatusCodes, get, status, ua
 
 _log = logging.getLogger(__name__)
 
 ANSWER_LIMIT_S: Final = 10.0
 """No request takes longer (a start takes 3 s); after this the link to the bus counts as broken."""
-
-
-received_at: ContextVar[float | None] = ContextVar("received_at", default=None)
-"""When the message whose service is being carried out can have come at the earliest; None for just now."""
 
 
 _ALONE: Final = {"parameter": WriteParameter, "supervision": SetTimeout}

@@ -15,13 +15,13 @@ from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from bridge.base.errors import OperationFailed
+from bridge.base.notices import teller
+from bridge.base.sources import source_of
 from bridge.northbound.listening import until_deaf
-from bridge.northbound.notices import teller
 from bridge.northbound.page.guards import MOST_HEAD
 from bridge.northbound.page.shares import MOST_CONNECTIONS, Connections, Doing
 from bridge.northbound.page.viewer import MOST_BYTES
 from bridge.northbound.page.web import Page
-from bridge.northbound.sources import source_of
 
 _HEADERS_S: Final = 10.0
 """How long the head of a request may take to come, the first of a connection included."""

@@ -10,8 +10,8 @@ from enum import IntEnum
 from math import inf
 from typing import Final, Generic, TypeVar
 
+from bridge.base.admission import Admission, Limits, Stage, Tell, Visitor
 from bridge.command import Role
-from bridge.northbound.admission import Admission, Limits, Stage, Tell, Visitor
 
 MOST_TABS: Final = 64
 MOST_OF_USER: Final = 16

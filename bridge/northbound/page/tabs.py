@@ -14,6 +14,7 @@ import msgspec
 from starlette.websockets import WebSocket
 
 from bridge.base.guard import Guard
+from bridge.base.sources import source_of
 from bridge.command import Event
 from bridge.condition.layout import Layout
 from bridge.image import Image
@@ -24,7 +25,6 @@ from bridge.northbound.page.tab import BAD_MESSAGE, GONE, NO_TOKEN, SESSION_OVER
 from bridge.northbound.page.topics import Topics
 from bridge.northbound.page.troubles import Troubles
 from bridge.northbound.page.viewer import BadMessage
-from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
 
 _TICK_S: Final = 0.05

@@ -21,6 +21,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
 
+from bridge.base.sources import source_of
 from bridge.command import Role
 from bridge.condition.layout import layout_of
 from bridge.config import PageTable, Site, UserTable
@@ -37,7 +38,6 @@ from bridge.northbound.page.sessions import Session, Sessions
 from bridge.northbound.page.system import System, SystemFacts
 from bridge.northbound.page.tabs import Tabs
 from bridge.northbound.page.throttle import FIRST_PAUSE_S, Throttle
-from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
 
 _log = logging.getLogger(__name__)

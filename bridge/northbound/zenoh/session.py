@@ -20,12 +20,12 @@ import zenoh
 
 from bridge.base.errors import Unavailable
 from bridge.base.quietlog import about
+from bridge.base.sources import source_of
 from bridge.command import Code, Event, Identity, Outcome, Rejection, Reply, Request, Source
 from bridge.command.messages.request import STOP_ACTIONS
 from bridge.config import ZenohTable
 from bridge.image import Quality, Reading
 from bridge.northbound.pulse import Pulse
-from bridge.northbound.sources import source_of
 from bridge.northbound.view import View
 from bridge.northbound.zenoh import keys
 from bridge.northbound.zenoh.access import access_control

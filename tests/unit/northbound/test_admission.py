@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.northbound.admission import Admission, Limits, Stage, Visitor
-from bridge.northbound.opcua.admission import (
+from bridge.base.admission import Admission, Limits, Stage, Visitor
+from bridge.base.sources import source_of
+from bridge.uaserver.admission import (
     DEADLINE_S,
     KEPT,
     MOST_CONNECTIONS,
@@ -14,7 +15,6 @@ from bridge.northbound.opcua.admission import (
     MOST_WAITING,
     limits,
 )
-from bridge.northbound.sources import source_of
 
 
 class Rig:

@@ -18,13 +18,15 @@ from asyncua.common import utils
 from asyncua.server.internal_server import InternalServer
 from asyncua.ua import ua_binary
 
-import bridge.northbound.opcua as package
-from bridge.northbound.opcua import decoding
+from bridge import uaserver
+from bridge.northbound import opcua
+from bridge.uaserver import decoding
 from tests.support.opcua_client import call, node, word, write
 from tests.support.opcua_raw import ask
 from tests.support.opcua_site import OPEN, break_off, connected, serving
 
 OVERRIDDEN = {
+    "BoundServer": {"start"},
     "Channel": {"select_policy"},
     "Listener": {"_make_protocol", "start", "stop"},
     "Processor": {
@@ -38,16 +40,15 @@ OVERRIDDEN = {
     },
     "Server": {"create_session", "get_endpoints", "stop"},
     "Session": {"_timeout_loop", "activate_session", "close_session", "create_session"},
-    "_Outer": {"start"},
     "_Protocol": {"_process_one_msg", "connection_lost", "connection_made", "data_received"},
 }
 """A name that asyncua no longer has would be no override any more, and nobody would call it."""
 
 BY_OURSELVES = {
+    "BoundServer.start",
     "Listener.start",
     "Processor._process_message",
     "Server.stop",
-    "_Outer.start",
     # by asyncio
     "Listener._make_protocol",
     "_Protocol.connection_lost",
@@ -69,8 +70,9 @@ SETTINGS = (
 
 
 def modules() -> Iterator[Any]:
-    for found in pkgutil.iter_modules(package.__path__):
-        yield importlib.import_module(f"{package.__name__}.{found.name}")
+    for package in (uaserver, opcua):
+        for found in pkgutil.iter_modules(package.__path__):
+            yield importlib.import_module(f"{package.__name__}.{found.name}")
 
 
 def ours() -> dict[str, type]:
@@ -108,7 +110,7 @@ def private_names() -> set[str]:
     """Names with an underscore that our modules use but nobody of us defines."""
     used: set[str] = set()
     defined: set[str] = set()
-    for path in Path(package.__path__[0]).glob("*.py"):
+    for path in (file for package in (uaserver, opcua) for file in Path(package.__path__[0]).glob("*.py")):
         for part in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(part, ast.Attribute) and part.attr.startswith("_") and not part.attr.endswith("__"):
                 used.add(part.attr)

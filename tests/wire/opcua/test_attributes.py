@@ -9,9 +9,9 @@ import pytest
 from asyncua import Client, ua
 from asyncua.server.address_space import AddressSpace
 
-from bridge.northbound.opcua.hierarchy import subtypes
-from bridge.northbound.opcua.selfdescription import NOT_DONE, VALUES, built_at
-from bridge.northbound.opcua.server import OpcUaServer
+from bridge.northbound.opcua.server import OpcUaServer, built_at
+from bridge.uaserver.hierarchy import subtypes
+from bridge.uaserver.selfdescription import NOT_DONE, VALUES
 from tests.support.opcua_raw import sessions
 from tests.support.opcua_site import LocalView, namespace
 

@@ -12,10 +12,10 @@ import pytest
 from asyncua import Client, ua
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua import admission, monitoring, shares
-from bridge.northbound.opcua.admission import DEADLINE_S, Stage
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.passwords import hash_password
+from bridge.uaserver import admission, monitoring, shares
+from bridge.uaserver.admission import DEADLINE_S, Stage
 from tests.support.opcua_site import OPEN, break_off, connected, serving
 from tests.support.quiet import quiet_log
 

@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 from asyncua import Client, ua
 
-from bridge.northbound.opcua import admission, listener
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.northbound.opcua.transport import MOST_BEFORE_SESSION
+from bridge.uaserver import admission, listener
+from bridge.uaserver.transport import MOST_BEFORE_SESSION
 from tests.support.opcua_site import OPEN, LocalView, break_off, connected, serving
 from tests.support.quiet import quiet_log
 from tests.support.zenoh_peer import until

@@ -9,7 +9,7 @@ from asyncua import Client, ua
 
 from bridge.image import Quality
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.northbound.opcua.services import SERVICES, Service
+from bridge.uaserver.services import SERVICES, Service
 from tests.support.opcua_raw import ask, item, monitored, told
 from tests.support.opcua_services import (
     LOAD,

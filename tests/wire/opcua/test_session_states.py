@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 from asyncua import Client, ua
 
-from bridge.northbound.opcua import admission, shares
-from bridge.northbound.opcua.routes import ROUTES
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.northbound.opcua.session import Session
-from bridge.northbound.opcua.states import REFUSALS, Need, State
+from bridge.uaserver import admission, shares
+from bridge.uaserver.routes import ROUTES
+from bridge.uaserver.session import Session
+from bridge.uaserver.states import REFUSALS, Need, State
 from tests.support.opcua_raw import ask, item, monitored, sessions, told
 from tests.support.opcua_services import (
     LOAD,

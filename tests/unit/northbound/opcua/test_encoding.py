@@ -9,8 +9,8 @@ import pytest
 from asyncua import ua
 from asyncua.ua.ua_binary import struct_to_binary
 
-from bridge.northbound.opcua.encoding import Results, encode, weight
-from bridge.northbound.opcua.library import ServiceError
+from bridge.uaserver.encoding import Results, encode, weight
+from bridge.uaserver.library import ServiceError
 
 ANY_SIZE = 1 << 24
 VALUES = [

@@ -12,10 +12,10 @@ from asyncua.server.standard_address_space import standard_address_space
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.northbound.opcua.eventfilter import EventFilterFault, Occurrence, event_filter
-from bridge.northbound.opcua.filters import change_filter
-from bridge.northbound.opcua.hierarchy import EventTypes
-from bridge.northbound.opcua.library import DataChangeFilter, ServiceError
+from bridge.uaserver.eventfilter import EventFilterFault, Occurrence, event_filter
+from bridge.uaserver.filters import change_filter
+from bridge.uaserver.hierarchy import EventTypes
+from bridge.uaserver.library import DataChangeFilter, ServiceError
 
 Codes, Ids, Kind, Op = ua.StatusCodes, ua.ObjectIds, ua.VariantType, ua.FilterOperator
 SERVER = ua.NodeId(Ids.Server)

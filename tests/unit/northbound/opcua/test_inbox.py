@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 from asyncua.common.utils import Buffer
 
-from bridge.northbound.opcua.inbox import Inbox
+from bridge.uaserver.inbox import Inbox
 
 
 @dataclass

@@ -10,11 +10,11 @@ from asyncua import ua
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.northbound.opcua.eventfilter import EventFilter, Occurrence
-from bridge.northbound.opcua.filters import ChangeFilter
-from bridge.northbound.opcua.items import EventItem, Settings, ValueItem, event_settings, value_settings
-from bridge.northbound.opcua.reading import window
-from bridge.northbound.opcua.where import Where
+from bridge.uaserver.eventfilter import EventFilter, Occurrence
+from bridge.uaserver.filters import ChangeFilter
+from bridge.uaserver.items import EventItem, Settings, ValueItem, event_settings, value_settings
+from bridge.uaserver.reading import window
+from bridge.uaserver.where import Where
 
 Codes, Kind, Mode = ua.StatusCodes, ua.VariantType, ua.MonitoringMode
 OVERFLOW = 0x480

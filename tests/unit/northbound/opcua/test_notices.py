@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import pytest
 
 from bridge.base.quietlog import QuietHandler
-from bridge.northbound.opcua.librarylog import quieten
-from bridge.northbound.opcua.notices import tell
+from bridge.uaserver.librarylog import quieten
+from bridge.uaserver.notices import tell
 
 
 class Log:

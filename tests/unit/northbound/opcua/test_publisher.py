@@ -8,7 +8,7 @@ from typing import Any
 
 from asyncua import ua
 
-from bridge.northbound.opcua.address_space import Watched
+from bridge.northbound.opcua.point_values import Watched
 from bridge.northbound.opcua.publisher import Publisher
 from tests.support.zenoh_peer import until
 

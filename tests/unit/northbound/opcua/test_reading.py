@@ -9,9 +9,9 @@ from asyncua import ua
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.northbound.opcua import ranges
-from bridge.northbound.opcua.library import ServiceError
-from bridge.northbound.opcua.reading import checked_times, window
+from bridge.uaserver import ranges
+from bridge.uaserver.library import ServiceError
+from bridge.uaserver.reading import checked_times, window
 
 Codes, Kind, Times = ua.StatusCodes, ua.VariantType, ua.TimestampsToReturn
 THEN, LATER = datetime(2026, 1, 1, tzinfo=UTC), datetime(2026, 1, 2, tzinfo=UTC)

@@ -19,9 +19,10 @@ from bridge.base.errors import FileFaults
 from bridge.command import Role
 from bridge.config import OpcUaTable, UserTable
 from bridge.northbound.opcua.certificates import OwnCertificate, TrustedCertificates, load_own, new_own
-from bridge.northbound.opcua.security import Users, read_password, security_policies
-from bridge.northbound.opcua.transport import Processor
+from bridge.northbound.opcua.users import Users, security_policies
 from bridge.northbound.passwords import hash_password, verify_password
+from bridge.uaserver.security import read_password
+from bridge.uaserver.transport import Processor
 
 URI = "urn:test:drivebridge"
 Policy = ua.SecurityPolicyType

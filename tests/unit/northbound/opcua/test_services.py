@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from asyncua import ua
 
-from bridge.northbound.opcua.services import REFUSED, SERVICES, request_type
-from bridge.northbound.opcua.states import REFUSALS, Need, State, need_of
+from bridge.uaserver.services import REFUSED, SERVICES, request_type
+from bridge.uaserver.states import REFUSALS, Need, State, need_of
 
 _ENDING = "Request_Encoding_DefaultBinary"
 NO_SERVICES = {"CallMethod", "MonitoredItemCreate", "MonitoredItemModify"}

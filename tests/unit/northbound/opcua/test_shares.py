@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from asyncua import ua
 
-from bridge.northbound.opcua import shares
-from bridge.northbound.opcua.eventfilter import EventFilter
-from bridge.northbound.opcua.items import EventItem, Settings
-from bridge.northbound.opcua.library import ServiceError
-from bridge.northbound.opcua.shares import Listening, room_for_items
-from bridge.northbound.opcua.subscription import Subscription, terms
-from bridge.northbound.opcua.where import Where
+from bridge.uaserver import shares
+from bridge.uaserver.eventfilter import EventFilter
+from bridge.uaserver.items import EventItem, Settings
+from bridge.uaserver.library import ServiceError
+from bridge.uaserver.shares import Listening, room_for_items
+from bridge.uaserver.subscription import Subscription, terms
+from bridge.uaserver.where import Where
 
 HERE, NEIGHBOUR, ELSEWHERE = "2001:db8::1", "2001:db8::2", "10.0.0.1"
 

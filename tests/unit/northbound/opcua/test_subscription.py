@@ -11,25 +11,37 @@ from asyncua.server.address_space import AddressSpace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command.messages.request import Identity, Source
-from bridge.northbound.opcua.filters import ChangeFilter
-from bridge.northbound.opcua.items import Settings, ValueItem
-from bridge.northbound.opcua.library import ServiceError
-from bridge.northbound.opcua.publishing import PublishQueue, PublishRequest
-from bridge.northbound.opcua.reading import window
-from bridge.northbound.opcua.shares import MOST_SUBSCRIPTIONS
-from bridge.northbound.opcua.subscription import RETRANSMISSIONS, Subscription, Terms, terms
-from bridge.northbound.opcua.subscriptions import Subscriptions
+from bridge.uaserver.filters import ChangeFilter
+from bridge.uaserver.items import Settings, ValueItem
+from bridge.uaserver.library import ServiceError
+from bridge.uaserver.publishing import PublishQueue, PublishRequest
+from bridge.uaserver.reading import window
+from bridge.uaserver.shares import MOST_SUBSCRIPTIONS
+from bridge.uaserver.subscription import RETRANSMISSIONS, Subscription, Terms, terms
+from bridge.uaserver.subscriptions import Subscriptions
 
 Codes, Mode = ua.StatusCodes, ua.MonitoringMode
 TARGET = ua.ReadValueId(AttributeId=ua.AttributeIds.Value)
 
 
 @dataclass
+class User:
+    name: str
+    has_rights: bool = True
+
+    @property
+    def is_anonymous(self) -> bool:
+        return self.name == "anonymous"
+
+    def is_same(self, other: object) -> bool:
+        return self == other
+
+
+@dataclass
 class Session:
     session_id: ua.NodeId = field(default_factory=lambda: ua.NodeId(7))
     address: str = "10.0.0.1"
-    identity: Identity = field(default_factory=lambda: Identity(Source.OPCUA, "anna"))
+    identity: User = field(default_factory=lambda: User("anna"))
     channel_certificate: bytes | None = None
     publishing: PublishQueue = field(default_factory=PublishQueue)
     is_gone: bool = False
@@ -365,7 +377,7 @@ async def test_what_nobody_could_take_over_is_not_left_behind(
     user: str, certificate: bytes | None, stays: int
 ) -> None:
     there = Subscriptions(AddressSpace())
-    owner = Session(identity=Identity(Source.OPCUA, user), channel_certificate=certificate)
+    owner = Session(identity=User(user), channel_certificate=certificate)
     there.create(owner, ua.CreateSubscriptionParameters(RequestedPublishingInterval=1e6))
     there.end(owner, delete=False)
     assert len(there.subscriptions) == stays

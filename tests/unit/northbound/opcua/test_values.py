@@ -14,9 +14,7 @@ from bridge.command import Event
 from bridge.command import Kind as EventKind
 from bridge.command.messages.request import Code, Identity, Outcome, Source
 from bridge.image import DataType, Point, Quality, Reading
-from bridge.northbound.opcua.eventfilter import Occurrence
 from bridge.northbound.opcua.events import EventSender
-from bridge.northbound.opcua.subscriptions import Subscriptions
 from bridge.northbound.opcua.values import (
     OUTCOME_STATUS,
     QUALITY_STATUS,
@@ -26,6 +24,8 @@ from bridge.northbound.opcua.values import (
     reading_value,
     rejection,
 )
+from bridge.uaserver.eventfilter import Occurrence
+from bridge.uaserver.subscriptions import Subscriptions
 
 Codes, Kind = ua.StatusCodes, ua.VariantType
 WORD = Point(name="a/b/command/word", data_type=DataType.UINT16)

@@ -19,15 +19,15 @@ from typing import Any, Final
 from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import struct_from_binary
 
-from bridge.northbound.opcua.browsing import Browser
-from bridge.northbound.opcua.encoding import Results
-from bridge.northbound.opcua.library import ServiceError, StatusCodes, UaError, change, get, make, status, ua
-from bridge.northbound.opcua.monitoring import MonitoredItems, loop_time
-from bridge.northbound.opcua.publishing import MOST_BYTES, PublishRequest
-from bridge.northbound.opcua.services import request_type
-from bridge.northbound.opcua.session import Session
-from bridge.northbound.opcua.subscription import Subscription
-from bridge.northbound.opcua.subscriptions import Subscriptions
+from bridge.uaserver.browsing import Browser
+from bridge.uaserver.encoding import Results
+from bridge.uaserver.library import ServiceError, StatusCodes, UaError, change, get, make, status, ua
+from bridge.uaserver.monitoring import MonitoredItems, loop_time
+from bridge.uaserver.publishing import MOST_BYTES, PublishRequest
+from bridge.uaserver.services import request_type
+from bridge.uaserver.session import Session
+from bridge.uaserver.subscription import Subscription
+from bridge.uaserver.subscriptions import Subscriptions
 
 MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100
@@ -87,11 +87,11 @@ async def _browse(session: Session, params: Any) -> Results:
 
 
 def _write(session: Session, params: Any) -> Any:
-    return session.services.writer.write(session.identity, get(params, "NodesToWrite"))
+    return session.application.write(session.identity, get(params, "NodesToWrite"))
 
 
 def _call(session: Session, params: Any) -> Any:
-    return session.services.caller.call(session.identity, get(params, "MethodsToCall"))
+    return session.application.call(session.identity, get(params, "MethodsToCall"))
 
 
 def _view(act: Callable[[Browser, Any], Any]) -> _Act:

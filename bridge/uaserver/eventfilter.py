@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.northbound.opcua.filters import is_none
-from bridge.northbound.opcua.hierarchy import EventTypes
-from bridge.northbound.opcua.library import (
+from bridge.uaserver.filters import is_none
+from bridge.uaserver.hierarchy import EventTypes
+from bridge.uaserver.library import (
     DataChangeFilter,
     ServiceError,
     StatusCodes,
@@ -18,7 +18,7 @@ from bridge.northbound.opcua.library import (
     ua,
     variant,
 )
-from bridge.northbound.opcua.where import Where, field_name, where_clause
+from bridge.uaserver.where import Where, field_name, where_clause
 
 _NO_FIELD: Final = variant(None, ua.VariantType.Null)
 MOST_FIELDS: Final = 500

@@ -14,13 +14,12 @@ from typing import TypeVar
 from asyncua.server.address_space import AddressSpace
 
 from bridge.base.beat import cycle_by
-from bridge.northbound.opcua.library import ServiceError, StatusCodes, change, get, make, status, ua
-from bridge.northbound.opcua.monitoring import MonitoredItems, code_of, loop_time
-from bridge.northbound.opcua.publishing import PublishRequest
-from bridge.northbound.opcua.shares import MOST_ITEMS, MOST_SUBSCRIPTIONS, room_for_items
-from bridge.northbound.opcua.subscription import Owner, Subscription, terms
-from bridge.northbound.passwords import ANONYMOUS
-from bridge.northbound.sources import source_of
+from bridge.base.sources import source_of
+from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
+from bridge.uaserver.monitoring import MonitoredItems, code_of, loop_time
+from bridge.uaserver.publishing import PublishRequest
+from bridge.uaserver.shares import MOST_ITEMS, MOST_SUBSCRIPTIONS, room_for_items
+from bridge.uaserver.subscription import Owner, Subscription, terms
 
 _T = TypeVar("_T")
 
@@ -217,10 +216,9 @@ def _is_same_client(before: Owner, now: Owner) -> bool:
     """Part 4 §5.14.7: the same user. Anybody can come without a name: then the same certificate."""
     if not before.identity.is_same(now.identity) or not _is_known(now):
         return False
-    is_named = now.identity.user != ANONYMOUS
-    return is_named or now.channel_certificate == before.channel_certificate
+    return not now.identity.is_anonymous or now.channel_certificate == before.channel_certificate
 
 
 def _is_known(owner: Owner) -> bool:
     """Whether a client can be told from others: by its name or its certificate."""
-    return owner.identity.user != ANONYMOUS or owner.channel_certificate is not None
+    return not owner.identity.is_anonymous or owner.channel_certificate is not None

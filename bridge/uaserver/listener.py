@@ -14,17 +14,15 @@ from asyncua.server.binary_server_asyncio import BinaryServer, OPCUAProtocol
 from asyncua.ua.ua_binary import uatcp_to_binary
 
 from bridge.base import clock
-from bridge.command import Role
-from bridge.command.messages.freshness import Inflow
-from bridge.northbound.admission import Admission, Stage, Visitor
-from bridge.northbound.opcua.admission import limits as admission_limits
-from bridge.northbound.opcua.inbox import Inbox
-from bridge.northbound.opcua.library import StatusCodes, make, status, ua
-from bridge.northbound.opcua.notices import tell
-from bridge.northbound.opcua.session import Server, Session
-from bridge.northbound.opcua.transport import MOST_BEFORE_SESSION, Processor
-from bridge.northbound.pulse import Pulse
-from bridge.northbound.sources import source_of
+from bridge.base.admission import Admission, Stage, Visitor
+from bridge.base.sources import source_of
+from bridge.uaserver.admission import limits as admission_limits
+from bridge.uaserver.arrivals import Arrivals
+from bridge.uaserver.inbox import Inbox
+from bridge.uaserver.library import StatusCodes, make, status, ua
+from bridge.uaserver.notices import tell
+from bridge.uaserver.session import Server, Session
+from bridge.uaserver.transport import MOST_BEFORE_SESSION, Processor
 
 _MOST_UNREAD: Final = 64
 """Messages that a client which waits for its answers has under way at most."""
@@ -39,13 +37,12 @@ _ERROR: Final[Any] = ua.MessageType.Error
 
 
 class _Protocol(OPCUAProtocol):
-    """Notes with each message when it can have come: it may wait here, or in the bus process."""
+    """Notes with each message when it can have come: it may wait here, or behind the application."""
 
-    def __init__(self, pulse: Pulse, admission: Admission, **settings: Any) -> None:
+    def __init__(self, arrivals: Arrivals, admission: Admission, **settings: Any) -> None:
         super().__init__(**settings)
-        self._pulse = pulse
+        self._arrivals = arrivals
         self._admission = admission
-        self._inflow = Inflow(clock.now(), pulse.look)
         self._source = ""
         self._visitor: Visitor | None = None
         self.messages = self._inbox = Inbox(self.messages.maxsize, self._most_bytes)
@@ -79,7 +76,7 @@ class _Protocol(OPCUAProtocol):
     def _has_rights(self) -> bool:
         """True for a user who may command."""
         session = self.processor.session if isinstance(self.processor, Processor) else None
-        return isinstance(session, Session) and session.identity.role >= Role.OPERATOR
+        return isinstance(session, Session) and session.identity.has_rights
 
     def _held(self) -> int:
         transport, processor = self.transport, self.processor
@@ -98,16 +95,16 @@ class _Protocol(OPCUAProtocol):
         super().data_received(data)
         waiting = self.messages.qsize()
         crowded = len(data) >= _READ_MOST or waiting > _MOST_UNREAD
-        came_at = self._inflow.arrive(clock.now(), self._pulse.look, crowded=crowded)
+        came_at = self._arrivals.arrive(crowded=crowded)
         if isinstance(self.processor, Processor):
             self.processor.arrivals += [came_at] * (waiting - before)
         if transport.is_closing():
             why = "too many requests at once" if self.messages.full() else "no header of a message"
-            server.count("opcua_broken_connections")
+            server.application.on_broken()
             tell("connections closed", self._source, why)
         # What is left is part of one chunk. asyncua would wait for the 4 GiB that a header may ask for.
         elif len(self._buffer) > self.limits.max_recv_buffer:
-            server.count("opcua_broken_connections")
+            server.application.on_broken()
             tell("connections closed", self._source, "a chunk without end")
             self._buffer = b""
             transport.close()
@@ -133,22 +130,22 @@ def _end(transport: asyncio.Transport, code: int = StatusCodes.BadTimeout) -> No
 class Listener(BinaryServer):
     """Takes connections on a socket that is bound already."""
 
-    def __init__(self, server: Server, bound: socket.socket, limits: TransportLimits, pulse: Pulse) -> None:
+    def __init__(self, server: Server, bound: socket.socket, limits: TransportLimits) -> None:
         host, port = bound.getsockname()[:2]
         super().__init__(server, host, port, limits)
         self._socket = bound
-        self._pulse = pulse
+        self._inner = server
         self._admission = Admission(
             admission_limits(),
             tell,
-            lambda: server.count("opcua_refused_connections"),
-            lambda: server.count("opcua_broken_connections"),
+            lambda: server.application.on_refused(),
+            lambda: server.application.on_broken(),
         )
         self._timer: asyncio.TimerHandle | None = None
 
     def _make_protocol(self) -> OPCUAProtocol:
         return _Protocol(
-            self._pulse,
+            self._inner.application.arrivals(),
             self._admission,
             iserver=self.iserver,
             policies=self._policies,

@@ -8,8 +8,8 @@ from typing import Final, TypeGuard
 
 from asyncua.server.address_space import AddressSpace, NodeData
 
-from bridge.northbound.opcua.hierarchy import related, supertypes
-from bridge.northbound.opcua.library import (
+from bridge.uaserver.hierarchy import related, supertypes
+from bridge.uaserver.library import (
     AttributeIds,
     DataChangeFilter,
     ObjectIds,

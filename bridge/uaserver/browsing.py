@@ -14,9 +14,9 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.northbound.opcua.encoding import Results
-from bridge.northbound.opcua.hierarchy import subtypes
-from bridge.northbound.opcua.library import (
+from bridge.uaserver.encoding import Results
+from bridge.uaserver.hierarchy import subtypes
+from bridge.uaserver.library import (
     AttributeIds,
     ObjectIds,
     ServiceError,

@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.northbound.notices import Teller, teller
+from bridge.base.notices import Teller, teller
 
 tell: Final[Teller] = teller("OPC UA")

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import Final
 
-from bridge.northbound.opcua.library import StatusCodes, ua
-from bridge.northbound.opcua.services import request_type
+from bridge.uaserver.library import StatusCodes, ua
+from bridge.uaserver.services import request_type
 
 
 class State(Enum):

@@ -24,7 +24,7 @@ from typing import Any, Final
 from asyncua.common.utils import Buffer, NotEnoughData
 from asyncua.ua import ua_binary
 
-from bridge.northbound.opcua.library import StatusCodes, UaError, UaStatusCodeError, ua
+from bridge.uaserver.library import StatusCodes, UaError, UaStatusCodeError, ua
 
 MOST_ELEMENTS: Final = 30_000
 """Of all arrays in one message that are decoded one by one, while nobody else has a turn; a thousand take

@@ -10,12 +10,13 @@ from typing import Final, TypeVar
 
 from asyncua.server.address_space import AddressSpace, NodeData
 
-from bridge.northbound.opcua import ranges
-from bridge.northbound.opcua.eventfilter import EventFilterFault, event_filter
-from bridge.northbound.opcua.filters import change_filter
-from bridge.northbound.opcua.hierarchy import EventTypes
-from bridge.northbound.opcua.items import EventItem, Item, ValueItem, event_settings, value_settings
-from bridge.northbound.opcua.library import (
+from bridge.base.sources import source_of
+from bridge.uaserver import ranges
+from bridge.uaserver.eventfilter import EventFilterFault, event_filter
+from bridge.uaserver.filters import change_filter
+from bridge.uaserver.hierarchy import EventTypes
+from bridge.uaserver.items import EventItem, Item, ValueItem, event_settings, value_settings
+from bridge.uaserver.library import (
     GOOD,
     AttributeIds,
     ServiceError,
@@ -25,10 +26,9 @@ from bridge.northbound.opcua.library import (
     status,
     ua,
 )
-from bridge.northbound.opcua.reading import checked_times, window
-from bridge.northbound.opcua.shares import MOST_ON_ONE, Listening
-from bridge.northbound.opcua.subscription import Subscription
-from bridge.northbound.sources import source_of
+from bridge.uaserver.reading import checked_times, window
+from bridge.uaserver.shares import MOST_ON_ONE, Listening
+from bridge.uaserver.subscription import Subscription
 
 _BATCH: Final = 50
 _SUBSCRIBE_TO_EVENTS: Final = 1

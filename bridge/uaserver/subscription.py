@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from bridge.command.messages.request import Identity
-from bridge.northbound.opcua.encoding import weight
-from bridge.northbound.opcua.eventfilter import Occurrence
-from bridge.northbound.opcua.items import EventItem, Item, Monitoring, ValueItem
-from bridge.northbound.opcua.library import ServiceError, StatusCodes, get, make, status, ua
-from bridge.northbound.opcua.publishing import PublishQueue, PublishRequest
+from bridge.uaserver.application import UserIdentity
+from bridge.uaserver.encoding import weight
+from bridge.uaserver.eventfilter import Occurrence
+from bridge.uaserver.items import EventItem, Item, Monitoring, ValueItem
+from bridge.uaserver.library import ServiceError, StatusCodes, get, make, status, ua
+from bridge.uaserver.publishing import PublishQueue, PublishRequest
 
 LEAST_INTERVAL_MS: Final = 50.0
 MOST_INTERVAL_MS: Final = 3_600_000.0
@@ -63,7 +63,7 @@ class Owner(Protocol):
 
     session_id: ua.NodeId
     address: str
-    identity: Identity
+    identity: UserIdentity
     channel_certificate: bytes | None
     publishing: PublishQueue
     holder: object | None

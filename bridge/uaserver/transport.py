@@ -26,12 +26,13 @@ from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, uatcp_t
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.base import clock
-from bridge.command.messages.freshness import NEVER
-from bridge.command.messages.request import Identity
-from bridge.northbound.opcua import decoding
-from bridge.northbound.opcua.admission import Stage
-from bridge.northbound.opcua.encoding import encode
-from bridge.northbound.opcua.library import (
+from bridge.base.sources import source_of
+from bridge.uaserver import decoding
+from bridge.uaserver.admission import Stage
+from bridge.uaserver.application import Login, UserIdentity
+from bridge.uaserver.arrivals import NEVER, received_at
+from bridge.uaserver.encoding import encode
+from bridge.uaserver.library import (
     InvalidSignature,
     ServiceError,
     StatusCodes,
@@ -43,18 +44,16 @@ from bridge.northbound.opcua.library import (
     status,
     ua,
 )
-from bridge.northbound.opcua.notices import tell
-from bridge.northbound.opcua.routes import ROUTES, Request, Route
-from bridge.northbound.opcua.security import Channel
-from bridge.northbound.opcua.services import REFUSED, request_type
-from bridge.northbound.opcua.session import Server, Session
-from bridge.northbound.opcua.shares import make_room_for_session
-from bridge.northbound.opcua.states import REFUSALS, Need, State, need_of
-from bridge.northbound.opcua.writes import received_at
-from bridge.northbound.sources import source_of
+from bridge.uaserver.notices import tell
+from bridge.uaserver.routes import ROUTES, Request, Route
+from bridge.uaserver.security import Channel
+from bridge.uaserver.services import REFUSED, request_type
+from bridge.uaserver.session import Server, Session
+from bridge.uaserver.shares import make_room_for_session
+from bridge.uaserver.states import REFUSALS, Need, State, need_of
 
 _SLOW: Final = (request_type("Write"), request_type("Call"))
-"""Services that wait for the bus process."""
+"""Services that may take seconds."""
 
 _TIME_AND_HANDLE: Final = struct.Struct("<qI")
 _ERROR: Final[Any] = ua.MessageType.Error
@@ -149,26 +148,27 @@ class Processor(UaProcessor):
         except (ServiceError, UaStatusCodeError) as error:
             code = int(error.code)
             is_too_large = code == StatusCodes.BadRequestTooLarge
-            self._count("opcua_broken_connections" if is_too_large else "opcua_refused_connections")
+            self._count(is_broken=is_too_large)
         except _MALFORMED as error:
-            self._count("opcua_broken_connections")
+            self._count(is_broken=True)
             tell(_MALFORMED_KIND, self._source, f"connection closed: {error!r}")
             code = StatusCodes.BadSecurityChecksFailed
             if self._connection.is_open():
                 is_malformed = decoding.is_malformed(error)
                 code = StatusCodes.BadDecodingError if is_malformed else StatusCodes.BadTcpInternalError
         except Exception as error:  # noqa: BLE001 - nor may one message end the others' connections
-            self._count("opcua_broken_connections")
+            self._count(is_broken=True)
             self._server.guard.note(error)
             code = StatusCodes.BadTcpInternalError
         message = make(ua.ErrorMessage, Error=status(code))
         self._transport.write(uatcp_to_binary(_ERROR, message))
         return False
 
-    def _count(self, leaf: str) -> None:
+    def _count(self, *, is_broken: bool) -> None:
         """A connection that ends, once: what came before it was closed is still looked at."""
         if not self._transport.is_closing():
-            self._server.count(leaf)
+            application = self._server.application
+            (application.on_broken if is_broken else application.on_refused)()
 
     def _greeted(self) -> None:
         if min(self._limits.max_send_buffer, self._limits.max_message_size) < _LEAST_BUFFER:
@@ -176,7 +176,7 @@ class Processor(UaProcessor):
         self._was_greeted = True
 
     async def process_message(self, seqhdr: Any, body: Buffer) -> bool:
-        """Requests that wait for a drive are answered when it has; the others go on meanwhile."""
+        """Requests that may take seconds are answered when they are done; the others go on meanwhile."""
         typeid = nodeid_from_binary(body)
         header = body.copy()
         try:
@@ -229,7 +229,7 @@ class Processor(UaProcessor):
     ) -> None:
         """Raises ServiceError for an answer that is larger than the client takes it."""
         if self._transport.get_write_buffer_size() > _MOST_UNDER_WAY:
-            self._server.count("opcua_broken_connections")
+            self._server.application.on_broken()
             tell("answers not read", self._source, "connection closed")
             self._transport.abort()
             return
@@ -260,7 +260,7 @@ class Processor(UaProcessor):
             try:
                 session.admitted = await self._login(session, get(params, "UserIdentityToken"))
             except ServiceError:
-                self._server.count("opcua_refused_connections")
+                self._server.application.on_refused()
                 raise
             self._begin()
         if typeid in ROUTES:
@@ -277,7 +277,7 @@ class Processor(UaProcessor):
         try:
             await make_room_for_session(self._source, self._server.sessions)
         except ServiceError:
-            self._server.count("opcua_refused_connections")
+            self._server.application.on_refused()
             tell("refused sessions", self._source, "all that it may have, or all there are, are in use")
             raise
 
@@ -368,20 +368,20 @@ class Processor(UaProcessor):
             # Part 4 §5.6.3: for the first time on the channel that it was created on.
             raise ServiceError(StatusCodes.BadSecureChannelIdInvalid)
         if session.channel_certificate != self._channel_certificate():
-            self._server.count("opcua_refused_connections")
+            self._server.application.on_refused()
             tell("refused sessions", self._source, "made with another certificate")
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
         return session
 
-    async def _login(self, session: Session, token: Any) -> Identity:
+    async def _login(self, session: Session, token: Any) -> UserIdentity:
         """Raises ServiceError, also for another user than that of a session which comes from another channel
         (Part 4 §5.6.3): whoever has its token and its certificate is not yet its user."""
-        users, key = self._server.services.users, self._server.private_key
-        how = token, session.nonce or b"", key, session.address
-        who = await users.identify(*how, encrypted=self._is_secured())
+        key, nonce = self._server.private_key, session.nonce or b""
+        login = Login(token, nonce, key, session.address, session.label, encrypted=self._is_secured())
+        who: UserIdentity = await self._server.application.identify(login)
         if session.holder is not self and session.is_activated() and not who.is_same(session.identity):
             tell(
-                "refused sessions", self._source, f"that of {session.identity.user}, activated by {who.user}"
+                "refused sessions", self._source, f"that of {session.identity.name}, activated by {who.name}"
             )
             raise ServiceError(StatusCodes.BadIdentityChangeNotSupported)
         return who

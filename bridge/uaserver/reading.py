@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
-from bridge.northbound.opcua import ranges
-from bridge.northbound.opcua.library import (
+from bridge.uaserver import ranges
+from bridge.uaserver.library import (
     AttributeIds,
     ServiceError,
     StatusCodes,

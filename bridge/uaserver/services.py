@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.northbound.opcua.library import ObjectIds, StatusCodes, get, node_id, ua
+from bridge.uaserver.library import ObjectIds, StatusCodes, get, node_id, ua
 
 
 @dataclass(frozen=True, slots=True)

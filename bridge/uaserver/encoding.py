@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from asyncua.ua.ua_binary import struct_to_binary
 
-from bridge.northbound.opcua.library import ServiceError, StatusCodes, ua
+from bridge.uaserver.library import ServiceError, StatusCodes, ua
 
 _TURN_BYTES: Final = 16 * 1024
 """That are encoded before others have their turn; a few milliseconds."""

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from asyncua.server.address_space import AttributeValue, NodeData
 
-from bridge.image import Image
-from bridge.northbound.opcua.library import AttributeIds, ua
-from bridge.northbound.opcua.nodes import VariableNode
-from bridge.northbound.opcua.structures import value_type
-from bridge.northbound.opcua.values import EpochNs, present_value
+from bridge.uaserver.library import AttributeIds, ua
 
 Callbacks = dict[int, Callable[..., Any]]
 """Whom to tell of a change, by handle."""
-
-_WHOLE_POINT: Final = -1
 
 
 def is_empty(held: AttributeValue) -> bool:
@@ -26,45 +19,6 @@ def is_empty(held: AttributeValue) -> bool:
     if held.value_callback is not None or (value and value.StatusCode and value.StatusCode.is_bad()):
         return False
     return value is None or value.Value is None or value.Value.Value is None
-
-
-@dataclass(frozen=True, slots=True)
-class Watched:
-    """A variable that is watched, or was once, and how to read it."""
-
-    callbacks: Callbacks
-    read: Callable[[], ua.DataValue]
-
-
-AllWatched = dict[int, dict[int, Watched]]
-"""By the index of the point, and then by the bit, -1 for the whole point."""
-
-
-class PointValue(AttributeValue):
-    """The attribute Value of a variable, read from ``image`` whenever somebody asks. It is made anew for
-    everybody who looks, and ``watched`` keeps who watches it."""
-
-    value = None
-    value_setter = None
-
-    def __init__(self, image: Image, epoch_ns: EpochNs, node: VariableNode, watched: AllWatched) -> None:
-        self._image = image
-        self._epoch_ns = epoch_ns
-        self._node = node
-        self._watched = watched
-
-    def read(self, *_: object) -> ua.DataValue:
-        node = self._node
-        return present_value(self._image, node.index, value_type(node), self._epoch_ns, node.bit)
-
-    value_callback = read  # pyright: ignore[reportAssignmentType]
-
-    @property
-    def datachange_callbacks(self) -> Callbacks:  # pyright: ignore[reportIncompatibleVariableOverride]
-        node = self._node
-        place = _WHOLE_POINT if node.bit is None else node.bit
-        of_point = self._watched.setdefault(node.index, {})
-        return of_point.setdefault(place, Watched({}, self.read)).callbacks
 
 
 class Attributes(Mapping[AttributeIds, AttributeValue]):

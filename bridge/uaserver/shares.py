@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
-from bridge.northbound.opcua.library import ServiceError, StatusCodes
-from bridge.northbound.opcua.subscription import Owner, Subscription
-from bridge.northbound.sources import source_of
+from bridge.base.sources import source_of
+from bridge.uaserver.library import ServiceError, StatusCodes
+from bridge.uaserver.subscription import Owner, Subscription
 
 MOST_SESSIONS: Final = 100
 """Also of clients that have lost their connection, for the session's time-out."""

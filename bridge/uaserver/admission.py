@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.northbound.admission import Deadline, Limits, Stage
-from bridge.northbound.opcua.shares import MOST_SESSIONS, MOST_SESSIONS_OF_ADDRESS
+from bridge.base.admission import Deadline, Limits, Stage
+from bridge.uaserver.shares import MOST_SESSIONS, MOST_SESSIONS_OF_ADDRESS
 
 _SPARE: Final = 1
 """Connections beside those with a session, for a client to come back to its session on (Part 4 §5.5.2)."""

@@ -9,8 +9,6 @@ from __future__ import annotations
 import asyncio
 import math
 import secrets
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
 from asyncua.crypto.permission_rules import User, UserRole
@@ -20,11 +18,11 @@ from asyncua.server.internal_session import InternalSession, SessionState
 from asyncua.server.subscription_service import SubscriptionService
 
 from bridge.base.guard import Guard
-from bridge.command.messages.request import Action, Identity, Role, Source
-from bridge.northbound.opcua.admission import MOST_CONNECTIONS
-from bridge.northbound.opcua.browsing import Browser
-from bridge.northbound.opcua.encoding import Results
-from bridge.northbound.opcua.library import (
+from bridge.uaserver.admission import MOST_CONNECTIONS
+from bridge.uaserver.application import NOBODY, Application, UserIdentity
+from bridge.uaserver.browsing import Browser
+from bridge.uaserver.encoding import Results
+from bridge.uaserver.library import (
     AttributeIds,
     ServiceError,
     StatusCodes,
@@ -36,41 +34,23 @@ from bridge.northbound.opcua.library import (
     ua,
     variant,
 )
-from bridge.northbound.opcua.methods import Caller
-from bridge.northbound.opcua.monitoring import loop_time
-from bridge.northbound.opcua.nodes import pascal_case
-from bridge.northbound.opcua.publishing import PublishQueue
-from bridge.northbound.opcua.reading import checked_times, window
-from bridge.northbound.opcua.security import Users
-from bridge.northbound.opcua.shares import make_room
-from bridge.northbound.opcua.structures import READ
-from bridge.northbound.opcua.subscriptions import Subscriptions
-from bridge.northbound.opcua.writes import Writer
-from bridge.northbound.view import View
+from bridge.uaserver.monitoring import loop_time
+from bridge.uaserver.publishing import PublishQueue
+from bridge.uaserver.reading import checked_times, window
+from bridge.uaserver.shares import make_room
+from bridge.uaserver.subscriptions import Subscriptions
 
 _LONGEST_SESSION_MS: Final = 120_000.0
-
-_FOR_ENGINEERS: Final = tuple(
-    f"/{pascal_case(action)}" for action in (Action.WRITE_PARAMETER, Action.SAVE_PARAMETERS)
-)
 
 _TOKEN_BYTES: Final = 32
 _NAME_BYTES: Final = 4
 """Of the name by which a session is told from others of its user, also from those before a restart."""
-_OBSERVER_ACCESS: Final = data_value(variant(READ, ua.VariantType.Byte))
+_READ: Final = 1
+"""Bit of an access level."""
+_OBSERVER_ACCESS: Final = data_value(variant(_READ, ua.VariantType.Byte))
 _OBSERVER_EXECUTABLE: Final = data_value(variant(False, ua.VariantType.Boolean))
 _NOTHING: Final = variant(None, ua.VariantType.Null)
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
-
-
-@dataclass(frozen=True, slots=True)
-class Services:
-    """What sessions need of the bridge."""
-
-    users: Users
-    writer: Writer
-    caller: Caller
-    view: View
 
 
 class Session(InternalSession):
@@ -86,8 +66,8 @@ class Session(InternalSession):
         self.external = True
         server.register_external_session(self)
         self.address = str(name[0]) if isinstance(name, tuple) else str(name)
-        self._name = f"session {secrets.token_hex(_NAME_BYTES)}"
-        self.identity = Identity(Source.OPCUA, "", Role.OBSERVER, self.address, connection=self._name)
+        self.label = f"session {secrets.token_hex(_NAME_BYTES)}"
+        self.identity: UserIdentity = NOBODY
         self.channel_certificate: bytes | None = None
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
@@ -99,7 +79,7 @@ class Session(InternalSession):
         """Of an answer, as its client takes it on that connection."""
         self.left_at = 0.0
         """When it lost its last connection; monotonic."""
-        self.admitted: Identity | None = None
+        self.admitted: UserIdentity | None = None
         """Who ``activate_session`` is for; set by the processor once the login has been checked."""
 
     @property
@@ -127,15 +107,15 @@ class Session(InternalSession):
         result = super().activate_session(params, peer_certificate)
         if not admitted.is_same(self.identity):
             self._tell(is_there=False)  # for the user before
-        self.identity = replace(admitted, connection=self._name)
+        self.identity = admitted
         self._tell(is_there=True)
         # Never Admin: that role may change the address space and write anything.
-        self.user = User(UserRole.User, admitted.user)
+        self.user = User(UserRole.User, admitted.name)
         return result
 
     @property
-    def services(self) -> Services:
-        return self._server.services
+    def application(self) -> Application[Any]:
+        return self._server.application
 
     def leave(self, now: float) -> None:
         """Its connection has ended. It may be activated on another one, and goes on then."""
@@ -143,12 +123,12 @@ class Session(InternalSession):
         self._tell(is_there=False)
 
     def _tell(self, *, is_there: bool) -> None:
-        """Tell the bridge that the session can be used, or that it cannot."""
-        if not self.identity.user:
+        """Say that the session can be used, or that it cannot."""
+        if self.identity is NOBODY:
             return  # it never was
         others = (one for one in self._server.sessions if one is not self and one.holder is not None)
         has_others = any(self.identity.is_same(one.identity) for one in others)
-        self.services.view.on_connection(self.identity, is_there=is_there, has_others=has_others)
+        self.application.on_connection(self.identity, is_there=is_there, has_others=has_others)
 
     # services
 
@@ -178,22 +158,18 @@ class Session(InternalSession):
             node = self.aspace.get(get(wanted, "NodeId"))
             access = node.attributes.get(AttributeIds.AccessLevel) if node else None
             held = access.value.Value if access and access.value else None
-            return value if held is None or held.Value & READ else _NOT_READABLE
-        if value.Value is None or not value.Value.Value or self._may(get(wanted, "NodeId")):
+            return value if held is None or held.Value & _READ else _NOT_READABLE
+        if (
+            value.Value is None
+            or not value.Value.Value
+            or self.application.may(self.identity, get(wanted, "NodeId"))
+        ):
             return value
         if attribute == AttributeIds.UserAccessLevel:
             return _OBSERVER_ACCESS
         if attribute == AttributeIds.UserExecutable:
             return _OBSERVER_EXECUTABLE
         return value
-
-    def _may(self, where: ua.NodeId) -> bool:
-        """Whether this user may write or call ``where``, in so far as roles decide."""
-        name = str(where.Identifier)
-        if name.endswith(f"/{pascal_case(Action.READ_PARAMETER)}"):
-            return True
-        for_engineers = "/parameter/" in name or name.endswith(_FOR_ENGINEERS)
-        return self.identity.role >= (Role.ENGINEER if for_engineers else Role.OPERATOR)
 
     async def subscribe(self, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
         self.subscriptions.drop_left_behind()
@@ -223,17 +199,15 @@ class Session(InternalSession):
 class Server(InternalServer):
     """asyncua's inner server with our sessions, subscriptions and limits.
 
-    ``services`` is set once the address space is built, before the first client is let in.
+    ``application`` is set once the address space is built, before the first client is let in.
     """
 
-    services: Services
+    application: Application[Any]
 
     def __init__(self, *, no_security: bool) -> None:
         super().__init__()
         self.guard = Guard("OPC UA")
         self.no_security = no_security
-        self.count: Callable[[str], None] = lambda leaf: None
-        """Counts up a point of the bridge's own."""
         # asyncua's own lets `admin` in with any password, as Admin. Logins are checked in the processor.
         self.user_manager = None  # pyright: ignore[reportAttributeAccessIssue]
         self.allow_remote_admin = False

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
-from bridge.northbound.opcua.hierarchy import EventTypes
-from bridge.northbound.opcua.library import AttributeIds, StatusCodes, get, make, status, ua
+from bridge.uaserver.hierarchy import EventTypes
+from bridge.uaserver.library import AttributeIds, StatusCodes, get, make, status, ua
 
 Operator = ua.FilterOperator
 _MOST_ELEMENTS: Final = 100

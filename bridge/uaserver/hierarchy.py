@@ -7,7 +7,7 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.northbound.opcua.library import AttributeIds, ObjectIds, StatusCodes, get, node_id, ua
+from bridge.uaserver.library import AttributeIds, ObjectIds, StatusCodes, get, node_id, ua
 
 _BASE_EVENT: Final = node_id(ObjectIds.BaseEventType)
 _NULL: Final = node_id(ObjectIds.Null)

@@ -14,9 +14,9 @@ from datetime import UTC, datetime
 from typing import Final
 
 from bridge.base.beat import LOOK_EVERY_S
-from bridge.northbound.opcua.eventfilter import EventFilter, Occurrence
-from bridge.northbound.opcua.filters import ChangeFilter
-from bridge.northbound.opcua.library import (
+from bridge.uaserver.eventfilter import EventFilter, Occurrence
+from bridge.uaserver.filters import ChangeFilter
+from bridge.uaserver.library import (
     ObjectIds,
     data_value,
     get,
@@ -27,7 +27,7 @@ from bridge.northbound.opcua.library import (
     ua,
     variant,
 )
-from bridge.northbound.opcua.reading import Window
+from bridge.uaserver.reading import Window
 
 LEAST_SAMPLING_MS: Final = LOOK_EVERY_S * 1000
 _HALF_LOOK_S: Final = LOOK_EVERY_S / 2

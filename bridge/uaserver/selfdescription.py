@@ -8,17 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Final
 
 from asyncua.server.address_space import AddressSpace, AttributeValue
 
-import bridge
-from bridge.northbound.opcua.address_space import is_empty
-from bridge.northbound.opcua.browsing import MOST_CONTINUATION_POINTS
-from bridge.northbound.opcua.eventfilter import MOST_FIELDS
-from bridge.northbound.opcua.items import LEAST_SAMPLING_MS, VALUE_QUEUE
-from bridge.northbound.opcua.library import (
+from bridge.uaserver.address_space import is_empty
+from bridge.uaserver.browsing import MOST_CONTINUATION_POINTS
+from bridge.uaserver.eventfilter import MOST_FIELDS
+from bridge.uaserver.items import LEAST_SAMPLING_MS, VALUE_QUEUE
+from bridge.uaserver.library import (
     AttributeIds,
     ObjectIds,
     StatusCodes,
@@ -29,15 +27,15 @@ from bridge.northbound.opcua.library import (
     ua,
     variant,
 )
-from bridge.northbound.opcua.routes import MOST_CALLS
-from bridge.northbound.opcua.shares import (
+from bridge.uaserver.routes import MOST_CALLS
+from bridge.uaserver.shares import (
     MOST_ITEMS,
     MOST_ITEMS_OF_ADDRESS,
     MOST_OF_SESSION,
     MOST_SESSIONS,
     MOST_SUBSCRIPTIONS,
 )
-from bridge.northbound.opcua.where import MOST_OPERANDS
+from bridge.uaserver.where import MOST_OPERANDS
 
 _Type = ua.VariantType
 _STATUS: Final = "Server_ServerStatus_"
@@ -77,12 +75,6 @@ NOT_DONE: Final = (
 """Limits that asyncua gives to services which are refused."""
 
 _NOTHING: Final = variant(None, _Type.Null)
-
-
-def built_at() -> datetime:
-    """When the newest of the program's files was written."""
-    files = Path(bridge.__file__).parent.rglob("*.py")
-    return datetime.fromtimestamp(max(file.stat().st_mtime for file in files), UTC)
 
 
 def describe(space: AddressSpace) -> None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import Any, Final, cast
 
-from bridge.northbound.opcua.library import ua, variant
+from bridge.uaserver.library import ua, variant
 
 Ranges = tuple[slice, ...]
 """One slice for each dimension; the last may be that of the texts in an array. Empty: all of it."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from bridge.northbound.opcua.library import StatusCodes, ua
+from bridge.uaserver.library import StatusCodes, ua
 
 MOST_BYTES: Final = 1024 * 1024
 """Of the notifications in one message, about; what is left follows with the next request."""

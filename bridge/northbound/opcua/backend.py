@@ -1,0 +1,100 @@
+"""The bridge behind the OPC UA server: its users, and what they write and call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from bridge.base import clock
+from bridge.command.messages.freshness import Inflow
+from bridge.command.messages.request import Action, Identity, Role
+from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.nodes import pascal_case
+from bridge.northbound.opcua.users import Users
+from bridge.northbound.opcua.writes import Writer
+from bridge.northbound.passwords import ANONYMOUS
+from bridge.northbound.pulse import Pulse
+from bridge.northbound.view import View
+from bridge.uaserver.application import Application, Login
+from bridge.uaserver.library import ua
+
+_FOR_ENGINEERS: Final = tuple(
+    f"/{pascal_case(action)}" for action in (Action.WRITE_PARAMETER, Action.SAVE_PARAMETERS)
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SessionUser:
+    """User of a session; ``identity`` names the session as its connection."""
+
+    identity: Identity
+
+    @property
+    def name(self) -> str:
+        return self.identity.user
+
+    @property
+    def is_anonymous(self) -> bool:
+        return self.identity.user == ANONYMOUS
+
+    @property
+    def has_rights(self) -> bool:
+        return self.identity.role >= Role.OPERATOR
+
+    def is_same(self, other: object) -> bool:
+        return isinstance(other, SessionUser) and self.identity.is_same(other.identity)
+
+
+class ConnectionArrivals:
+    """Times of what comes through one connection."""
+
+    def __init__(self, pulse: Pulse) -> None:
+        self._pulse = pulse
+        self._inflow = Inflow(clock.now(), pulse.look)
+
+    def arrive(self, *, crowded: bool) -> float:
+        return self._inflow.arrive(clock.now(), self._pulse.look, crowded=crowded)
+
+
+class Backend(Application[SessionUser]):
+    """``pulse`` is that of the event loop."""
+
+    def __init__(self, users: Users, writer: Writer, caller: Caller, view: View, pulse: Pulse) -> None:
+        self._users = users
+        self._writer = writer
+        self._caller = caller
+        self._view = view
+        self._pulse = pulse
+
+    async def identify(self, login: Login) -> SessionUser:
+        how = login.token, login.nonce, login.key, login.address
+        identity = await self._users.identify(*how, encrypted=login.encrypted)
+        return SessionUser(replace(identity, connection=login.session))
+
+    def may(self, user: SessionUser, where: ua.NodeId) -> bool:
+        name = str(where.Identifier)
+        if name.endswith(f"/{pascal_case(Action.READ_PARAMETER)}"):
+            return True
+        for_engineers = "/parameter/" in name or name.endswith(_FOR_ENGINEERS)
+        return user.identity.role >= (Role.ENGINEER if for_engineers else Role.OPERATOR)
+
+    async def write(self, user: SessionUser, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
+        return await self._writer.write(user.identity, writes)
+
+    async def call(
+        self, user: SessionUser, calls: Sequence[ua.CallMethodRequest]
+    ) -> list[ua.CallMethodResult]:
+        return await self._caller.call(user.identity, calls)
+
+    def on_connection(self, user: SessionUser, *, is_there: bool, has_others: bool) -> None:
+        self._view.on_connection(user.identity, is_there=is_there, has_others=has_others)
+
+    def on_refused(self) -> None:
+        self._view.count("opcua_refused_connections")
+
+    def on_broken(self) -> None:
+        self._view.count("opcua_broken_connections")
+
+    def arrivals(self) -> ConnectionArrivals:
+        return ConnectionArrivals(self._pulse)

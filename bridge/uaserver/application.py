@@ -1,0 +1,95 @@
+"""The server's side of whom it serves: who may log in and do what, and who carries out writes and calls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
+
+from bridge.uaserver.arrivals import Arrivals
+from bridge.uaserver.library import ua
+
+
+class UserIdentity(Protocol):
+    """User of a session, as its identity token has told."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def is_anonymous(self) -> bool:
+        """Anybody can come as this one."""
+        ...
+
+    @property
+    def has_rights(self) -> bool:
+        """May do more than read."""
+        ...
+
+    def is_same(self, other: Any) -> bool:
+        """The same user, in whatever session."""
+        ...
+
+
+class Nobody:
+    """User of a session that was never activated."""
+
+    name = ""
+    is_anonymous = True
+    has_rights = False
+
+    def is_same(self, other: object) -> bool:
+        return self is other
+
+
+NOBODY = Nobody()
+
+
+@dataclass(frozen=True, slots=True)
+class Login:
+    """Identity token of a session. ``nonce`` is the server's last one to this session, ``key`` the server's;
+    ``encrypted`` says whether the channel is. ``session`` is the session's name."""
+
+    token: object
+    nonce: bytes
+    key: RSAPrivateKey
+    address: str
+    session: str
+    encrypted: bool
+
+
+U = TypeVar("U", bound=UserIdentity)
+
+
+class Application(Protocol[U]):
+    """Whom a server serves. Its users are those that ``identify`` gives."""
+
+    async def identify(self, login: Login) -> U:
+        """Raises ServiceError for who is not let in."""
+        ...
+
+    def may(self, user: U, where: ua.NodeId) -> bool:
+        """Whether this user may write or call ``where``, in so far as roles decide."""
+        ...
+
+    async def write(self, user: U, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]: ...
+
+    async def call(self, user: U, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]: ...
+
+    def on_connection(self, user: U, *, is_there: bool, has_others: bool) -> None:
+        """A session of ``user`` can be used, or cannot. ``has_others``: there are others of the same user."""
+        ...
+
+    def on_refused(self) -> None:
+        """A connection, a session or a login was refused."""
+        ...
+
+    def on_broken(self) -> None:
+        """A connection was ended."""
+        ...
+
+    def arrivals(self) -> Arrivals:
+        """Those of a new connection."""
+        ...

@@ -1,0 +1,37 @@
+"""asyncua's outer server, on a socket that is bound already and with checked channels."""
+
+from __future__ import annotations
+
+import socket
+from typing import Final
+
+from asyncua.common.connection import TransportLimits
+from asyncua.server.server import Server as LibraryServer
+
+from bridge.uaserver.listener import Listener
+from bridge.uaserver.security import CheckedPolicy, Trust
+from bridge.uaserver.selfdescription import describe
+from bridge.uaserver.session import Server
+
+_CHUNK: Final = 65535
+_MOST_CHUNKS: Final = 256
+
+
+class BoundServer(LibraryServer):
+    """asyncua's server on a socket that is bound already, with checked channels."""
+
+    def __init__(self, inner: Server, bound: socket.socket, trusted: Trust | None) -> None:
+        super().__init__(iserver=inner)
+        self._inner = inner
+        self._bound = bound
+        self._trusted = trusted
+        self.limits = TransportLimits(_CHUNK, _CHUNK, _MOST_CHUNKS, _CHUNK * _MOST_CHUNKS)
+
+    async def start(self) -> None:
+        await self._setup_server_nodes()
+        policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
+        await self._inner.start()
+        describe(self._inner.aspace)
+        self.bserver = Listener(self._inner, self._bound, self.limits)
+        self.bserver.set_policies(policies)
+        await self.bserver.start()

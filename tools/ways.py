@@ -33,8 +33,8 @@ from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.zenoh import ZenohServer
 from bridge.project import load_project
 from bridge.service.bus_process import Service
-from bridge.sim.core.shell import Simulation
 from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.sim.shell import Simulation
 from bridge.zenohlink import zenoh_config
 from tools.marks import replaced
 from tools.trace import Rest, Threads, Trace

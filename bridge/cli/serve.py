@@ -25,7 +25,7 @@ from bridge.service.front_process import FRONTS, Front, become_front, give_reaso
 if TYPE_CHECKING:
     from bridge.can import Bus
     from bridge.project import Project
-    from bridge.sim.core.shell import Simulation
+    from bridge.sim.shell import Simulation
 
 
 class Role(StrEnum):

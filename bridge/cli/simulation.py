@@ -20,7 +20,7 @@ from bridge.mapping.site import described_file
 from bridge.sim.catalogue import SIMULATED, simulate_description, simulate_family, simulate_node, values_of
 from bridge.sim.core.device import SimulatedDevice
 from bridge.sim.core.habit import Rule, load_habit
-from bridge.sim.core.shell import Simulation
+from bridge.sim.shell import Simulation
 
 Habits = Mapping[str, Sequence[Rule]]
 """By the name of the node that has them."""

@@ -19,8 +19,8 @@ from bridge.cli.simulation import simulated_nodes
 from bridge.config import BusTable
 from bridge.project import load_project
 from bridge.service.bus_process import Service
-from bridge.sim.core.shell import Simulation
 from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.sim.shell import Simulation
 
 
 class Plant(asyncio.DatagramProtocol):

@@ -21,10 +21,10 @@ from bridge.service.bus_process import Service
 from bridge.sim.catalogue import simulate_node
 from bridge.sim.cia402.cia402_drive import Cia402Drive
 from bridge.sim.core.device import SimulatedDevice
-from bridge.sim.core.shell import Simulation
 from bridge.sim.lenze.lenze_motec import LenzeMotec
 from bridge.sim.nord.nord_single import NordSingle
 from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.sim.shell import Simulation
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from tests.support import sites
 from tests.support.process import free_port, until

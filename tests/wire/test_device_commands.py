@@ -20,8 +20,8 @@ from bridge.cli.app import make_app
 from bridge.sim.catalogue import simulate_description
 from bridge.sim.core.device import SimulatedDevice
 from bridge.sim.core.nmt_slave import NmtState
-from bridge.sim.core.shell import Simulation
 from bridge.sim.generic.generic_node import GenericNode
+from bridge.sim.shell import Simulation
 from tests.support.devices import DEVICES, description_of
 
 RUN = CliRunner()

@@ -16,8 +16,8 @@ from bridge.canopen.frame import Frame
 from bridge.command import Event, Identity, Kind, Request, Source, Write
 from bridge.project import load_project
 from bridge.service.bus_process import Service
-from bridge.sim.core.shell import Simulation
 from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.sim.shell import Simulation
 from tests.support import sites
 from tests.support.process import free_port
 from tests.support.zenoh_peer import until

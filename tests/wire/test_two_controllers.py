@@ -20,8 +20,8 @@ from bridge.canopen.frame import Frame
 from bridge.command import Kind, Source
 from bridge.project import load_project
 from bridge.service.bus_process import Service
-from bridge.sim.core.shell import Simulation
 from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.sim.shell import Simulation
 from tests.support import sites
 from tests.support.opcua_client import call, word, write_all, write_value
 from tests.support.opcua_site import namespace

@@ -18,7 +18,7 @@ from bridge.config import load_site
 from bridge.sim.core.canopen_slave import CanopenSlave
 from bridge.sim.core.dictionary import Dictionary, Number
 from bridge.sim.core.pdo import ActiveTpdo
-from bridge.sim.core.shell import Simulation
+from bridge.sim.shell import Simulation
 from tests.support.virtual_loop import VirtualLoop
 
 NODES = (5, 6, 7, 8)

@@ -10,8 +10,8 @@ import pytest
 from bridge.base.errors import Unavailable
 from bridge.can.interface import BusStatus
 from bridge.canopen.frame import Frame
-from bridge.sim.core.shell import Simulation
 from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.sim.shell import Simulation
 
 
 class Wire:

@@ -10,7 +10,7 @@ from tests.support import sites
 from tests.support.process import drivebridge, free_port
 from tests.support.process import drivebridge_called as call
 from tests.support.sniffer import Sniffer, sniffing
-from tests.unit.sim.test_generic_node import LIGHT
+from tests.unit.sim.generic.test_generic_node import LIGHT
 
 NAME = "acme/light"
 TAG = "a rather long name " * 20

@@ -15,7 +15,7 @@ from bridge.sim.catalogue import simulate_family
 from bridge.sim.core.habit import Habit, load_habit, shipped_habits
 from tests.support import sites
 from tests.support.bench import Bench
-from tests.unit.sim.test_generic_node import CYCLIC, LIGHT
+from tests.unit.sim.generic.test_generic_node import CYCLIC, LIGHT
 
 NAME, BASE = "acme/light", "cia402/velocity"
 TAG = "a rather long name " * 20

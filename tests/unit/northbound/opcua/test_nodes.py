@@ -18,8 +18,6 @@ from bridge.northbound.opcua.nodes import (
     layout,
     pascal_case,
 )
-from bridge.northbound.opcua.structures import property_nodes
-from bridge.northbound.opcua.units import unit_id
 from tests.support.opcua_site import make_plant
 
 
@@ -162,36 +160,3 @@ def test_sparse_codes_stand_at_their_index() -> None:
         "bad",
         "unknown",
     )
-
-
-# Part 8 §5.6.3: the characters of the UNECE common code, the first one highest.
-@pytest.mark.parametrize(
-    ("unit", "number"),
-    [
-        ("Hz", 4740186),
-        ("A", 4279632),
-        ("V", 5655636),
-        ("%", 20529),
-        ("ms", 4403766),
-        ("s", 5457219),
-        ("furlong", -1),
-    ],
-)
-def test_units_are_those_of_unece(unit: str, number: int) -> None:
-    assert unit_id(unit) == number
-
-
-@pytest.mark.parametrize(
-    ("name", "low", "high"),
-    [
-        ("bus/can0/load", 0.0, 100.0),
-        # P105 = 50 Hz is 4000h; the words are two's complements
-        ("conveyor/fu1/command/frequency", -100.0, 50 * 0x7FFF / 0x4000),
-    ],
-)
-def test_values_with_ends_have_their_range(
-    trees: tuple[ObjectNode, ...], name: str, low: float, high: float
-) -> None:
-    (variable,) = [variable for variable in variables(trees) if variable.id == name]
-    (limits,) = [one.content.value.Value for one in property_nodes(variable) if one.browse_name == "EURange"]
-    assert (limits.Low, limits.High) == (low, high)

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
-from types import SimpleNamespace
-from typing import cast
 
 import pytest
 from asyncua import ua
 
-from bridge.command import Event
-from bridge.command import Kind as EventKind
 from bridge.command.messages.request import Code, Identity, Outcome, Source
 from bridge.image import DataType, Point, Quality, Reading
-from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.values import (
     OUTCOME_STATUS,
     QUALITY_STATUS,
@@ -24,8 +18,6 @@ from bridge.northbound.opcua.values import (
     reading_value,
     rejection,
 )
-from bridge.uaserver.eventfilter import Occurrence
-from bridge.uaserver.subscriptions import Subscriptions
 
 Codes, Kind = ua.StatusCodes, ua.VariantType
 WORD = Point(name="a/b/command/word", data_type=DataType.UINT16)
@@ -99,38 +91,6 @@ def test_other_types_are_not(point: Point, written: ua.Variant) -> None:
 def test_what_is_no_number_is_out_of_range(number: float) -> None:
     with pytest.raises(ValueError, match="take"):
         point_value(NUMBER, ua.Variant(number, Kind.Double))
-
-
-def test_events_are_bounded_to_a_burst_and_a_rate() -> None:
-    """And each kind has its own: who has writes refused all day hides no trip."""
-    heard: list[str] = []
-
-    class Listener:
-        is_listening = True
-
-        def hear(self, one: Occurrence) -> None:
-            heard.append(one.fields["Message"].Value.Text)
-
-    subscriptions = SimpleNamespace(subscriptions={1: Listener()})
-    kinds = {kind: ua.NodeId(number, 1) for number, kind in enumerate(EventKind, 1)}
-    sender = EventSender(
-        lambda at: round(at * 1e9),
-        cast("Subscriptions", subscriptions),
-        {"bridge": ua.NodeId("bridge", 1)},
-        kinds,
-    )
-
-    def told(now: float, kind: EventKind) -> list[str]:
-        heard.clear()
-        for _ in range(1000):
-            sender.on_event(Event(now, kind, "bridge", 500, kind.value))
-        asyncio.run(sender.send_waiting())
-        return heard[::2]  # at the server, and at the bridge
-
-    assert told(5.0, EventKind.REFUSED) == ["refused"] * 20
-    assert told(5.0, EventKind.WATCHDOG) == ["watchdog"] * 20
-    more = "refused (980 more like it before were left out)"
-    assert told(5.5, EventKind.REFUSED) == [more] + ["refused"] * 4
 
 
 def test_a_clients_words_are_cut_before_they_are_told():

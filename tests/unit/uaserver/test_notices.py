@@ -9,7 +9,6 @@ from collections.abc import Iterator
 import pytest
 
 from bridge.base.quietlog import QuietHandler
-from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.notices import tell
 
 
@@ -60,19 +59,3 @@ def test_a_thousand_sources_cost_a_bounded_number_of_lines(log: Log) -> None:
         tell("refused logins", f"10.0.{number >> 8}.{number & 255}", "x" * 10_000)
     assert len(log.lines) <= 501
     assert max(map(len, log.lines)) < 300
-
-
-def test_the_library_says_each_thing_once_a_minute_and_without_traceback(log: Log) -> None:
-    library = logging.getLogger("asyncua.test")
-    quieten()
-    quieten()
-    for second in range(100):
-        log.now = float(second)
-        try:
-            raise ValueError(second)
-        except ValueError:
-            library.exception("while processing %s", "a message")
-    assert log.lines == [
-        "while processing a message: ValueError(0)",
-        "while processing a message: ValueError(60) (60 more of this kind)",
-    ]

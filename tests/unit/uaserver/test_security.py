@@ -1,0 +1,67 @@
+"""Passwords that come through a channel; no server."""
+
+from __future__ import annotations
+
+import pytest
+from asyncua import ua
+from asyncua.common.utils import ServiceError
+from asyncua.crypto.security_policies import SecurityPolicyAes256Sha256RsaPss, encrypt_asymmetric
+
+from bridge.northbound.opcua.certificates import OwnCertificate, new_own
+from bridge.uaserver.security import read_password
+
+URI = "urn:test:drivebridge"
+Policy = ua.SecurityPolicyType
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> OwnCertificate:
+    folder = tmp_path_factory.mktemp("own")
+    return new_own(folder / "c", folder / "k", URI, ["localhost"])
+
+
+class TestReadPassword:
+    NONCE = bytes(range(32))
+
+    def token(self, content: bytes, algorithm: str | None = None) -> ua.UserNameIdentityToken:
+        return ua.UserNameIdentityToken(UserName="anna", Password=content, EncryptionAlgorithm=algorithm)
+
+    def encrypted(self, own: OwnCertificate, nonce: bytes, password: bytes = b"swordfish") -> object:
+        whole = len(password + nonce).to_bytes(4, "little") + password + nonce
+        key, policy = own.certificate.public_key(), SecurityPolicyAes256Sha256RsaPss.URI
+        # What is longer than a block of RSA is encrypted in blocks (Part 4 §7.40.2.2).
+        blocks = [encrypt_asymmetric(key, whole[at : at + 150], policy) for at in range(0, len(whole), 150)]
+        return self.token(b"".join(block for block, _ in blocks), blocks[0][1])
+
+    def test_an_encrypted_one_is_read(self, own: OwnCertificate) -> None:
+        for password in ("swordfish", "", "ä" * 400):
+            token = self.encrypted(own, self.NONCE, password.encode())
+            assert read_password(token, self.NONCE, own.private_key, encrypted=False) == password
+
+    def test_one_that_was_heard_before_is_not(self, own: OwnCertificate) -> None:
+        token = self.encrypted(own, bytes(32))
+        with pytest.raises(ServiceError):
+            read_password(token, self.NONCE, own.private_key, encrypted=False)
+
+    @pytest.mark.parametrize("sent", [b"", NONCE])
+    def test_nothing_is_read_for_a_session_without_a_nonce(self, own: OwnCertificate, sent: bytes) -> None:
+        """What ends with nothing would fit any message that was ever heard."""
+        with pytest.raises(ServiceError):
+            read_password(self.encrypted(own, sent), b"", own.private_key, encrypted=False)
+
+    def test_clear_text_is_read_on_an_encrypted_channel_only(self, own: OwnCertificate) -> None:
+        token = self.token(b"swordfish")
+        assert read_password(token, self.NONCE, own.private_key, encrypted=True) == "swordfish"
+        with pytest.raises(ServiceError):
+            read_password(token, self.NONCE, own.private_key, encrypted=False)
+
+    @pytest.mark.parametrize("algorithm", ["http://www.w3.org/2001/04/xmlenc#rsa-1_5", "rot13"])
+    def test_weak_algorithms_are_refused(self, own: OwnCertificate, algorithm: str) -> None:
+        with pytest.raises(ServiceError):
+            read_password(self.token(bytes(256), algorithm), self.NONCE, own.private_key, encrypted=True)
+
+    @pytest.mark.parametrize("size", [0, 1, 256, 257, 100_000])
+    def test_noise_is_refused(self, own: OwnCertificate, size: int) -> None:
+        token = self.token(b"\x07" * size, "http://www.w3.org/2001/04/xmlenc#rsa-oaep")
+        with pytest.raises(ServiceError):
+            read_password(token, self.NONCE, own.private_key, encrypted=True)

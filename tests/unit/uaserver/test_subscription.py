@@ -304,25 +304,6 @@ def test_a_request_that_is_too_old_or_too_many_is_refused() -> None:
     assert rig.refused == [Codes.BadTimeout] + 8 * [Codes.BadTooManyPublishRequests]
 
 
-def test_the_highest_priority_is_told_first_and_equals_take_turns() -> None:
-    rig, told = Rig(), []
-
-    class Late:
-        def __init__(self, name: str, priority: int) -> None:
-            self.name = name
-            self.priority = priority
-
-        def publish(self, request: PublishRequest) -> bool:
-            told.append(self.name)
-            return self.name == "b"
-
-    for late in (Late("a", 1), Late("b", 1), Late("c", 9)):
-        rig.session.publishing.ask(late, 0.0)
-    for _ in range(5):
-        rig.publish()
-    assert told == ["c", "a", "b", "b", "b"]
-
-
 def test_a_last_word_reaches_the_session_that_has_lost_it() -> None:
     rig = Rig()
     last = rig.subscription.last_word(Codes.GoodSubscriptionTransferred)

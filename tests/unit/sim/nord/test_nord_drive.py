@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.sim.core.ramp import step
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_parameters import PARAMETERS
 from bridge.sim.nord.nord_states import State
@@ -293,22 +292,6 @@ def test_disable_voltage_takes_the_output_away_and_the_motor_runs_down(driver):
     assert (driver.drive.output_hz, driver.drive.actual_values[:2]) == (0.0, (0, 0))
     assert driver.drive.motor_hz(driver.now + 0.5) == pytest.approx(25.0)
     assert driver.drive.motor_hz(driver.now + 1.5) == 0.0
-
-
-@given(
-    value=st.floats(-50, 50),
-    target=st.floats(-50, 50),
-    up=st.floats(0, 10),
-    down=st.floats(0, 10),
-    cuts=st.lists(st.floats(0.001, 0.5), min_size=1, max_size=20),
-)
-def test_a_ramp_does_not_depend_on_how_often_it_is_looked_at(value, target, up, down, cuts):
-    once = step(value, target, up, down, 50.0, sum(cuts))
-    often = value
-    for cut in cuts:
-        often = step(often, target, up, down, 50.0, cut)
-    assert often == pytest.approx(once, abs=1e-5)
-    assert min(value, target) - 1e-9 <= often <= max(value, target) + 1e-9
 
 
 def test_current_is_scaled_by_p112_and_is_0_without_voltage(driver):

@@ -1,0 +1,93 @@
+"""An application that an OPC UA server serves in tests: users without passwords, and variables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from asyncua import ua
+from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
+
+from bridge.uaserver.application import Application, Login
+from bridge.uaserver.library import ServiceError
+
+Ids = ua.AttributeIds
+
+
+@dataclass(frozen=True)
+class User:
+    name: str
+    has_rights: bool = True
+    is_anonymous: bool = False
+
+    def is_same(self, other: object) -> bool:
+        return self == other
+
+
+class AtOnce:
+    """Nothing has ever waited."""
+
+    def arrive(self, *, crowded: bool) -> float:
+        return 0.0
+
+
+@dataclass
+class Served(Application[User]):
+    """``users`` by their names; ``told`` is who came and went, and whether there were others."""
+
+    users: dict[str, User] = field(default_factory=dict)
+    told: list[tuple[str, bool, bool]] = field(default_factory=list)
+    written: list[tuple[str, object]] = field(default_factory=list)
+    refused: int = 0
+    broken: int = 0
+    after_write: Callable[[], None] = lambda: None
+
+    async def identify(self, login: Login) -> User:
+        name = getattr(login.token, "UserName", None) or "anonymous"
+        if name not in self.users:
+            raise ServiceError(ua.StatusCodes.BadUserAccessDenied)
+        return self.users[name]
+
+    def may(self, user: User, where: ua.NodeId) -> bool:
+        return user.has_rights
+
+    async def write(self, user: User, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
+        self.written += [(user.name, one.Value.Value.Value) for one in writes]
+        self.after_write()
+        return [ua.StatusCode() for _ in writes]
+
+    async def call(self, user: User, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
+        return [ua.CallMethodResult() for _ in calls]
+
+    def on_connection(self, user: User, *, is_there: bool, has_others: bool) -> None:
+        self.told.append((user.name, is_there, has_others))
+
+    def on_refused(self) -> None:
+        self.refused += 1
+
+    def on_broken(self) -> None:
+        self.broken += 1
+
+    def arrivals(self) -> AtOnce:
+        return AtOnce()
+
+
+def add_variable(space: AddressSpace, where: ua.NodeId, value: int, access: int = 1) -> None:
+    """A UInt16 with nothing around it."""
+
+    def held(content: object, kind: ua.VariantType) -> AttributeValue:
+        return AttributeValue(ua.DataValue(ua.Variant(content, kind)))
+
+    kinds = ua.VariantType
+    node = NodeData(where)
+    node.attributes = {
+        Ids.NodeId: held(where, kinds.NodeId),
+        Ids.NodeClass: held(ua.NodeClass.Variable, kinds.Int32),
+        Ids.BrowseName: held(ua.QualifiedName(str(where.Identifier), 1), kinds.QualifiedName),
+        Ids.Value: held(value, kinds.UInt16),
+        Ids.DataType: held(ua.NodeId(ua.ObjectIds.UInt16), kinds.NodeId),
+        Ids.ValueRank: held(-1, kinds.Int32),
+        Ids.AccessLevel: held(access, kinds.Byte),
+        Ids.UserAccessLevel: held(access, kinds.Byte),
+    }
+    space[where] = node

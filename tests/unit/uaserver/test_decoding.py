@@ -1,0 +1,81 @@
+"""The decoder, made strict."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from asyncua import ua
+from asyncua.common.utils import Buffer, NotEnoughData
+from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary, variant_from_binary, variant_to_binary
+
+from bridge.uaserver import decoding
+from bridge.uaserver.library import UaError, UaStatusCodeError
+
+
+@pytest.fixture(autouse=True)
+def strict() -> None:
+    decoding.install()
+    decoding.install()
+    decoding.begin(decoding.MOST_ELEMENTS)
+
+
+def reads(count: int) -> bytes:
+    return struct_to_binary(ua.ReadParameters(NodesToRead=[ua.ReadValueId() for _ in range(count)]))
+
+
+def test_what_is_sound_is_decoded_as_before() -> None:
+    params = struct_from_binary(ua.ReadParameters, Buffer(reads(3)))
+    assert len(params.NodesToRead) == 3
+    for value in ("Grüße", b"\xff", [1, 2], None, 7):
+        assert variant_from_binary(Buffer(variant_to_binary(ua.Variant(value)))).Value == value
+
+
+def test_a_string_that_is_no_utf_8_is_refused_and_known_as_malformed() -> None:
+    content = struct_to_binary(ua.QualifiedName("ab")).replace(b"ab", b"\xff\xfe")
+    with pytest.raises(UnicodeDecodeError) as refused:
+        struct_from_binary(ua.QualifiedName, Buffer(content))
+    assert decoding.is_malformed(refused.value)
+    assert decoding.place(refused.value).startswith("at decoding.py:")
+
+
+@pytest.mark.parametrize("length", [2**31 - 1, 1000, -2])
+def test_an_array_is_no_longer_than_its_message(length: int) -> None:
+    content = reads(1).replace(struct.pack("<i", 1), struct.pack("<i", length), 1)
+    with pytest.raises(NotEnoughData) as refused:
+        struct_from_binary(ua.ReadParameters, Buffer(content))
+    assert decoding.is_malformed(refused.value)
+
+
+def test_the_elements_of_a_message_are_counted() -> None:
+    decoding.begin(10)
+    struct_from_binary(ua.ReadParameters, Buffer(reads(6)))
+    with pytest.raises(UaStatusCodeError) as refused:
+        struct_from_binary(ua.ReadParameters, Buffer(reads(6)))
+    assert refused.value.code == ua.StatusCodes.BadEncodingLimitsExceeded
+    decoding.begin(10)
+    struct_from_binary(ua.ReadParameters, Buffer(reads(6)))
+
+
+@pytest.mark.parametrize("size", [-1, 4])
+def test_a_buffer_gives_what_it_has(size: int) -> None:
+    with pytest.raises(NotEnoughData):
+        Buffer(b"abc").read(size)
+    assert Buffer(b"abc").read(3) == b"abc"
+
+
+def test_dimensions_fit_the_values() -> None:
+    sound = ua.Variant([1, 2, 3, 4], ua.VariantType.Int32, Dimensions=[2, 2])
+    content = variant_to_binary(sound)
+    assert variant_from_binary(Buffer(content)).Value == [[1, 2], [3, 4]]
+    wrong = content[: -struct.calcsize("<ii")] + struct.pack("<ii", 2, 3)
+    with pytest.raises(UaError):
+        variant_from_binary(Buffer(wrong))
+
+
+def test_what_fails_elsewhere_is_not_malformed() -> None:
+    try:
+        raise ValueError("x")
+    except ValueError as error:
+        assert not decoding.is_malformed(error)
+    assert decoding.place(ValueError("never raised")) == ""

@@ -1,4 +1,4 @@
 """An OPC UA server on asyncua's codec, secure channel and node store. Of the bridge it knows nothing.
 
-Sessions, subscriptions and the services are here; whom they serve is an ``Application``.
+Sessions, subscriptions and the services are here; whom they serve is a ``ServedApplication``.
 """

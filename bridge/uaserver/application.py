@@ -48,7 +48,7 @@ NOBODY = Nobody()
 
 
 @dataclass(frozen=True, slots=True)
-class Login:
+class LoginAttempt:
     """Identity token of a session. ``nonce`` is the server's last one to this session, ``key`` the server's;
     ``encrypted`` says whether the channel is. ``session`` is the session's name."""
 
@@ -63,10 +63,10 @@ class Login:
 U = TypeVar("U", bound=UserIdentity)
 
 
-class Application(Protocol[U]):
+class ServedApplication(Protocol[U]):
     """Whom a server serves. Its users are those that ``identify`` gives."""
 
-    async def identify(self, login: Login) -> U:
+    async def identify(self, login: LoginAttempt) -> U:
         """Raises ServiceError for who is not let in."""
         ...
 

@@ -19,7 +19,7 @@ from asyncua.server.subscription_service import SubscriptionService
 
 from bridge.base.guard import Guard
 from bridge.uaserver.admission import MOST_CONNECTIONS
-from bridge.uaserver.application import NOBODY, Application, UserIdentity
+from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
 from bridge.uaserver.browsing import Browser
 from bridge.uaserver.encoding import Results
 from bridge.uaserver.library import (
@@ -114,7 +114,7 @@ class Session(InternalSession):
         return result
 
     @property
-    def application(self) -> Application[Any]:
+    def application(self) -> ServedApplication[Any]:
         return self._server.application
 
     def leave(self, now: float) -> None:
@@ -202,7 +202,7 @@ class Server(InternalServer):
     ``application`` is set once the address space is built, before the first client is let in.
     """
 
-    application: Application[Any]
+    application: ServedApplication[Any]
 
     def __init__(self, *, no_security: bool) -> None:
         super().__init__()

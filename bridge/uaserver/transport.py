@@ -29,7 +29,7 @@ from bridge.base import clock
 from bridge.base.sources import source_of
 from bridge.uaserver import decoding
 from bridge.uaserver.admission import Stage
-from bridge.uaserver.application import Login, UserIdentity
+from bridge.uaserver.application import LoginAttempt, UserIdentity
 from bridge.uaserver.arrivals import NEVER, received_at
 from bridge.uaserver.encoding import encode
 from bridge.uaserver.library import (
@@ -377,7 +377,7 @@ class Processor(UaProcessor):
         """Raises ServiceError, also for another user than that of a session which comes from another channel
         (Part 4 §5.6.3): whoever has its token and its certificate is not yet its user."""
         key, nonce = self._server.private_key, session.nonce or b""
-        login = Login(token, nonce, key, session.address, session.label, encrypted=self._is_secured())
+        login = LoginAttempt(token, nonce, key, session.address, session.label, encrypted=self._is_secured())
         who: UserIdentity = await self._server.application.identify(login)
         if session.holder is not self and session.is_activated() and not who.is_same(session.identity):
             tell(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
-from bridge.uaserver.application import Application, Login
+from bridge.uaserver.application import LoginAttempt, ServedApplication
 from bridge.uaserver.library import ServiceError
 
 Ids = ua.AttributeIds
@@ -32,7 +32,7 @@ class AtOnce:
 
 
 @dataclass
-class Served(Application[User]):
+class Served(ServedApplication[User]):
     """``users`` by their names; ``told`` is who came and went, and whether there were others."""
 
     users: dict[str, User] = field(default_factory=dict)
@@ -42,7 +42,7 @@ class Served(Application[User]):
     broken: int = 0
     after_write: Callable[[], None] = lambda: None
 
-    async def identify(self, login: Login) -> User:
+    async def identify(self, login: LoginAttempt) -> User:
         name = getattr(login.token, "UserName", None) or "anonymous"
         if name not in self.users:
             raise ServiceError(ua.StatusCodes.BadUserAccessDenied)

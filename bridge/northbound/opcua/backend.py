@@ -9,14 +9,14 @@ from typing import Final
 from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
 from bridge.command.messages.request import Action, Identity, Role
+from bridge.northbound.opcua.accounts import Users
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import pascal_case
-from bridge.northbound.opcua.users import Users
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.passwords import ANONYMOUS
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
-from bridge.uaserver.application import Application, Login
+from bridge.uaserver.application import LoginAttempt, ServedApplication
 from bridge.uaserver.library import ua
 
 _FOR_ENGINEERS: Final = tuple(
@@ -57,7 +57,7 @@ class ConnectionArrivals:
         return self._inflow.arrive(clock.now(), self._pulse.look, crowded=crowded)
 
 
-class Backend(Application[SessionUser]):
+class Backend(ServedApplication[SessionUser]):
     """``pulse`` is that of the event loop."""
 
     def __init__(self, users: Users, writer: Writer, caller: Caller, view: View, pulse: Pulse) -> None:
@@ -67,7 +67,7 @@ class Backend(Application[SessionUser]):
         self._view = view
         self._pulse = pulse
 
-    async def identify(self, login: Login) -> SessionUser:
+    async def identify(self, login: LoginAttempt) -> SessionUser:
         how = login.token, login.nonce, login.key, login.address
         identity = await self._users.identify(*how, encrypted=login.encrypted)
         return SessionUser(replace(identity, connection=login.session))

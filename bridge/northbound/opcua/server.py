@@ -16,6 +16,7 @@ from bridge.base.errors import OperationFailed
 from bridge.command import Kind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
+from bridge.northbound.opcua.accounts import Users, security_policies
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
@@ -24,7 +25,6 @@ from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.publisher import Publisher
 from bridge.northbound.opcua.tree import Tree
-from bridge.northbound.opcua.users import Users, security_policies
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View

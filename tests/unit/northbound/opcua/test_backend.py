@@ -11,7 +11,7 @@ from cryptography.hazmat.primitives.asymmetric.rsa import generate_private_key
 from bridge.command.messages.request import Identity, Role, Source
 from bridge.northbound.opcua.backend import Backend, SessionUser
 from bridge.northbound.pulse import Pulse
-from bridge.uaserver.application import NOBODY, Login
+from bridge.uaserver.application import NOBODY, LoginAttempt
 
 KEY = generate_private_key(65537, 2048)
 
@@ -66,7 +66,7 @@ def test_what_a_user_may_write_and_call_follows_from_the_role(where: str, least:
 
 async def test_a_login_becomes_a_user_whose_connection_is_the_session() -> None:
     told = Told()
-    login = Login("token", b"nonce", KEY, "10.0.0.1", "session 1f3a", encrypted=True)
+    login = LoginAttempt("token", b"nonce", KEY, "10.0.0.1", "session 1f3a", encrypted=True)
     found = await backend(told).identify(login)
     assert found.identity == user(connection="session 1f3a").identity
     assert told.calls == [("token", b"nonce", KEY, "10.0.0.1", True)]

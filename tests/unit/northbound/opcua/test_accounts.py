@@ -9,7 +9,7 @@ from asyncua.common.utils import ServiceError
 from bridge.base.errors import FileFaults
 from bridge.command import Role
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua.users import Users, security_policies
+from bridge.northbound.opcua.accounts import Users, security_policies
 from bridge.northbound.passwords import hash_password, verify_password
 
 Policy = ua.SecurityPolicyType

@@ -1,6 +1,6 @@
 """Which points the clients of a protocol may ever write on a site: the tables of the reference.
 
-``tests/unit/northbound/test_export_is_true.py`` compares the same with a bridge that runs."""
+``tests/unit/test_exports.py`` compares the same with a bridge that runs."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """What the points say at the moment at which a command is answered with ok: what the command has done.
 
 Each method and each writable point of a drive, a node, its outputs and a bus is in one of the tables. What a
-front shows then is what the bus process shows (``tests/unit/mirror/test_answers.py``).
+front shows then is what the bus process shows (``tests/unit/mirror/test_client.py``).
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Request, Role, Source, Start
 from bridge.sim.core.nmt_slave import NmtState
 from tests.support.bench import Bench, write_site
-from tests.unit.master.test_last_words import FAMILIES, SLACK_S, SYNC_S, TYPES, moving, speed
+from tests.unit.master.test_farewell import FAMILIES, SLACK_S, SYNC_S, TYPES, moving, speed
 
 TWIN: Final = Frame(0x77F, b"\x05")
 """A second bridge with the same site file says that it is operational."""

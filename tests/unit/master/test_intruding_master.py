@@ -15,7 +15,7 @@ from bridge.drive import DriveState, StatusWords
 from bridge.master.answers import SHARE, Answers, answer_bits
 from tests.support.bench import Bench
 from tests.support.quick import Quick, quick_site
-from tests.unit.master.test_last_words import FAMILIES, LastWords, moving, speed
+from tests.unit.master.test_farewell import FAMILIES, LastWords, moving, speed
 
 ENGINEER: Final = Identity(Source.LOCAL, "test", Role.ENGINEER)
 START, STOP, PRE_OPERATIONAL = b"\1\5", b"\2\5", b"\x80\5"

@@ -19,7 +19,7 @@ from bridge.node.boot import BootMemory
 from bridge.sim.catalogue import simulate_node
 from tests.support.bench import PLC, Bench
 from tests.support.latching_slave import LatchingSlave
-from tests.unit.node.test_failed_boot import SOME, is_running, site
+from tests.unit.node.test_booting import SOME, is_running, site
 
 FAN = "cia402/profile-velocity"
 RESET_NODE, RESET_COMMUNICATION, STOP = 0x81, 0x82, 0x02

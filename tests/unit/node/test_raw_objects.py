@@ -8,7 +8,7 @@ import pytest
 
 from bridge.command import Action, Code
 from bridge.image import Quality
-from tests.unit.node.test_parameters import OBSERVER, OPERATOR, READ, WRITE, Parameters
+from tests.unit.node.parameters.test_service import OBSERVER, OPERATOR, READ, WRITE, Parameters
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from bridge.sim.nord.nord_tu4 import NordTu4
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from tests.support import sites
 from tests.support.bench import PLC, Bench
-from tests.unit.node.test_failed_boot import Restart
+from tests.unit.node.test_booting import Restart
 
 FAMILIES: Final = (
     "cia402/velocity",

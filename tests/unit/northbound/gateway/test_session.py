@@ -1,4 +1,4 @@
-"""The ASCII gateway (CiA 309-3): lines in, requests out, lines back."""
+"""Sessions of the ASCII gateway (CiA 309-3): lines in, requests out, lines back."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Do, Identity, Outcome, ReadParameter, Reply, Request, Role, Source
-from bridge.northbound.gateway.datatypes import TYPES, BadText, decode, encode
 from bridge.northbound.gateway.session import MOST_PENDING, Net, Session
-from bridge.northbound.gateway.syntax import LONGEST_LINE, Refused, parse, split_sequence
+from bridge.northbound.gateway.syntax import LONGEST_LINE
 
 TOOL = Identity(Source.LOCAL, "gateway", Role.ENGINEER)
 NET = Net(
@@ -54,72 +53,6 @@ def client() -> Client:
     return Client()
 
 
-# data types
-
-
-@pytest.mark.parametrize(
-    ("kind", "words", "octets"),
-    [
-        ("b", "1", "01"),
-        ("i8", "-1", "FF"),
-        ("u16", "0xABCD", "CD AB"),
-        ("i24", "-2", "FE FF FF"),
-        ("u56", "0x01020304050607", "07 06 05 04 03 02 01"),
-        ("i32", "-2", "FE FF FF FF"),
-        ("u64", "18446744073709551615", "FF FF FF FF FF FF FF FF"),
-        ("r32", "1.0", "00 00 80 3F"),
-        ("r64", "1.0", "00 00 00 00 00 00 F0 3F"),
-        ("t", "3 77", "4D 00 00 00 03 00"),
-        ("td", "0 1", "01 00 00 00 00 00"),
-        ("vs", "motor", "6D 6F 74 6F 72"),
-        ("os", "AQID", "01 02 03"),
-        ("us", "QQA=", "41 00"),
-        ("d", "AQID", "01 02 03"),
-        ("hex", "01 02", "01 02"),
-    ],
-)
-def test_values_and_bytes(kind: str, words: str, octets: str) -> None:
-    data = bytes.fromhex(octets)
-    assert encode(kind, words.split()) == data
-    assert encode(kind, decode(kind, data).split()) == data
-
-
-@pytest.mark.parametrize("text", ["1_0", "\u0662", "nan", "inf", "2,5", "1e999", "0x10", "", "."])
-def test_a_real_number_has_the_digits_0_to_9(text: str) -> None:
-    with pytest.raises(BadText, match="r32 is a number that fits"):
-        encode("r32", [text])
-
-
-@given(st.sampled_from(sorted(TYPES - {"vs"})), st.binary(max_size=20))
-def test_any_bytes_are_a_value_or_a_bad_one(kind: str, data: bytes) -> None:
-    try:
-        text = decode(kind, data)
-    except BadText:
-        return
-    assert "\n" not in text
-    if kind not in ("b", "r32", "r64", "t", "td"):
-        assert data.startswith(encode(kind, text.split() or [""]))
-
-
-@given(st.text(st.characters(max_codepoint=0xFF, min_codepoint=0x20, exclude_characters="\x7f"), min_size=1))
-def test_a_visible_string_survives_the_line(text: str) -> None:
-    data = text.encode("latin-1")
-    line = parse(f"5 w 0x2000 0 vs {decode('vs', data)}")
-    assert line.command.data.decode("latin-1").isprintable()  # type: ignore[union-attr]
-
-
-# lines
-
-
-@given(st.text())
-def test_no_line_raises_anything_but_a_refusal(text: str) -> None:
-    try:
-        _, rest = split_sequence(text)
-        parse(rest)
-    except Refused:
-        pass
-
-
 @given(st.lists(st.binary(max_size=40)))
 def test_no_bytes_raise_and_every_answer_is_a_line(pieces: list[bytes]) -> None:
     client = Client()
@@ -137,9 +70,6 @@ def test_where_a_stream_is_cut_changes_nothing(stream: bytes, place: int) -> Non
     cut.session.receive(stream[place:], 0.0)
     assert whole.heard() == cut.heard()
     assert whole.requests == cut.requests
-
-
-# SDO
 
 
 @pytest.mark.parametrize("line", ["[7]", "[7] ", "[7] # only a comment", "[7] 5", "[7] 1 5 # nothing"])
@@ -206,9 +136,6 @@ def test_answers_have_the_sequence_of_their_command(client: Client) -> None:
     assert client.end(Outcome(Code.OK, value="00 00 00 00")) == "[1] 0\r\n"
 
 
-# NMT
-
-
 @pytest.mark.parametrize(
     ("words", "action"),
     [
@@ -226,9 +153,6 @@ def test_nmt_is_a_request_like_any_other(
     client.say(f"[1] {node} {words}")
     assert client.requests == [Request(TOOL, target, Do(action))]
     assert client.end(Outcome(Code.NOT_ALLOWED)) == f"[1] ERROR:102 #{target}: not_allowed\r\n"
-
-
-# what is answered at once
 
 
 @pytest.mark.parametrize(
@@ -263,9 +187,6 @@ def test_the_default_node_is_taken_where_none_is_named(client: Client) -> None:
     assert client.say("[1] set node 5") == "[1] OK\r\n"
     client.say("[2] stop")
     assert client.requests[0].target == "conveyor"
-
-
-# limits
 
 
 def test_a_line_that_is_too_long_is_one_error_and_the_next_is_heard(client: Client) -> None:

@@ -1,16 +1,14 @@
-"""What the page tells of a plant: its points by topic, its description, and what is wrong."""
+"""Troubles as the page shows them: those that the bus process has judged, and its own silence."""
 
 from __future__ import annotations
 
 from bridge.condition.told import troubles_json
 from bridge.image import Quality
-from bridge.northbound.page.describe import described
-from bridge.northbound.page.topics import topics_of
 from bridge.northbound.page.troubles import Troubles
 from tests.support import sites
-from tests.support.condition import Watched, families_of
+from tests.support.condition import Watched
 
-DRIVE, BUS = "conveyor/fu1", "bus/can0"
+BUS = "bus/can0"
 _SITE = sites.site(
     sites.bus(sites.node(sites.drive("fu1", "lease", 1000), sites.drive("fu2", "lease", 1000)))
 )
@@ -74,27 +72,3 @@ def test_a_bus_process_that_does_not_answer_says_nothing_of_the_drives() -> None
     front.judge()
     front.troubles.beat()
     assert [one["kind"] for one in front.troubles.shown] == ["drive_lost", "drive_lost"], "it answers"
-
-
-def test_each_point_is_in_the_topics_of_its_place() -> None:
-    case = Watched(_SITE)
-    points = case.image.points
-    topics = topics_of(points, case.layout)
-    shown = {index for indices in topics.values() for index in indices}
-    assert shown == set(range(len(points)))
-    assert {points[index].name for index in topics[f"drive {DRIVE}"]} == {
-        point.name for point in points if point.name.startswith(f"{DRIVE}/")
-    }
-    assert set(topics) == {"plant", "bus can0", "node conveyor", f"drive {DRIVE}", "drive conveyor/fu2"}
-
-
-def test_the_site_is_described_by_the_names_of_its_points() -> None:
-    plant = sites.plant_of(_SITE)
-    told = described(plant.image, plant.site, families_of(plant))
-    assert [one["name"] for one in told["drives"]] == [DRIVE, "conveyor/fu2"]
-    assert all(one["main"] == "frequency" and one["stops_in"] == "ready" for one in told["drives"])
-    names = {f"{place}/{leaf}" for place, kind in told["places"].items() for leaf in told["natures"][kind]}
-    assert names == {point.name for point in plant.image.points}
-    for drive in told["drives"]:
-        assert f"actual/{drive['main']}" in told["natures"][told["places"][drive["name"]]]
-    assert all(told["natures"].count(one) == 1 for one in told["natures"]), "each kind is described once"

@@ -1,4 +1,4 @@
-"""The site file: what may stand in it, and that every fault in it is told in one run."""
+"""Keys of the site file together: what is unique, who commands, and times that need one another."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from bridge.base.errors import FileFaults
-from bridge.config import Site, load_site
 from bridge.mapping.site import load_site_and_families
+from tests.support.small_site import SMALL, faults, load
 
 CONTRACT = """
 [site]
@@ -59,34 +59,6 @@ connect = []
 prefix = "drives"
 """
 """The example of the contract, as it stands there."""
-
-SMALL = """
-[site]
-name = "hall"
-[[bus]]
-name = "can0"
-interface = "virtual"
-[[bus.node]]
-name = "conveyor"
-id = 5
-mapping = "nord/sk-tu4-cao"
-[[bus.node.drive]]
-slot = "fu1"
-"""
-
-
-def load(folder: Path, text: str) -> Site:
-    path = folder / "site.toml"
-    path.write_text(text, encoding="utf-8")
-    return load_site(path)
-
-
-def faults(folder: Path, text: str) -> list[str]:
-    """The faults as the user sees them, from the line number on."""
-    with pytest.raises(FileFaults) as caught:
-        load(folder, text)
-    top = str(folder / "site.toml")
-    return [str(fault).removeprefix(f"{top}:").removeprefix(top).strip(": ") for fault in caught.value.faults]
 
 
 class TestTheContractsExample:
@@ -140,130 +112,6 @@ class TestTheContractsExample:
     def test_loads_with_every_value_it_names(self, tmp_path: Path, change: tuple[str, str]):
         assert change[0] in CONTRACT
         load(tmp_path, CONTRACT.replace(*change))
-
-
-def test_defaults_are_those_of_the_contract(tmp_path: Path):
-    site = load(tmp_path, SMALL)
-    (bus,) = site.bus
-    (node,) = bus.node
-    (drive,) = node.drive
-    assert site.site.state_dir == "/var/lib/drivebridge"
-    assert (bus.bitrate, bus.master_node_id, bus.heartbeat_ms) == (250_000, 127, 100)
-    assert (bus.sync_period_ms, bus.deadman_ms) == (10, 100)
-    assert (node.supervision, node.supervision_ms, node.hold_ms) == ("heartbeat", 200, 2000)
-    assert (node.mandatory, node.enabled) == (False, True)
-    assert (drive.control, drive.fieldbus_timeout_ms) == ("none", None)
-    assert (drive.telegram_downtime_s, drive.on_expiry, drive.then_silence_ms) == (0.5, "disable_voltage", 0)
-    assert (site.modbus, site.opcua, site.zenoh) == (None, None, None)
-
-
-def test_served_protocols_listen_on_loopback_unless_told_otherwise(tmp_path: Path):
-    site = load(tmp_path, SMALL + "[modbus]\n[opcua]\n[zenoh]\n")
-    assert site.modbus is not None
-    assert site.opcua is not None
-    assert site.zenoh is not None
-    assert site.modbus.listen == "127.0.0.1:502"
-    assert site.opcua.listen == "127.0.0.1:4840"
-    assert site.zenoh.listen == ["tcp/127.0.0.1:7447"]
-
-
-@pytest.mark.parametrize(
-    ("sync_ms", "rpdo_ms", "period_s"), [(10, None, 0.01), (10, 25, 0.025), (0, None, 0.02), (0, 5, 0.005)]
-)
-def test_process_data_go_with_sync_or_every_20_ms(
-    tmp_path: Path, sync_ms: int, rpdo_ms: int | None, period_s: float
-):
-    period = f"rpdo_period_ms = {rpdo_ms}\n" if rpdo_ms else ""
-    lines = f'interface = "virtual"\nsync_period_ms = {sync_ms}\n{period}'
-    site = load(tmp_path, SMALL.replace('interface = "virtual"\n', lines))
-    assert site.bus[0].rpdo_period_s == period_s
-
-
-BROKEN = """\
-[site]
-name = "Hall 3"
-sate_dir = "/tmp"
-
-[[bus]]
-name = "can0"
-interface = "socketcan"
-bitrate = "250000"
-deadman_ms = 15
-
-[[bus.node]]
-name = "conveyor"
-id = 128
-mapping = "nord/sk-tu4-cao"
-supervision = "heartbeet"
-
-[[bus.node.drive]]
-slot = "fu1"
-unit_id = 1
-control = "modbus"
-telegram_downtime_s = 0.05
-
-[[bus.node.drive]]
-slot = "fu1"
-unit_id = 1
-control = "opcua"
-fieldbus_timeout_ms = 40000
-parameters = { P105 = -50.0 }
-
-[[bus.node]]
-name = "conveyor"
-id = 127
-[[bus.node.drive]]
-slot = "fu1"
-name = "node"
-
-[modbus]
-listen = "localhost"
-allow = ["127.0.0.0/8", "127.0.0.0/99"]
-word_order = "DCAB"
-
-[zenoh]
-listen = ["127.0.0.1:7447"]
-prefix = "a/*"
-"""
-
-
-def test_every_fault_of_a_file_is_told_in_one_run_with_its_line(tmp_path: Path):
-    assert faults(tmp_path, BROKEN) == [
-        '2: site.name: must be lower_snake_case: a letter, then letters, digits and _, not "Hall 3" '
-        "(a name for this site, lower_snake_case)",
-        "3: site.sate_dir: is not a key that belongs here (did you mean state_dir?)",
-        "5: bus[0]: interface 'socketcan' needs a channel (such as channel = \"can0\")",
-        '8: bus[0].bitrate: must be a whole number, not "250000" (10000…1000000 bit/s)',
-        "9: bus[0].deadman_ms: 15 ms is too short for process data every 10 ms "
-        "(at least 20: the dead-man burst must outlive one lost cycle)",
-        "13: bus[0].node[0].id: must be at most 127, not 128 (the node's CANopen address, 1…127)",
-        '15: bus[0].node[0].supervision: must be "heartbeat", "guarding" or "none", not "heartbeet" '
-        '(did you mean "heartbeat"?)',
-        "17: bus[0].node[0].drive[0].fieldbus_timeout_ms: is missing: a drive that can be commanded states "
-        "how long its controller may be silent (1…32767 ms, or 0 for no supervision, which is a decision)",
-        "21: bus[0].node[0].drive[0].telegram_downtime_s: must be -0.1 (ignore), 0 (off) or 0.1…100.0, "
-        "not 0.05",
-        "24: bus[0].node[0].drive[1].slot: slot 'fu1' is used twice (first used in line 18)",
-        "25: bus[0].node[0].drive[1].unit_id: unit id 1 is used twice (first used in line 19)",
-        "26: bus[0].node[0].drive[1].control: the drive is controlled by opcua, which this site does not "
-        "serve (add a [opcua] table)",
-        "27: bus[0].node[0].drive[1].fieldbus_timeout_ms: must be at most 32767, not 40000 "
-        "(0 (off) or 1…32767 ms, like P151)",
-        "28: bus[0].node[0].drive[1].parameters.P105: must be more than 0.0, not -50.0",
-        "30: bus[0].node[1].mapping: is missing "
-        "(a file below mappings/ without .toml, such as nord/sk-tu4-cao)",
-        "31: bus[0].node[1].name: node name 'conveyor' is used twice (first used in line 12)",
-        "32: bus[0].node[1].id: node id 127 is the bridge's own (change it or master_node_id)",
-        "35: bus[0].node[1].drive[0].name: 'node' is reserved (choose another name)",
-        '38: modbus.listen: must be an address and a port such as 127.0.0.1:4840, not "localhost" '
-        "(address:port)",
-        "39: modbus.allow[1]: must be a network such as 192.168.1.0/24: '127.0.0.0/99' does not appear to "
-        'be an IPv4 or IPv6 network, not "127.0.0.0/99"',
-        '40: modbus.word_order: must be "ABCD", "CDAB", "BADC" or "DCBA", not "DCAB" (did you mean "DCBA"?)',
-        "43: zenoh.listen[0]: must be a protocol and an address such as tcp/192.168.1.10:7447, "
-        'not "127.0.0.1:7447"',
-        '44: zenoh.prefix: must be words of letters, digits and _ . - with / between them, not "a/*"',
-    ]
 
 
 class TestWhatDoesNotGoTogether:
@@ -374,30 +222,6 @@ class TestWhatDoesNotGoTogether:
         load(tmp_path, text.replace('interface = "virtual"', 'interface = "virtual"\nheartbeat_ms = 0'))
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        (
-            "",
-            [
-                "site: is missing (a [site] table with a name)",
-                "bus: is missing (a [[bus]] table for each bus)",
-            ],
-        ),
-        (
-            '[site]\nname = "a"\n[bus]\nname = "b"\n',
-            ["3: bus: must be a list (a [[bus]] table for each bus)"],
-        ),
-        ('bus = 5\n[site]\nname = "a"', ["1: bus: must be a list, not 5 (a [[bus]] table for each bus)"]),
-    ],
-)
-def test_what_is_missing_is_told_with_what_would_be_right(tmp_path: Path, text: str, told: list[str]):
-    found = faults(tmp_path, text)
-    assert len(found) == len(told)
-    for one, start in zip(found, told, strict=True):
-        assert one.startswith(start)
-
-
 def test_a_node_of_drives_has_one(tmp_path: Path):
     path = tmp_path / "site.toml"
     path.write_text(SMALL.split("[[bus.node.drive]]")[0], encoding="utf-8")
@@ -407,30 +231,3 @@ def test_a_node_of_drives_has_one(tmp_path: Path):
         f"{path}:7: bus[0].node[0].drive: is missing "
         "(a [[bus.node.drive]] for each drive; slots: fu1, fu2, fu3, fu4)"
     )
-
-
-@pytest.mark.parametrize("value", ["nan", "inf", "-0.2", "0.09", "100.1", "true", '"0.5"'])
-def test_a_telegram_downtime_is_that_of_p513(tmp_path: Path, value: str):
-    assert "telegram_downtime_s" in faults(tmp_path, f"{SMALL}telegram_downtime_s = {value}\n")[0]
-
-
-@pytest.mark.parametrize("value", ["nan", "inf", "0", "-1.5", '"50"'])
-def test_a_scaling_parameter_is_more_than_nothing(tmp_path: Path, value: str):
-    assert "parameters.P105" in faults(tmp_path, f"{SMALL}parameters = {{ P105 = {value} }}\n")[0]
-
-
-@pytest.mark.parametrize(
-    "listen",
-    ["127.0.0.1", "127.0.0.1:", "127.0.0.1:99999", "localhost:502", ":502", "127.0.0.1:x", "1.2.3:5"],
-)
-def test_an_endpoint_is_an_ip_address_and_a_port(tmp_path: Path, listen: str):
-    assert faults(tmp_path, f'{SMALL}[modbus]\nlisten = "{listen}"\n')[0].startswith(
-        "14: modbus.listen: must"
-    )
-
-
-@pytest.mark.parametrize("listen", ["0.0.0.0:502", "[::1]:502", "192.168.1.5:0"])
-def test_these_are_endpoints(tmp_path: Path, listen: str):
-    site = load(tmp_path, f'{SMALL}[modbus]\nlisten = "{listen}"\n')
-    assert site.modbus
-    assert site.modbus.listen == listen

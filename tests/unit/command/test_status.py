@@ -1,0 +1,72 @@
+"""What a drive says of itself: faults by emergency, by asking, by the bridge; which one is shown."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.command.status import DriveStatus
+from bridge.drive import DriveState, EmergencyReader, Told
+from bridge.mapping import load_family
+
+NORD = load_family("nord/sk-tu4-cao")
+FAULT, ENABLED = DriveState.FAULT, DriveState.OPERATION_ENABLED
+
+
+def emergency(code: int) -> Told:
+    return EmergencyReader(NORD).read(code, bytes(5))
+
+
+@pytest.fixture
+def status() -> DriveStatus:
+    return DriveStatus(NORD)
+
+
+def test_without_anything_there_is_no_fault(status: DriveStatus) -> None:
+    assert status.fault_text(0.0, ENABLED) == ""
+    assert status.last_fault_text == ""
+    assert (status.drive_fault, status.last_fault, status.emcy_code) == (0.0, 0.0, 0)
+
+
+def test_a_drive_in_fault_that_says_no_more_has_a_fault(status: DriveStatus) -> None:
+    assert status.fault_text(0.0, FAULT) == "fault"
+
+
+def test_an_emergency_explains_the_fault_until_it_is_gone(status: DriveStatus) -> None:
+    status.on_emcy(emergency(0x2310))
+    assert status.emcy_code == 0x2310
+    assert status.fault_text(0.0, FAULT) == emergency(0x2310).text
+    assert status.fault_text(0.0, ENABLED) == "", "an emergency alone is no state"
+    status.on_emcy(emergency(0x0000))
+    assert (status.emcy_code, status.fault_text(0.0, FAULT)) == (0, "fault")
+
+
+def test_the_drives_own_number_is_shown_in_any_state(status: DriveStatus) -> None:
+    assert status.on_drive_fault(3.0, None)
+    assert status.fault_text(0.0, ENABLED) == "E003/3.0 overcurrent of the inverter"
+
+
+def test_the_bridges_own_fault_comes_first(status: DriveStatus) -> None:
+    status.on_drive_fault(3.0, None)
+    assert "3.0 " not in status.fault_text(10.3, FAULT)
+    assert "10.3" in status.fault_text(10.3, FAULT)
+
+
+def test_only_what_changes_something_is_news(status: DriveStatus) -> None:
+    assert not status.on_drive_fault(0.0, None)
+    assert not status.on_drive_fault(None, None)
+    assert status.on_drive_fault(3.0, None)
+    assert not status.on_drive_fault(3.0, None)
+    assert status.on_drive_fault(0.0, None)
+
+
+def test_of_the_last_faults_that_bridge_and_drive_tell_the_newest_counts(status: DriveStatus) -> None:
+    status.on_drive_fault(None, 4.0)
+    assert status.last_fault == 4.0
+    status.last_fault = 10.3
+    status.on_drive_fault(None, 4.0)
+    assert status.last_fault == 10.3, "the drive has told this one before"
+    status.on_drive_fault(3.0, None)
+    assert status.last_fault == 3.0
+    status.on_drive_fault(0.0, None)
+    assert status.last_fault == 3.0, "no fault is no last fault"
+    assert status.last_fault_text == "E003/3.0 overcurrent of the inverter"

@@ -1,0 +1,86 @@
+"""Outputs when the bridge falls silent (CiA 401): whether the node makes each of them safe, or why not."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.command.output_words import OutputWords, Place
+from bridge.config import SafeValue
+from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, Watch
+from bridge.mapping.device import Output
+from bridge.node.boot.actions import BootResult
+from bridge.node.boot.device_watch import keeps_outputs, read_held, read_why_not_safe, why_not_safe
+from tests.support.answering import Answering
+
+
+def place(index: str, kind: str, on_expiry: SafeValue = 0, *, has_errors: bool = True) -> Place:
+    keys: dict[str, object] = {"name": "valves", "object": index, "data_type": kind, "on_expiry": on_expiry}
+    if has_errors:
+        keys |= {"error_mode": "6206:01", "error_value": "6207:01"}
+    return OutputWords("block", (Output.model_validate(keys),), {}).places["valves"]
+
+
+DIGITAL, ANALOGUE = place("6200:01", "uint8"), place("6411:01", "int16", 5)
+
+
+@pytest.mark.parametrize(
+    ("one", "safe", "mode", "value", "why"),
+    [
+        (DIGITAL, 0, 0xFF, 0x00, ""),
+        (DIGITAL, 0, 0xFC, 0x00, "valves keeps 2 of its bits: 6206:01 is FCh"),
+        (DIGITAL, 0, 0x00, 0x00, "valves keeps 8 of its bits: 6206:01 is 0h"),
+        (DIGITAL, 0, 0xFF, 0x01, "valves becomes 1h by 6207:01, not 0h"),
+        (ANALOGUE, 5, 1, 5, ""),
+        (ANALOGUE, 5, 0, 5, "valves keeps its value: 6206:01 is 0"),
+        (ANALOGUE, 5, 0x100, 5, "valves keeps its value: 6206:01 is 0"),
+        (ANALOGUE, 5, 1, 0x1_0005, ""),
+        (ANALOGUE, 5, 1, 6, "valves becomes 6h by 6207:01, not 5h"),
+        (DIGITAL, 0, None, 0, "what valves does then is not known: 6206:01 cannot be read"),
+        (DIGITAL, 0, 0xFF, None, "what valves does then is not known: 6207:01 cannot be read"),
+    ],
+)
+def test_an_output_is_safe_where_mode_and_value_say_so(
+    one: Place, safe: int, mode: int | None, value: int | None, why: str
+) -> None:
+    """CiA 401: an error mode of 1 takes the error value; digital ones have a bit each."""
+    assert why_not_safe(one, safe, mode, value) == why
+
+
+def test_what_the_mapping_does_not_name_is_not_known() -> None:
+    one = place("6200:01", "uint8", has_errors=False)
+    why = why_not_safe(one, 0, 0xFF, 0)
+    assert why == "what valves does then is not known: the mapping names no error_mode and error_value"
+    node = Answering()
+    assert node.run(read_why_not_safe(one, 0)) == why
+    assert node.reads == []
+
+
+def test_it_is_judged_by_what_the_node_holds() -> None:
+    node = Answering({(0x6206, 1): b"\xff", (0x6207, 1): b"\0"})
+    assert node.run(read_why_not_safe(DIGITAL, 0)) == ""
+    del node.objects[0x6207, 1]
+    assert node.run(read_why_not_safe(DIGITAL, 0)).endswith("6207:01 cannot be read")
+
+
+def test_a_node_that_notices_and_keeps_its_outputs_runs_on() -> None:
+    stops = Watch("heartbeat", "heartbeat", "1016:01", 300.0, "stops", OwnVerdict.STOPS, silent_ms=100)
+    link = Watch("link", "link", "x", None, "", None)
+    own = OwnJudgement((stops, link))
+    assert own.verdict is OwnVerdict.STOPS
+    kept = keeps_outputs(own, "valves keeps its value")
+    assert (kept.verdict, kept.reason) == (OwnVerdict.RUNS_ON, "valves keeps its value")
+    assert kept.watches[1] == link
+    assert keeps_outputs(own, "?", is_known=False).verdict is OwnVerdict.UNKNOWN
+
+
+def test_what_is_to_hold_is_read_so_that_the_first_frame_changes_nothing() -> None:
+    holds = Output.model_validate(
+        {"name": "lamp", "object": "6411:02", "data_type": "int16", "on_expiry": "hold"}
+    )
+    safe = Output.model_validate({"name": "fan", "object": "6411:03", "data_type": "int16"})
+    words, result = OutputWords("block", (holds, safe), {}), BootResult()
+    Answering({(0x6411, 2): b"\xfe\xff\xff\xff", (0x6411, 3): b"\7\0"}).run(read_held(words, result))
+    assert result.held == {"lamp": 0xFFFE}
+    nothing = BootResult()
+    Answering().run(read_held(words, nothing))
+    assert nothing.held == {}

@@ -88,7 +88,7 @@ def test_what_is_not_answered_is_no_value_and_is_noted() -> None:
     value = found.parameters[one.name, in_set]
     assert value is not None
     assert math.isnan(value)
-    assert result.notes == [f"cannot be read, and is not needed: {silence}"]
+    assert result.notes[0] == f"cannot be read, and is not needed: {silence}"
 
 
 def test_the_drives_own_value_counts_beside_that_of_the_site_file() -> None:

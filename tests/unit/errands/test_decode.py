@@ -31,9 +31,6 @@ def heard(decoder: Decoder, *frames: tuple[int, str]) -> Meaning:
     return [decoder.decode(Frame(can_id, bytes.fromhex(data))) for can_id, data in frames][-1]
 
 
-# SDO, from the manuals
-
-
 @pytest.mark.parametrize(
     ("frames", "text"),
     [
@@ -83,32 +80,6 @@ def test_block_segments_are_not_taken_for_commands() -> None:
     heard(decoder, (0x585, "A202020000000000"))
     assert heard(decoder, (0x605, "C100000000000000")).text == "block write 2000h:00: end"
     assert heard(decoder, (0x605, "4000100000000000")).text == "read 1000h:00"
-
-
-# process data and the rest
-
-
-def test_the_example_of_the_nord_manual() -> None:
-    """BU 2500 §6.8: 047F, 2000 runs at 25 Hz; the drive answers xx37, 2000."""
-    sent = heard(site(), (0x205, "7F04002000000000"))
-    assert sent.kind is Kind.PDO
-    assert sent.label == "RPDO1 conveyor/fu1"
-    assert "control_word 047Fh" in sent.text
-    assert "setpoint_1 2000h (frequency 25 Hz)" in sent.text
-    answered = heard(site(), (0x185, "370B002000000000"))
-    assert "status_word 0B37h operation enabled" in answered.text
-    assert dict(answered.values) | {"frequency": 25.0, "state": "operation_enabled"} == dict(answered.values)
-
-
-def test_a_drive_whose_scale_is_not_known_shows_its_words() -> None:
-    assert heard(site(), (0x285, "310B002000000000")).text.endswith(
-        "value_1 2000h, value_2 0000h, value_3 0000h"
-    )
-
-
-def test_without_a_site_a_pdo_is_its_bytes() -> None:
-    meaning = heard(Decoder(), (0x205, "7F04"))
-    assert (meaning.label, meaning.text, meaning.node) == ("RPDO1 node 5", "7F 04", 5)
 
 
 @pytest.mark.parametrize(

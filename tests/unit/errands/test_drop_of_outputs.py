@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from pathlib import Path
 
-import pytest
-
-from bridge.cli import drop_report
 from bridge.drive import OwnVerdict
 from bridge.errands.drop_test import Proof
 from bridge.project import load_project
@@ -40,20 +36,3 @@ def test_one_that_does_not_is_not(tmp_path: Path) -> None:
     (outcome,) = drop(bench_of(tmp_path, "")).outcomes
     assert outcome.proof is Proof.NOTHING
     assert not outcome.is_proven
-
-
-@pytest.mark.parametrize("more", [WATCHING, ""])
-def test_the_report_says_what_was_tried(tmp_path: Path, more: str) -> None:
-    bench = bench_of(tmp_path, more)
-    test = drop(bench)
-    site = tmp_path / "site.toml"
-    occasion = drop_report.Occasion("me", "here", "agreed", datetime(2026, 11, 24, tzinfo=UTC), site)
-    (node,) = bench.plant.nodes.values()
-    facts = drop_report.facts(occasion, node, test)
-    assert facts["ok"] is bool(more)
-    assert (facts["node"]["vendor"], facts["node"]["product"]) == (0xACE, 0x401)
-    text = drop_report.markdown(facts)
-    assert f"| own time-out | {test.outcomes[0].own_text} |" in text
-    assert all(setting["setting"] in text for setting in facts["drives"][0]["settings"])
-    assert "leaves Operational" in text
-    assert "drives stood still" not in text

@@ -11,75 +11,7 @@ from bridge.mapping import family_names, load_family, read_family
 from bridge.mapping.loader import mappings_dir
 from bridge.mapping.model import pattern_bits
 from bridge.mapping.site import load_site_and_families
-
-FAMILY = """\
-[family]
-name = "Test"
-vendor = "Nobody"
-source = "none"
-[process]
-rpdo = ["control_word", "setpoint_1"]
-tpdo = ["status_word", "value_1"]
-[[slot]]
-name = "one"
-[slot.rpdo]
-number = 1
-cob_id = 0x200
-objects = [["6040:00"], ["6042:00"]]
-[slot.tpdo]
-number = 1
-cob_id = 0x180
-objects = [["6041:00"], ["6044:00"]]
-[[value]]
-name = "velocity"
-group = "command"
-word = "setpoint_1"
-scale = { full = "P1", at = 1000 }
-unit = "1/min"
-[[parameter]]
-name = "P1"
-title = "full speed"
-object = "2001:00"
-data_type = "uint16"
-[[poll]]
-name = "inputs"
-object = "60FD:00"
-data_type = "uint16"
-every_ms = 500
-[control_word]
-bits = []
-acknowledge_bit = 7
-enabling = { mask = 0x0F, value = 0x0F }
-stopped = 0
-ready = 6
-run = 15
-stop = { mask = 1, value = 0 }
-quick_stop = { mask = 4, value = 0 }
-disable_voltage = { mask = 2, value = 0 }
-[status_word]
-bits = []
-state = [
-  { name = "ready", pattern = "01X0001" },
-  { name = "fault", pattern = "0XX1000" }, { name = "operation_enabled", pattern = "01X0111" },
-]
-[emcy.codes]
-0000 = "no fault"
-[faults]
-controller_silent = 1.0
-bridge_timeout = 2.0
-telegram_downtime = 3.0
-node_missing = 4.0
-[faults.texts]
-"1.0" = "silent"
-"""
-
-
-def told(folder: Path, text: str) -> list[str]:
-    path = folder / "family.toml"
-    path.write_text(text)
-    with pytest.raises(FileFaults) as caught:
-        read_family(path)
-    return [str(fault).removeprefix(f"{path}:") for fault in caught.value.faults]
+from tests.support.sample_family import FAMILY, told
 
 
 def test_the_sample_is_a_family(tmp_path: Path):
@@ -188,29 +120,6 @@ def test_a_fault_is_told_with_its_line(tmp_path: Path, old: str, new: str, fault
     assert [line for line in found if line.startswith(fault)], found
 
 
-def test_a_valid_bit_belongs_into_every_word_the_bridge_sends(tmp_path: Path):
-    found = told(tmp_path, FAMILY.replace("acknowledge_bit = 7", "acknowledge_bit = 7\nvalid_bit = 10"))
-    assert [line.split(": ")[1] for line in found] == [
-        "control_word.stopped",
-        "control_word.ready",
-        "control_word.run",
-    ]
-
-
-def test_what_is_there_twice_is_told_with_where_it_is_first(tmp_path: Path):
-    parameter = FAMILY[FAMILY.index("[[parameter]]") : FAMILY.index("[[poll]]")]
-    poll = FAMILY[FAMILY.index("[[poll]]") : FAMILY.index("[control_word]")]
-    slot = FAMILY[FAMILY.index("[[slot]]") : FAMILY.index("[[value]]")]
-    value = FAMILY[FAMILY.index("[[value]]") : FAMILY.index("[[parameter]]")]
-    found = told(tmp_path, FAMILY + parameter + poll + slot + value)
-    assert [line.split(": ", 1)[1] for line in found] == [
-        "parameter[1].name: parameter 'P1' is there twice (first in line 25)",
-        "poll[1].name: poll 'inputs' is there twice (first in line 30)",
-        "slot[1].name: slot 'one' is there twice (first in line 9)",
-        "value[1].name: point 'command/velocity' is there twice (first in line 19)",
-    ]
-
-
 def test_several_faults_come_in_one_run(tmp_path: Path):
     text = FAMILY.replace("cob_id = 0x200", "cob_id = 0x900").replace("at = 1000", "at = -1")
     text = text.replace("every_ms = 500", "every_ms = 5").replace('"60FD:00"', '"inputs"')
@@ -284,28 +193,6 @@ class TestSiteAndMappings:
         site, families = load_site_and_families(path)
         assert [node.name for node in site.bus[0].node] == ["conveyor", "pump"]
         assert list(families) == ["nord/sk-tu4-cao"]
-
-
-@pytest.mark.parametrize(
-    ("more", "fault"),
-    [
-        ('slot = "two"', "sdo[0].slot: there is no slot 'two' (known: one)"),
-        ("after_stop = 1", "sdo[0].after_stop: must be true or false, not 1"),
-        (
-            "[[sdo]]\nnumber = 2\nrequest = 0x640\nreply = 0x5C0",
-            "sdo[1].number: SDO server '2' is there twice",
-        ),
-    ],
-)
-def test_a_wrong_sdo_server_is_named(tmp_path: Path, more: str, fault: str):
-    server = f"[[sdo]]\nnumber = 2\nrequest = 0x340\nreply = 0x2C0\n{more}\n[control_word]"
-    assert fault in told(tmp_path, FAMILY.replace("[control_word]", server))[0]
-
-
-def test_an_sdo_server_leaves_room_for_the_node_id(tmp_path: Path):
-    server = "[[sdo]]\nnumber = 2\nrequest = 0x7FF\nreply = 0x2C0\n[control_word]"
-    [fault] = told(tmp_path, FAMILY.replace("[control_word]", server))
-    assert "sdo[0].request: 7FFh leaves no room for the node id" in fault
 
 
 def test_a_file_that_is_nested_too_deeply_is_a_fault(tmp_path: Path):

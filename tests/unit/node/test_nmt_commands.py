@@ -1,0 +1,101 @@
+"""Commands on nodes: who may give them, what is answered, and whether one frame tells them all."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import pytest
+
+from bridge.command import Action, Code, Event, Identity, Outcome, Request, Role, Source
+from bridge.command.messages.request import Do
+from bridge.node.nmt_commands import NMT, CommandedNode, answer, refusal
+from tests.support import sites
+
+OPERATOR = Identity(Source.OPCUA, "ann", Role.OPERATOR)
+OBSERVER = Identity(Source.OPCUA, "bob", Role.OBSERVER)
+ENGINEER = Identity(Source.OPCUA, "eve", Role.ENGINEER)
+PLC = Identity(Source.MODBUS, "192.168.1.10")
+
+
+class Channel:
+    owner: Identity | None = None
+
+
+class One:
+    """A node with one drive, and what it is told."""
+
+    def __init__(self, owner: Identity | None = None, takeover_s: float = 0.0) -> None:
+        self.name = "conveyor/fu1"
+        self.channel = Channel()
+        self.channel.owner = owner
+        self.node: Any = self
+        self.commanded = [self]
+        self.leaving: Any = self
+        self.takeover_s = takeover_s
+        self.told: list[tuple[Action, bool]] = []
+
+    def carry_out_command(self, action: Action, who: str, now: float, *, send: bool = True) -> None:
+        self.told.append((action, send))
+
+
+class Asked:
+    def __init__(self, action: Action, target: str, *nodes: One, who: Identity = OPERATOR) -> None:
+        plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "none", 0)))))
+        self.events: list[Event] = []
+        plant.on_event(self.events.append)
+        outcomes: list[Outcome] = []
+        request = Request(who, target, Do(action))
+        them = cast("list[CommandedNode]", list(nodes))
+        self.is_one_frame = answer(request, "the log", them, plant, 10.0, outcomes.append)
+        (self.outcome,) = outcomes
+
+
+def test_a_command_to_a_node_is_carried_out_and_told() -> None:
+    node = One()
+    asked = Asked(Action.STOP_NODE, "conveyor", node)
+    assert asked.outcome.code is Code.OK
+    assert not asked.is_one_frame
+    assert node.told == [(Action.STOP_NODE, True)]
+    assert [event.message for event in asked.events] == [f"stop_node by {OPERATOR}"]
+
+
+def test_one_frame_tells_a_bus_but_for_a_start() -> None:
+    """An unchecked node is not started."""
+    for action in NMT:
+        nodes = One(), One()
+        asked = Asked(action, "bus/can0", *nodes)
+        assert asked.is_one_frame is (action is not Action.START_NODE)
+        assert [node.told for node in nodes] == [[(action, action is Action.START_NODE)]] * 2
+
+
+def test_where_a_node_has_to_take_over_its_stopped_words_each_gets_its_own() -> None:
+    nodes = One(), One(takeover_s=0.01)
+    assert not Asked(Action.STOP_NODE, "bus/can0", *nodes).is_one_frame
+    assert all(node.told == [(Action.STOP_NODE, True)] for node in nodes)
+
+
+def test_a_bus_knows_nmt_alone() -> None:
+    node = One()
+    asked = Asked(Action.DISABLE, "bus/can0", node)
+    assert (asked.outcome.code, asked.outcome.message) == (Code.UNKNOWN_TARGET, "a bus has no disable")
+    assert node.told == []
+    assert asked.events == []
+
+
+@pytest.mark.parametrize(
+    ("who", "owner", "why"),
+    [
+        (OBSERVER, None, f"{OBSERVER} may only read"),
+        (OPERATOR, None, None),
+        (OPERATOR, OPERATOR, None),
+        (OPERATOR, PLC, f"conveyor/fu1 is controlled by {PLC.named_beside(OPERATOR)}"),
+        (ENGINEER, PLC, None),
+    ],
+)
+def test_who_may_command_a_node(who: Identity, owner: Identity | None, why: str | None) -> None:
+    request = Request(who, "conveyor", Do(Action.RESET))
+    assert refusal(request, cast("Any", [One(), One(owner)])) == why
+    node = One(owner)
+    asked = Asked(Action.RESET, "conveyor", node, who=who)
+    assert (asked.outcome.code is Code.OK) is (why is None)
+    assert bool(node.told) is (why is None)

@@ -1,0 +1,60 @@
+"""News about the meaning of a drive's words: what is told, and what becomes of setpoints in force."""
+
+from __future__ import annotations
+
+import pytest
+
+from bridge.command import Event
+from bridge.command.meaning_news import MeaningNews
+from tests.support import sites
+
+DRIVE = "conveyor/fu1"
+
+
+class Case:
+    """A NORD drive that has told nothing of itself yet."""
+
+    def __init__(self) -> None:
+        self.plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "lease", 200, "")))))
+        self.drive = self.plant.drives[DRIVE]
+        self.events: list[Event] = []
+        self.news = MeaningNews(self.drive, self.events.append)
+
+    def told(self) -> list[str]:
+        found = [event.message for event in self.events]
+        self.events.clear()
+        return found
+
+
+@pytest.fixture
+def case() -> Case:
+    return Case()
+
+
+def test_what_is_read_for_the_first_time_is_no_news(case: Case) -> None:
+    case.news.on_parameter("P105", 50.0, 10.0)
+    assert case.told() == []
+
+
+def test_a_scale_that_has_changed_is_told_with_both_and_with_what_it_is_for(case: Case) -> None:
+    case.news.on_parameter("P105", 50.0, 10.0)
+    case.news.on_parameter("P105", 50.0, 11.0)
+    assert case.told() == []
+    case.news.on_parameter("P105", 60.0, 12.0)
+    (message,) = case.told()
+    assert message.startswith("P105 of parameter set 1 is 60, it was 50: ")
+    assert "has another scale" in message
+
+
+def test_one_that_cannot_be_read_any_more_is_told(case: Case) -> None:
+    case.news.on_parameter("P105", 50.0, 10.0)
+    case.news.on_parameter("P105", None, 11.0)
+    (message,) = case.told()
+    assert message.startswith("P105 of parameter set 1 cannot be read, it was 50")
+
+
+def test_a_scale_that_is_none_is_told_as_that(case: Case) -> None:
+    case.news.on_parameter("P105", 50.0, 10.0)
+    case.news.on_parameter("P105", 0.0, 11.0)
+    (message,) = case.told()
+    assert "P105 is 0 in the drive, which is no scale" in message

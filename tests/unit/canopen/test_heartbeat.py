@@ -98,6 +98,13 @@ def test_the_toggle_bit_may_begin_with_either_and_alternates() -> None:
         assert one.toggle_errors == 0
 
 
+def test_the_state_is_no_part_of_the_toggle_bit() -> None:
+    one = guard()
+    for number, state in enumerate((5, 4, 127, 4, 5)):
+        assert one.on_frame(says(state | 0x80 * (number % 2), 10.1 + number / 10))
+    assert one.toggle_errors == 0
+
+
 def test_a_repeated_toggle_bit_proves_nothing_and_the_next_correct_one_does() -> None:
     one = guard()
     one.on_frame(says(0x05, 10.1))

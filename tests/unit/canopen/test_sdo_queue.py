@@ -19,6 +19,11 @@ def job(number: int, priority: Priority) -> SdoJob:
     return SdoJob(number, 0, never, lambda result: None, priority, 0, 0.5)
 
 
+def test_there_is_room_for_64() -> None:
+    queue = SdoQueue()
+    assert sum(queue.add(job(number, Priority.POLL)) is None for number in range(99)) == 64
+
+
 def test_commands_come_first_and_polls_last() -> None:
     assert sorted(Priority) == [Priority.COMMAND, Priority.BOOT, Priority.MEANING, Priority.POLL]
     queue = SdoQueue()

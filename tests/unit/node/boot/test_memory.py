@@ -13,6 +13,13 @@ def rpdo(cob_id: int, kind: int = 255) -> PdoPlan:
     return PdoPlan(cob_id, kind, 0, PdoCodec(()), ())
 
 
+def test_of_a_node_that_was_never_seen_drives_may_run_and_nothing_was_done() -> None:
+    memory = BootMemory()
+    assert (memory.may_run, memory.is_at_rest, memory.did_not_start) == (True, False, False)
+    assert (memory.unsaved, memory.unanswered_stores) == (False, 0)
+    assert memory.count_write("n", "1010:01", "save") == "", "nobody counts"
+
+
 def test_a_value_that_was_not_kept_is_known_by_its_bytes_until_the_node_starts_anew() -> None:
     memory = BootMemory()
     memory.note_not_kept(0x2097, 1, b"\1\0")
@@ -74,6 +81,20 @@ def test_a_node_is_reset_once_for_an_error_and_for_three_in_all() -> None:
     memory.boot_succeeded()
     memory.did_not_start, memory.may_run = True, False
     assert memory.may_reset_for((0x11, 4))
+
+
+def test_who_starts_anew_may_be_reset_for_the_same_error_again() -> None:
+    memory = BootMemory(may_run=False)
+    memory.note_reset((0x11, 1))
+    memory.start_anew()
+    memory.did_not_start = True
+    assert memory.may_reset_for((0x11, 1))
+
+
+def test_a_reset_by_the_boot_up_is_no_start_that_failed() -> None:
+    memory = BootMemory(did_not_start=True)
+    memory.was_reset()
+    assert not memory.did_not_start
 
 
 def test_a_successful_boot_up_may_run_drives() -> None:

@@ -34,7 +34,7 @@ def test_a_long_object_fills_several_words_the_low_one_first() -> None:
 
 
 def test_what_is_not_known_or_lies_beyond_the_words_is_left_out() -> None:
-    word_map = WordMap((CONTROL, SPEED, POSITION), (None, Place(5), Place(1, 2)), 2)
+    word_map = WordMap((CONTROL, SPEED, POSITION), (None, Place(2), Place(1, 2)), 2)
     assert unpacked(word_map, [1, 2, 0x12345678], 2) == [0, 0x5678]
     assert word_map.pack([7, 8]) == [0, 0, 8]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.command.status import DriveStatus
-from bridge.drive import DriveState, EmergencyReader, Told
+from bridge.drive import DriveState, EmergencyReader, Explained, Told
 from bridge.mapping import load_family
 
 NORD = load_family("nord/sk-tu4-cao")
@@ -25,6 +25,8 @@ def test_without_anything_there_is_no_fault(status: DriveStatus) -> None:
     assert status.fault_text(0.0, ENABLED) == ""
     assert status.last_fault_text == ""
     assert (status.drive_fault, status.last_fault, status.emcy_code) == (0.0, 0.0, 0)
+    assert (status.word, status.link_fault) == (0, 0.0)
+    assert status.fault(0.0, FAULT) == Explained()
 
 
 def test_a_drive_in_fault_that_says_no_more_has_a_fault(status: DriveStatus) -> None:
@@ -42,7 +44,14 @@ def test_an_emergency_explains_the_fault_until_it_is_gone(status: DriveStatus) -
 
 def test_the_drives_own_number_is_shown_in_any_state(status: DriveStatus) -> None:
     assert status.on_drive_fault(3.0, None)
+    assert status.fault_text(0.0, FAULT) == "E003/3.0 overcurrent of the inverter"
     assert status.fault_text(0.0, ENABLED) == "E003/3.0 overcurrent of the inverter"
+
+
+def test_an_emergency_has_its_cause_and_remedy_while_the_drive_is_in_fault(status: DriveStatus) -> None:
+    status.on_emcy(emergency(0x2310))
+    assert "overcurrent" in str(status.fault(0.0, FAULT))
+    assert status.fault(0.0, ENABLED) == Explained()
 
 
 def test_the_bridges_own_fault_comes_first(status: DriveStatus) -> None:

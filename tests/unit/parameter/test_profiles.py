@@ -39,6 +39,43 @@ def test_an_object_of_a_profile(index: int, profile: int, effect: Effect | None)
     assert effect_of(index, profile) is effect
 
 
+def spread(*spans: int | tuple[int, int]) -> set[int]:
+    pairs = ((span, span) if isinstance(span, int) else span for span in spans)
+    return {index for first, last in pairs for index in range(first, last + 1)}
+
+
+TABLES = {
+    (401, Effect.COMMANDS): spread(0x6200, (0x6220, 0x622F), 0x6300, 0x6320, (0x6410, 0x6414)),
+    (401, Effect.SHAPES): spread(
+        0x6202, (0x6240, 0x624F), 0x6302, 0x6322, (0x6441, 0x6442), (0x6446, 0x6447)
+    ),
+    (401, Effect.MAKES_SAFE): spread(
+        (0x6206, 0x6208),
+        (0x6250, 0x627F),
+        (0x6306, 0x6308),
+        (0x6326, 0x6328),
+        (0x6443, 0x6445),
+        0x67FE,
+    ),
+    (402, Effect.COMMANDS): spread(
+        *(0x6040, 0x6042, 0x6052, 0x6071, 0x607A, (0x60B0, 0x60B2), 0x60C1, 0x60FE, 0x60FF)
+    ),
+    (402, Effect.MAKES_SAFE): spread(0x6007, 0x604A, 0x6051, (0x605A, 0x605E), 0x6085),
+    (402, Effect.OPERATES): spread(0x6060),
+    (408, Effect.COMMANDS): spread(0x6040, (0x6042, 0x6043), 0x6300),
+    (408, Effect.SHAPES): spread(0x6324),
+    (408, Effect.MAKES_SAFE): spread(0x6314),
+}
+"""The tables of the device profiles, written down a second time."""
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_every_object_of_the_first_logical_device(profile: int) -> None:
+    for index in range(0x6000, 0x6800):
+        effects = [effect for (of, effect), indices in TABLES.items() if of == profile and index in indices]
+        assert [effect_of(index, profile)] == (effects or [None]), f"{index:04X}h"
+
+
 def test_a_further_logical_device_has_the_worst_that_any_profile_says() -> None:
     """CiA 301 §7.4.1: 800h indices each; its own 67FFh says what it is."""
     assert effect_of(0x6840, 402) is Effect.COMMANDS

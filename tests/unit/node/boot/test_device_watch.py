@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from bridge.command.node import Node
 from bridge.command.output_words import OutputWords, Place
 from bridge.config import SafeValue
 from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, Watch
 from bridge.mapping.device import Output
 from bridge.node.boot.actions import BootResult
-from bridge.node.boot.device_watch import keeps_outputs, read_held, read_why_not_safe, why_not_safe
+from bridge.node.boot.device_watch import (
+    judge_outputs,
+    keeps_outputs,
+    read_held,
+    read_why_not_safe,
+    why_not_safe,
+)
 from tests.support.answering import Answering
+from tests.support.devices import IO_BLOCK, OUTPUTS
+from tests.support.nodes import device_plant
 
 
 def place(index: str, kind: str, on_expiry: SafeValue = 0, *, has_errors: bool = True) -> Place:
@@ -84,3 +95,59 @@ def test_what_is_to_hold_is_read_so_that_the_first_frame_changes_nothing() -> No
     nothing = BootResult()
     Answering().run(read_held(words, nothing))
     assert nothing.held == {}
+
+
+def block(folder: Path, outputs: str = "") -> tuple[Node, OutputWords]:
+    more = OUTPUTS.replace("[modbus]", f"{outputs}\n[modbus]")
+    node = device_plant(folder, IO_BLOCK, more).nodes["shaft"]
+    assert node.device is not None
+    assert node.device.outputs is not None
+    return node, node.device.outputs.words
+
+
+SAFE = {
+    (0x1016, 1): (127 << 16 | 300).to_bytes(4, "little"),
+    (0x1029, 1): b"\0",
+    (0x6206, 1): b"\xff",
+    (0x6207, 1): b"\0",
+    (0x6443, 1): b"\1",
+    (0x6444, 1): (50).to_bytes(4, "little"),
+}
+
+
+def judged(folder: Path, objects: dict[tuple[int, int], bytes], outputs: str = "") -> BootResult:
+    node, words = block(folder, outputs)
+    result = BootResult()
+    Answering(objects).run(judge_outputs(node, words, result))
+    return result
+
+
+def test_a_node_that_makes_all_of_them_safe_has_its_time(tmp_path: Path) -> None:
+    result = judged(tmp_path, SAFE)
+    assert result.own["shaft"].verdict is OwnVerdict.STOPS
+    assert result.bridge_stop == (result.own["shaft"].bridge_ms, "")
+    assert result.bridge_stop[0] > 300
+    assert result.notes == []
+
+
+def test_one_output_that_is_kept_is_enough_to_run_on(tmp_path: Path) -> None:
+    result = judged(tmp_path, {**SAFE, (0x6206, 1): b"\xfe"})
+    why = "valves keeps 1 of its bits: 6206:01 is FEh"
+    assert result.own["shaft"].verdict is OwnVerdict.RUNS_ON
+    assert result.bridge_stop == (0, why)
+    assert result.notes == [f"outputs are not safe by themselves when the bridge falls silent: {why}"]
+
+
+def test_what_the_site_accepts_is_no_note(tmp_path: Path) -> None:
+    result = judged(tmp_path, {**SAFE, (0x6206, 1): b"\xfe"}, 'accepts = { runs_on = "only a lamp is kept" }')
+    assert result.bridge_stop == (0, "only a lamp is kept")
+    assert result.notes == []
+    assert result.own["shaft"].accepted == "only a lamp is kept"
+
+
+def test_where_all_hold_nothing_is_read(tmp_path: Path) -> None:
+    node, words = block(tmp_path, 'on_expiry = { valves = "hold", speed = "hold" }')
+    asked, result = Answering(SAFE), BootResult()
+    asked.run(judge_outputs(node, words, result))
+    assert asked.reads == []
+    assert result.bridge_stop == (0, "all of its outputs hold their values")

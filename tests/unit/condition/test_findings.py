@@ -9,9 +9,12 @@ from bridge.condition.findings import (
     Rank,
     Trouble,
     is_bridge_dead,
+    of_bridge,
     of_bus,
     of_drive,
+    of_meaning,
     of_node,
+    silence_of,
 )
 from bridge.drive import Explained
 from bridge.image import Image, Quality, Value
@@ -173,3 +176,55 @@ def test_a_point_that_is_not_there_or_has_no_value_is_none(case: Watched) -> Non
     case.set(f"{DRIVE}/status/state", 4, Quality.DEAD)
     assert look(f"{DRIVE}/status/state") is None
     assert look.label(f"{DRIVE}/status/state") == ""
+
+
+def test_how_a_node_was_lost_and_why_it_is_not_as_configured_are_told(case: Watched) -> None:
+    name = f"{NODE}/node/state"
+    codes = {label: number for number, label in case.image.points[case.image.index[name]].states}
+    case.set(f"{NODE}/node/supervision_state", "no heartbeat")
+    case.set(f"{NODE}/node/boot_status", "another vendor")
+    case.set(name, codes["lost"])
+    assert [one.facts for one in node(case)] == [(("how", "no heartbeat"),)]
+    case.set(name, codes["config_error"])
+    assert [one.facts for one in node(case)] == [(("why", "another vendor"),)]
+
+
+def test_a_value_that_the_words_do_not_carry_is_a_warning_with_its_reason(case: Watched) -> None:
+    look = Look(case.image)
+    (main,) = (m for m in ("velocity", "frequency", "speed") if f"{DRIVE}/actual/{m}" in case.image.index)
+    point = f"{DRIVE}/actual/{main}"
+    assert list(of_meaning(look, DRIVE, main)) == []
+    case.set(point, 0.0, Quality.STALE, "no TPDO")
+    assert list(of_meaning(look, DRIVE, main)) == []
+    case.set(point, 0.0, Quality.DISABLED, "")
+    assert list(of_meaning(look, DRIVE, main)) == []
+    case.set(point, 0.0, Quality.DISABLED, "P1 is 2")
+    facts = (("value", main), ("why", "P1 is 2"))
+    assert list(of_meaning(look, DRIVE, main)) == [Trouble(Rank.WARNING, "no_actual", DRIVE, facts)]
+
+
+def test_a_bus_is_silent_where_none_of_several_nodes_answers() -> None:
+    drive = sites.drive("fu1", "none", 0)
+    nodes = sites.node(drive, name="a", node_id=2), sites.node(drive, name="b", node_id=3)
+    case = Watched(sites.site(sites.bus(*nodes)))
+    look = Look(case.image)
+    codes = {label: number for number, label in case.image.points[case.image.index["a/node/state"]].states}
+
+    def silent(a: str, b: str) -> list[Trouble]:
+        case.set("a/node/state", codes[a])
+        case.set("b/node/state", codes[b])
+        return list(silence_of(look, "can0", ("a", "b")))
+
+    assert silent("lost", "absent") == [Trouble(Rank.ALARM, "bus_silent", BUS, (("nodes", 2),))]
+    assert silent("lost", "operational") == []
+    assert silent("disabled", "stopped") == []
+    assert silent("lost", "disabled") == []
+    case.set(f"{BUS}/state", 2)
+    assert silent("lost", "disabled") == [Trouble(Rank.ALARM, "bus_silent", BUS, (("nodes", 1),))]
+
+
+def test_fronts_that_fail_are_a_warning_of_the_bridge(case: Watched) -> None:
+    assert list(of_bridge(Look(case.image))) == []
+    case.set("bridge/fronts_failing", "opcua")
+    found = Trouble(Rank.WARNING, "fronts_failing", "bridge", (("fronts", "opcua"),))
+    assert list(of_bridge(Look(case.image))) == [found]

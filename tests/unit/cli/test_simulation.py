@@ -9,7 +9,7 @@ import typer
 
 from bridge.cli.simulation import habits_of, simulated_nodes
 from bridge.config import load_site
-from bridge.sim.nord_tu4 import NordTu4
+from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support import sites
 
 

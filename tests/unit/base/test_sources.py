@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.northbound.sources import source_of
+from bridge.base.sources import source_of
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from bridge.northbound.notices import teller
+from bridge.base.notices import teller
 
 
 def test_a_notice_says_who_did_what(caplog: pytest.LogCaptureFixture) -> None:

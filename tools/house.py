@@ -48,7 +48,7 @@ class House:
     def rows(self) -> Iterator[Row]:
         phrases = self.phrases()
         yield Row("sentences matched to be translated, with slots", f"{phrases[0]}, {phrases[1]}", "0")
-        yield Row("attributes of Follow", _shown(self.attributes("Follow")), "one state")
+        yield Row("attributes of the stop check of a drive", _shown(self.attributes("DriveStopCheck")), "5")
         yield Row("calls node and master → plant", f"{self.calls_of_plant()}", "0")
         yield Row("files that name Plant", f"{len(self.naming('Plant'))}", "at most 12")
         yield Row("parameters of Drive.__init__", _shown(self.parameters("Drive")), "at most 6")

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Draw the table of the controller leg from the code into docs/explanation/dead-man-chain.md.
+"""Draw the tables of the controller leg and of the judge of stops into docs/explanation/dead-man-chain.md.
 
     .venv/bin/python -m tools.state_table
 
-What stands between the two marks is replaced; a test fails where it is not up to date.
+What stands between the marks is replaced; a test fails where it is not up to date.
 """
 
 from __future__ import annotations
@@ -14,11 +14,15 @@ from typing import Final
 
 from bridge.command.leg.state import ANY_TRIP, MEANING, NORMAL, STARTING, Stage
 from bridge.command.leg.table import TABLE, Deed, Stimulus
+from bridge.command.stop_check import table as judge
+from bridge.command.stop_check.state import PLACES, LastStop, Place
 from tools.marks import replaced
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "dead-man-chain.md"
 BEGIN: Final = "<!-- drawn by tools/state_table.py: begin -->"
 END: Final = "<!-- drawn by tools/state_table.py: end -->"
+JUDGE_BEGIN: Final = "<!-- judge drawn by tools/state_table.py: begin -->"
+JUDGE_END: Final = "<!-- judge drawn by tools/state_table.py: end -->"
 PARTS: Final = {
     "Neither tripped nor in a start": NORMAL,
     "While a start goes on": STARTING,
@@ -38,6 +42,32 @@ def tables() -> str:
     return "\n\n".join(parts)
 
 
+def judge_tables() -> str:
+    """The places of a stop; then what each event makes of the place, and each finding of the outcome."""
+    places = _table([["place", "what it is"], *([f"**{place}**", PLACES[place]] for place in Place)])
+    news = [[news.value, *(_place(place, news) for place in Place)] for news in judge.News]
+    outcomes = [LastStop.FORWARDED, LastStop.FOLLOWED, LastStop.IGNORED]
+    found = [[finding.value, *(_outcome(one, finding) for one in outcomes)] for finding in judge.Finding]
+    return "\n\n".join(
+        (
+            places,
+            _table([["event", *Place], *news]),
+            _table([["what is found of a stop on the bus", *(one.label for one in outcomes)], *found]),
+        )
+    )
+
+
+def _place(place: Place, news: judge.News) -> str:
+    after, deed = judge.PLACE_TABLE[place, news]
+    return deed.value if after is place else f"→ **{after}**: {deed}"
+
+
+def _outcome(outcome: LastStop, finding: judge.Finding) -> str:
+    after, says = judge.OUTCOME_TABLE[outcome, finding]
+    shown = "; ".join(says) or judge.Deed.NOTHING.value
+    return shown if after is outcome else f"→ **{after.label}**: {shown}"
+
+
 def _table(rows: Iterable[list[str]]) -> str:
     first, *others = rows
     return "\n".join(f"| {' | '.join(row)} |" for row in (first, ["---"] * len(first), *others)).replace(
@@ -53,7 +83,7 @@ def _cell(stage: Stage, stimulus: Stimulus) -> str:
 
 def drawn(text: str) -> str:
     """``text`` of a page with the tables as they are now. Raises ValueError where the page has no marks."""
-    return replaced(text, BEGIN, END, tables())
+    return replaced(replaced(text, BEGIN, END, tables()), JUDGE_BEGIN, JUDGE_END, judge_tables())
 
 
 if __name__ == "__main__":

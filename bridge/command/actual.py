@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
+from bridge.command.stop_check.drive import DriveStopCheck
 from bridge.drive import DriveState, Lack, ParameterSet, ValueCodec, codecs
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Meaning, Slot
@@ -54,7 +54,7 @@ class ActualData:
         self,
         channel: DriveChannel,
         slot: Slot,
-        following: Following,
+        stop_check: DriveStopCheck,
         image: Image,
         on_code: Callable[[Meaning, int, float], None],
     ) -> None:
@@ -67,7 +67,7 @@ class ActualData:
         self._codes_told: list[int] = []
         self._image = image
         self._channel = channel
-        self._following = following
+        self._stop_check = stop_check
         self._has_followers = any(value.follows for value in family.values_of(slot))
         self._process = family.process.tpdo
         self._set = ParameterSet(family.status_word.parameter_set_bits)
@@ -186,7 +186,7 @@ class ActualData:
         held, channel = self.words, self._channel
         if self._has_followers:
             channel.on_actual_words(words, now)
-        self._following.before_pdo(now)
+        self._stop_check.before_pdo(now)
         has_new_status = words[0] != held[0]
         if (words[0] ^ held[0]) & self._set.mask:
             self._use(words[0])
@@ -203,7 +203,7 @@ class ActualData:
 
     def on_unchanged_data(self, now: float) -> None:
         """A TPDO that says what the last one said."""
-        self._following.before_pdo(now)
+        self._stop_check.before_pdo(now)
         self._channel.on_unchanged(now)
         self._judge_stop(now)
         if self.quality is not Quality.GOOD:
@@ -211,10 +211,10 @@ class ActualData:
 
     def _judge_stop(self, now: float) -> None:
         """By the TPDO that has just come."""
-        self._following.after_pdo(now)
+        self._stop_check.after_pdo(now)
         if self._channel.leg.drive is DriveState.OPERATION_ENABLED:
             speed = None if self._speed is None else float(self._speed.from_words(self.words))
-            self._following.on_telegram(now, speed)
+            self._stop_check.on_telegram(now, speed)
 
     def refresh(self, now: float) -> None:
         channel = self._channel

@@ -133,7 +133,7 @@ class Device:
         """The link does not know of the TPDO yet."""
         told = [(ref, values[entry] & mask) for entry, ref, mask in heard.told]
         outputs, last, deadline_s = self.outputs, heard.link.last_pdo, heard.pdo.deadline_s
-        if outputs is not None and (outputs.following.is_owed or told != heard.told_values):
+        if outputs is not None and (outputs.stop_check.is_owed or told != heard.told_values):
             is_late = last is not None and deadline_s is not None and now - last > deadline_s
             outputs.on_told(told, now, after_pause=is_late)
         heard.told_values = told

@@ -10,14 +10,14 @@ from bridge.command.actual import ActualData
 from bridge.command.commanded import Commanded
 from bridge.command.deadlines import NOW
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.follow import Verdict
-from bridge.command.following import Following
 from bridge.command.link import FurtherTpdo
 from bridge.command.meaning_news import MeaningNews
 from bridge.command.messages.event import Event
 from bridge.command.messages.life_sign import LEAF as LIFE_SIGN
 from bridge.command.messages.request import Identity
 from bridge.command.setpoint_doubts import InForce, in_force
+from bridge.command.stop_check.drive import DriveStopCheck
+from bridge.command.stop_check.state import Verdict
 from bridge.command.worst_case import StopTime, Wire, stop_time
 from bridge.config import BusTable, DriveTable, NodeTable
 from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
@@ -98,7 +98,7 @@ class Drive(Commanded):
             tripped=tripped,
             due=due,
         )
-        self.following = Following(self.channel)
+        self.stop_check = DriveStopCheck(self.channel)
         self.identification = Identification()
         self.own: OwnJudgement | None = None
         """What it does by itself when the bridge falls silent; None until the boot-up has read it, and empty
@@ -108,7 +108,7 @@ class Drive(Commanded):
         self.given_parameters = table.parameters
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
-        self._actual = ActualData(self.channel, self.slot, self.following, image, self._on_code)
+        self._actual = ActualData(self.channel, self.slot, self.stop_check, image, self._on_code)
         # What its node brings, which is not looked at here.
         self.on_process_data = self._actual.on_process_data
         self.on_unchanged_data = self._actual.on_unchanged_data
@@ -284,36 +284,36 @@ class Drive(Commanded):
 
     # time
 
-    def on_time(self, now: float) -> list[Verdict]:
+    def on_time(self, now: float) -> Sequence[Verdict]:
         """Let everything happen that is due by ``now``; how stops have ended. Call it when the bus has been
         drained."""
         self.channel.on_time(now)
-        verdicts = self.following.on_time(now)
+        verdicts = self.stop_check.on_time(now)
         if verdicts:
             self._refresh_follows(now)
         return verdicts
 
     def next_deadline(self, now: float) -> float | None:
         """When ``on_time`` is to be called; ``now`` where something is due already, None for never."""
-        at, of_stop = self.channel.next_deadline(now), self.following.next_deadline()
+        at, of_stop = self.channel.next_deadline(now), self.stop_check.next_deadline()
         if of_stop is None:
             return at
         return max(now, of_stop if at is None else min(at, of_stop))
 
     def on_handed_over(self, now: float) -> None:
         """What the channel puts out has been handed to the bus."""
-        self.following.on_handed_over(now, self.rpdo_period_ms, self.own)
+        self.stop_check.on_handed_over(now, self.rpdo_period_ms, self.own)
 
     def on_cut_off(self, now: float) -> None:
         """The bridge takes its node out of operation, with stopped words before it."""
-        self.following.on_cut_off(now, self.rpdo_period_ms, self.own)
+        self.stop_check.on_cut_off(now, self.rpdo_period_ms, self.own)
 
     # into the image
 
     def refresh(self, now: float) -> None:
         """Bring every point of the drive up to date; called when something about it has changed."""
         self.channel.due(NOW)
-        self.following.on_settled()
+        self.stop_check.on_settled()
         self._actual.refresh(now)
         self._refresh_command(now)
         self._refresh_supervision(now)
@@ -323,9 +323,9 @@ class Drive(Commanded):
         """As good as what the drive says; which stop that is about we know ourselves."""
         quality = self.channel.link.quality(now)
         reason = self.channel.link.reason(quality)
-        (follows, last_stop), following = self._follows, self.following
-        self._image.set(follows, following.follows, now, quality, reason)
-        self._image.set(last_stop, int(following.last_stop), now)
+        follows, last_stop = self._follows
+        self._image.set(follows, self.stop_check.follows, now, quality, reason)
+        self._image.set(last_stop, int(self.stop_check.last_stop), now)
 
     def _refresh_command(self, now: float) -> None:
         channel, image = self.channel, self._image

@@ -14,14 +14,14 @@ from typing import Final, NamedTuple
 from bridge.command.channel import Channel
 from bridge.command.commanded import Commanded
 from bridge.command.deadlines import NOW
-from bridge.command.follow import Verdict
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import Output as Sent
 from bridge.command.link import Link, NodeState
 from bridge.command.messages.event import Event, Kind
 from bridge.command.messages.request import Action, Code, Outcome, Reply, Request
-from bridge.command.output_following import Answer, OutputFollowing, Question, StoppedOutput
 from bridge.command.output_words import ACTIVE, OutputWords
+from bridge.command.stop_check.outputs import Answer, OutputStopCheck, Question, StoppedOutput
+from bridge.command.stop_check.state import Verdict
 from bridge.command.worst_case import StopTime, Wire, output_stop_time
 from bridge.config import BusTable, NodeTable, OutputsTable
 from bridge.drive import ControlWords, OwnJudgement
@@ -157,7 +157,7 @@ class Outputs(Commanded):
             tripped=tripped,
             due=due,
         )
-        self.following = OutputFollowing()
+        self.stop_check = OutputStopCheck()
         self._telling: dict[ObjectRef, Telling] = {}
         """Outputs that a TPDO of the node carries, too."""
         self.unserved: dict[ObjectRef, str] = {}
@@ -242,7 +242,7 @@ class Outputs(Commanded):
         """What the channel puts out has been handed to the bus."""
         way_s = self.rpdo_period_ms / 1000
         stopped = self._stopped()
-        self.following.on_handed_over(now, stopped, way_s=way_s, bound_s=self._bound_s(stopped, way_s))
+        self.stop_check.on_handed_over(now, stopped, way_s=way_s, bound_s=self._bound_s(stopped, way_s))
         self._judged(now)
 
     def _stopped(self) -> list[StoppedOutput]:
@@ -266,15 +266,15 @@ class Outputs(Commanded):
         return _DEADLINES * max(deadlines, default=0.0) + way_s + _TAKEN_S
 
     def on_answer(self, question: Question, answer: Answer, now: float) -> None:
-        """What came of a question of ``following``."""
-        self.following.on_answer(question, answer, now)
+        """What came of a question of ``stop_check``."""
+        self.stop_check.on_answer(question, answer, now)
         self._judged(now)
 
     def on_told(self, values: Sequence[tuple[ObjectRef, int]], now: float, *, after_pause: bool) -> None:
         """A TPDO holds these outputs, as integers without sign. ``after_pause``: later than it may."""
         if after_pause:
-            self.following.on_pause(now)
-        self.following.on_told(values, now)
+            self.stop_check.on_pause(now)
+        self.stop_check.on_told(values, now)
         self._judged(now)
 
     def _judged(self, now: float) -> None:
@@ -286,10 +286,10 @@ class Outputs(Commanded):
     def on_time(self, now: float) -> Sequence[Verdict]:
         """Let everything happen that is due by ``now``; how stops have ended."""
         self.channel.on_time(now)
-        return self.following.take_verdicts()
+        return self.stop_check.take_verdicts()
 
     def next_deadline(self, now: float) -> float | None:
-        at, of_stop = self.channel.next_deadline(now), self.following.next_deadline()
+        at, of_stop = self.channel.next_deadline(now), self.stop_check.next_deadline()
         return at if of_stop is None else now
 
     # into the image
@@ -303,7 +303,7 @@ class Outputs(Commanded):
             self.words.take(channel.output.words[1:])
         sent = channel.on_wire(channel.output)
         is_there = channel.link.node is NodeState.OPERATIONAL
-        self.following.on_settled(None if is_active else sent, is_there=is_there)
+        self.stop_check.on_settled(None if is_active else sent, is_there=is_there)
         self._refresh_follows(now)
         quality = channel.link.quality(now)
         for place, index in self._points:
@@ -332,10 +332,10 @@ class Outputs(Commanded):
 
     def _refresh_follows(self, now: float) -> None:
         """Which stop that is about we know ourselves, and why it is not followed."""
-        following, link = self.following, self.channel.link
+        check, link = self.stop_check, self.channel.link
         quality = link.quality(now)
-        self._image.set(self._follows, following.follows, now, quality, link.reason(quality))
-        self._image.set(self._last_stop, int(following.last_stop), now, Quality.GOOD, following.why)
+        self._image.set(self._follows, check.follows, now, quality, link.reason(quality))
+        self._image.set(self._last_stop, int(check.last_stop), now, Quality.GOOD, check.why)
 
     def look(self, now: float) -> None:
         """Bring to this moment what changes by itself."""

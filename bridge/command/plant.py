@@ -19,7 +19,7 @@ from bridge.command.audit import AuditTrail, Rejection
 from bridge.command.deadlines import Deadlines
 from bridge.command.device import Device
 from bridge.command.drive import Drive
-from bridge.command.ignored import conclude
+from bridge.command.ignored_stop import concluded
 from bridge.command.link import NodeState
 from bridge.command.messages.event import Event, EventGate, Kind
 from bridge.command.messages.request import (
@@ -36,6 +36,7 @@ from bridge.command.messages.request import (
 from bridge.command.node import Enforce, Node
 from bridge.command.outputs import Outputs
 from bridge.command.points import CONNECTION_COUNTS, NODE_CODES, site_points
+from bridge.command.stop_check.state import Verdict
 from bridge.config import Site
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family
@@ -294,8 +295,15 @@ class Plant:
         whoever ignores its stop."""
         for one in self._deadlines.take_due(now):
             for verdict in one.on_time(now):
-                node = self.nodes[one.node_name]
-                conclude(node, one, verdict, now, self.report, self.audit, enforce)
+                self._conclude(one, verdict, now, enforce)
+
+    def _conclude(self, one: Drive | Outputs, verdict: Verdict, now: float, enforce: Enforce) -> None:
+        conclusion = concluded(self.nodes[one.node_name], one, verdict, now)
+        self.audit.stop_ended(one.name, verdict.outcome.label, conclusion.logged, now)
+        if conclusion.event is not None:
+            self.report(conclusion.event)
+        if conclusion.action is not None:
+            enforce(one.node_name, conclusion.action, f"the bridge: {one.name} ignores its stop", now)
 
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""
@@ -323,7 +331,7 @@ class Plant:
         """
         self._changed[node.bus.name].add(node.name)
         drive.refresh(now)
-        if drive.following.awaits_sending:
+        if drive.stop_check.awaits_sending:
             self.unsent_stops.add(drive)
         self._show_node(node, node.drives, node.drives[0].channel.link.node, now)
 
@@ -331,7 +339,7 @@ class Plant:
         """Something about the outputs of a node has changed."""
         self._changed[node.bus.name].add(node.name)
         outputs.refresh(now)
-        if outputs.following.awaits_sending:
+        if outputs.stop_check.awaits_sending:
             self.unsent_stops.add(outputs)
         self._show_node(node, [outputs], outputs.channel.link.node, now)
 

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any, Final
 
-from bridge.command import follow
 from bridge.command.leg.state import WATCHDOG_STATES
 from bridge.command.link import NodeState
 from bridge.command.messages.life_sign import LEAF as LIFE_SIGN
 from bridge.command.parameter_points import parameter_points
+from bridge.command.stop_check.state import LAST_STOPS
 from bridge.condition.told import CONDITIONS
 from bridge.config import BusTable, DriveTable, NodeTable, Site
 from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec, scales_of
@@ -222,7 +222,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
         point(
             "follows", _FLAG, "false while the drive still reports enabled after the bound of its last stop"
         ),
-        point("last_stop", _U8, "how the last stop ended", states=follow.LAST_STOPS),
+        point("last_stop", _U8, "how the last stop ended", states=LAST_STOPS),
         point("telegrams", _U16, "counts the owner's valid telegrams, modulo 65536"),
         point("sdo_abort_code", _U32, _ABORT_CODE),
     ]

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from bridge.command import Action, Drive, Plant
-from bridge.command.follow import LastStop
 from bridge.command.node import Enforce
 from bridge.command.outputs import Outputs
+from bridge.command.stop_check.state import LastStop
 from bridge.image import Quality
 
 
@@ -50,7 +50,7 @@ class Ending:
 def waits_for(plant: Plant) -> bool:
     """Whether something whose node is in operation is not known yet to follow its stop, and may be."""
     return any(
-        one.following.is_judged and not _has_followed(one) and not _is_unproven(one)
+        one.stop_check.is_judged and not _has_followed(one) and not _is_unproven(one)
         for one in plant.commanded
     )
 
@@ -64,14 +64,14 @@ def end(plant: Plant, now: float, enforce: Enforce, *, can_send: bool = True) ->
     unheard = [
         one.name
         for one in left
-        if one not in unproven and not (one.following.is_judged and _has_followed(one))
+        if one not in unproven and not (one.stop_check.is_judged and _has_followed(one))
     ]
     return Ending(
         len(plant.drives),
         len(plant.commanded) - len(plant.drives),
         tuple(one.name for one in ignoring),
         tuple(unheard),
-        tuple(f"{one.name} ({one.following.why})" for one in unproven),
+        tuple(f"{one.name} ({one.stop_check.why})" for one in unproven),
         tuple(dict.fromkeys(_stopped(ignoring, now, enforce))),
     )
 
@@ -80,22 +80,22 @@ def _stopped(ignoring: Sequence[Drive | Outputs], now: float, enforce: Enforce) 
     why = "the bridge at its end: {} does not follow its stop"
     for one in ignoring:
         if one.table.reacts_to_ignored_stop != "report":
-            if one.following.is_judged:
+            if one.stop_check.is_judged:
                 enforce(one.node_name, Action.STOP_NODE, why.format(one.name), now)
             yield one.node_name
 
 
 def _has_followed(one: Drive | Outputs) -> bool:
-    return one.following.last_stop is LastStop.FOLLOWED
+    return one.stop_check.last_stop is LastStop.FOLLOWED
 
 
 def _is_unproven(one: Drive | Outputs) -> bool:
     """The node has refused to let the outputs be read: nothing more will be known of them."""
-    return isinstance(one, Outputs) and one.following.is_stuck
+    return isinstance(one, Outputs) and one.stop_check.is_stuck
 
 
 def _ignores(one: Drive | Outputs) -> bool:
     if isinstance(one, Outputs):
-        return not one.following.follows
-    is_heard = one.following.is_judged and one.quality is Quality.GOOD
-    return not one.following.follows or (is_heard and not _has_followed(one))
+        return not one.stop_check.follows
+    is_heard = one.stop_check.is_judged and one.quality is Quality.GOOD
+    return not one.stop_check.follows or (is_heard and not _has_followed(one))

@@ -345,7 +345,7 @@ class Network:
         for node in self.nodes:
             for one in node.node.commanded:
                 is_sent = node.sends_process_data and node.wire.carries(one)
-                if one in unsent and (is_sent or not one.following.awaits_sending):
+                if one in unsent and (is_sent or not one.stop_check.awaits_sending):
                     self._plant.on_handed_over(one, now)
                     self._schedule.plan(node)
 

@@ -2,7 +2,7 @@
 
 What stops a drive is its stopped word: NMT stop does not stop those of every family. So the command goes
 out when the words have been taken over, and a drive that cannot say any more whether it has stopped is
-told of (``command/follow.py``).
+told of (``command/stop_check/step.py``).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Leaving:
     def has_told(self, now: float) -> bool:
         """Whatever gets process data has had stopped words for long enough to take them over."""
         told = [one for one in self._node.commanded if self._wire.carries(one)]
-        return all(one.following.told_for_s(now) >= self.takeover_s for one in told)
+        return all(one.stop_check.sent_for_s(now) >= self.takeover_s for one in told)
 
     def send(self, command: NmtCommand, now: float, *, at_once: bool = False) -> None:
         """A command after which the node takes no words: when it has taken over the stopped ones.
@@ -80,14 +80,14 @@ class Leaving:
         if state is NmtState.STOPPED and self.is_stopped_by_nmt:
             self._memory.is_at_rest = True
             for drive in self._node.drives:
-                drive.following.on_node_stopped(now)
+                drive.stop_check.on_node_stopped(now)
 
     def on_restart(self) -> None:
         """The node has started: whatever it was told before is over."""
         self.forget()
         self.owed.settle()
         for drive in self._node.drives:
-            drive.following.on_restart()
+            drive.stop_check.on_restart()
 
     def forget(self) -> None:
         self._wire.put_off.clear()

@@ -8,9 +8,9 @@ here.
 from __future__ import annotations
 
 from bridge.command.drive import Drive
-from bridge.command.follow import LastStop
 from bridge.command.node import Node
 from bridge.command.outputs import Outputs
+from bridge.command.stop_check.state import LastStop
 
 
 class OwedStop:
@@ -45,4 +45,4 @@ def _enables(one: Drive | Outputs) -> bool:
 
 
 def _has_followed(one: Drive | Outputs) -> bool:
-    return one.following.last_stop is LastStop.FOLLOWED
+    return one.stop_check.last_stop is LastStop.FOLLOWED

@@ -1,7 +1,7 @@
 """Reads the outputs of a node that is no drive: whether they have what the last stop gives them.
 
-``command/output_following.py`` says when, and what it means. One is asked for after the other, so that other
-transfers get their turn.
+``command/stop_check/outputs.py`` says when, and what it means. One is asked for after the other,
+so that other transfers get their turn.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import Final
 
 from bridge.canopen import abort, width
 from bridge.canopen.sdo import Result, SdoError
-from bridge.command.output_following import Answer, Question, StoppedOutput
 from bridge.command.outputs import Outputs
+from bridge.command.stop_check.outputs import Answer, Question, StoppedOutput
 from bridge.node.places.sdo_channels import FIRST, SdoChannels
 
 _EXPEDITED: Final = 4
@@ -28,11 +28,11 @@ class ReadBack:
         self.now = 0.0
 
     def next_deadline(self) -> float | None:
-        return self._outputs.following.next_reading()
+        return self._outputs.stop_check.next_reading()
 
     def on_time(self, now: float) -> None:
         self.now = now
-        question = self._outputs.following.question(now)
+        question = self._outputs.stop_check.question(now)
         if question is not None:
             ref = question.output.object
             self._sdo.read(ref.index, ref.sub, now, partial(self._done, question))

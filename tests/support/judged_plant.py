@@ -5,8 +5,8 @@ from __future__ import annotations
 from bridge.command import Action, Event, Request, command_of
 from bridge.command.audit import AuditEntry
 from bridge.command.drive import Drive
-from bridge.command.follow import LastStop
 from bridge.command.link import NodeState
+from bridge.command.stop_check.state import LastStop
 from bridge.image import Value
 from tests.support import sites
 from tests.support.leg_words import NORD_TU4, LegWords
@@ -60,12 +60,12 @@ class JudgedPlant:
 
     def restarts(self) -> None:
         """The node, by itself or by command."""
-        self.drive.following.on_restart()
+        self.drive.stop_check.on_restart()
         self.node(NodeState.BOOTING)
         self.node(NodeState.OPERATIONAL)
 
     def _settle(self) -> None:
-        if self.drive.following.awaits_sending:
+        if self.drive.stop_check.awaits_sending:
             self.plant.on_handed_over(self.drive, self.now)
 
     # the drive
@@ -129,7 +129,7 @@ class JudgedPlant:
 
     @property
     def last_stop(self) -> LastStop:
-        return self.drive.following.last_stop
+        return self.drive.stop_check.last_stop
 
     @property
     def told(self) -> list[tuple[int, str]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge.command import Action, Identity, Source
-from bridge.command.follow import LastStop
+from bridge.command.stop_check.state import LastStop
 from tests.support.bench import Bench
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
 from tests.support.pdo_node import PdoNode

@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
-from bridge.command.follow import Bounds, Follow, LastStop, Says, Sent, Verdict
+from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, Verdict
+from tests.support.judge import Judge
 
 STEP_S = 1 / 16
 PAUSE_S = 1 / 8
@@ -48,7 +49,7 @@ class Play:
     """The judge is asked at each step."""
     bounds: Bounds = BOUNDS
     now: float = 0.0
-    follow: Follow = field(default_factory=Follow)
+    follow: Judge = field(default_factory=Judge)
     drive: Says = Says.ENABLED
     is_mute: bool = False
     heard_at: float | None = None

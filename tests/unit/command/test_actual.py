@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.command import Action, Drive
-from bridge.command.follow import LastStop
 from bridge.command.link import FurtherTpdo, NodeState
+from bridge.command.stop_check.state import LastStop
 from bridge.image import Quality, Reading, Value
 from tests.support import sites
 from tests.support.rig import ENABLED, FAULT, HALF_SPEED, INHIBITED, READY
@@ -241,7 +241,7 @@ def stopped(deadline_s: float = 0.1) -> Hall:
 
 
 def last_stop(hall: Hall) -> LastStop:
-    return hall.drive.following.last_stop
+    return hall.drive.stop_check.last_stop
 
 
 @pytest.mark.parametrize("word", [READY, INHIBITED, FAULT])

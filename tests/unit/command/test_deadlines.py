@@ -9,10 +9,10 @@ import pytest
 
 from bridge.command.deadlines import Deadlines
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.following import Following
 from bridge.command.link import NodeState
 from bridge.command.messages.event import Event, Kind
 from bridge.command.plant import Plant
+from bridge.command.stop_check.drive import DriveStopCheck
 from bridge.config import load_site
 from tests.support import sites
 from tests.support.rig import ENABLED, INHIBITED, READY, Rig
@@ -206,10 +206,10 @@ class Told:
         self.channel: DriveChannel = self.rig.channel
         self.times: list[float] = []
         self.channel.due = self.times.append
-        self.following = Following(self.channel)
+        self.stop_check = DriveStopCheck(self.channel)
 
     def earliest(self, now: float) -> float:
-        times = self.channel.link.next_deadline(), self.following.next_deadline()
+        times = self.channel.link.next_deadline(), self.stop_check.next_deadline()
         return min((max(at, now) for at in times if at is not None), default=inf)
 
 
@@ -217,7 +217,7 @@ class Told:
 def test_whoever_brings_a_deadline_forward_tells(seed: int) -> None:
     """Of the drive's link and of its stops; what changes the leg settles."""
     chance, told = random.Random(seed), Told()
-    channel, following, now = told.channel, told.following, 100.0
+    channel, following, now = told.channel, told.stop_check, 100.0
     channel.on_node(NodeState.OPERATIONAL, now)
     words = (INHIBITED, READY, ENABLED, 0x0B17)
 

@@ -11,7 +11,7 @@ import pytest
 
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Event, Identity, Outcome, Request, Role, Source, Start
-from bridge.command.follow import LastStop
+from bridge.command.stop_check.state import LastStop
 from bridge.config import load_site
 from bridge.mapping import load_family
 from bridge.sim.catalogue import simulate_node
@@ -173,7 +173,7 @@ def worst(bench: Bench) -> list[Event]:
 def named(bench: Bench) -> bool:
     drive = next(iter(bench.plant.drives.values()))
     is_said = [event.source for event in worst(bench)] == [drive.name]
-    return is_said and not drive.following.follows and drive.following.last_stop is LastStop.IGNORED
+    return is_said and not drive.stop_check.follows and drive.stop_check.last_stop is LastStop.IGNORED
 
 
 def leaves_at(bench: Bench) -> list[float]:
@@ -217,8 +217,8 @@ def test_who_says_in_time_that_it_follows_is_not_named(tmp_path: Path, mapping: 
     (drive, *_) = bench.plant.drives.values()
     CALLERS["operator's stop"](bench)
     bench.run(3.0)
-    if drive.following.last_stop is LastStop.FOLLOWED:
-        assert not worst(bench) and drive.following.follows
+    if drive.stop_check.last_stop is LastStop.FOLLOWED:
+        assert not worst(bench) and drive.stop_check.follows
     else:
         assert named(bench) and "may run on" in worst(bench)[0].message
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Action, Outcome, Request, Start
-from bridge.command.follow import LastStop
+from bridge.command.stop_check.state import LastStop
 from bridge.config import load_site
 from bridge.drive import ControlWords, DriveState
 from bridge.mapping import load_family
@@ -56,9 +56,9 @@ def test_every_family_follows_every_stop(tmp_path: Path, mapping: str) -> None:
         bench.run(0.8)
         assert drive.channel.state is DriveState.OPERATION_ENABLED
         bench.ask(stop, drive.name)
-        assert drive.following.last_stop is LastStop.FORWARDED
+        assert drive.stop_check.last_stop is LastStop.FORWARDED
         bench.run(2.5)
-        assert drive.following.last_stop is LastStop.FOLLOWED, stop
+        assert drive.stop_check.last_stop is LastStop.FOLLOWED, stop
     assert max(event.severity for event in bench.events) < 1000
 
 

@@ -244,7 +244,7 @@ def test_in_every_stage_the_drive_is_stopped_first(tmp_path: Path, stage: str, c
     begin = bench.now
     bench.run(ENOUGH_S)
     assert bench.value("bus/can0/passive") is True
-    has_followed = drive.following.last_stop.label == "followed"
+    has_followed = drive.stop_check.last_stop.label == "followed"
     assert stopped_and_left(bench, begin) or has_followed
     bench.run(3.0)
     assert bench.node.drives[0].output_hz == 0

@@ -10,8 +10,8 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
 from bridge.command import Action, Event, Identity, Kind, Role, Source
 from bridge.command.audit import AuditEntry
-from bridge.command.follow import LastStop
 from bridge.command.link import NodeState
+from bridge.command.stop_check.state import LastStop
 from bridge.image import Quality
 from bridge.master.ending import end, waits_for
 from tests.support.bench import Bench, write_site

@@ -8,7 +8,7 @@ import pytest
 
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.command import Action, Drive
-from bridge.command.follow import LastStop
+from bridge.command.stop_check.state import LastStop
 from bridge.node.boot import BootMemory
 from bridge.node.leaving import Leaving
 from bridge.node.put_off import PutOff
@@ -217,7 +217,7 @@ def test_one_drive_that_has_been_told_does_not_speak_for_the_others() -> None:
     node = Node(NORD_TU4, "fu1", "fu2")
     node.line.enables()
     node.line.asks(Action.STOP)
-    assert node.line.drive.following.told_for_s(node.now + 10.0) > 0
+    assert node.line.drive.stop_check.sent_for_s(node.now + 10.0) > 0
     assert not node.leaving.has_told(node.now + 10.0)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from bridge.command import Action
 from bridge.command.audit import AuditEntry
-from bridge.command.follow import LastStop
+from bridge.command.stop_check.state import LastStop
 from bridge.condition.findings import Look, Rank, Trouble, of_node
 from bridge.image import Quality
 from bridge.project import load_project

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from bridge.command import Action
-from bridge.command.follow import LastStop
 from bridge.command.link import NodeState
+from bridge.command.stop_check.state import LastStop
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import Watch
 from tests.support.judged_plant import JudgedPlant
@@ -25,7 +25,7 @@ def named_after(line: JudgedPlant, bound_s: float) -> None:
     assert line.last_stop is LastStop.FORWARDED
     line.goes_on(bound_s + ABOUT_S)
     assert line.last_stop is LastStop.IGNORED
-    assert not line.drive.following.follows
+    assert not line.drive.stop_check.follows
 
 
 @pytest.mark.parametrize(
@@ -164,13 +164,13 @@ def test_a_node_that_says_that_it_is_stopped_or_starts_speaks_for_a_drive_that_w
     line = JudgedPlant().enables()
     line.asks(OFF)
     line.is_cut_off()
-    line.drive.following.on_node_stopped(line.now)
+    line.drive.stop_check.on_node_stopped(line.now)
     line.is_silent(10.0)
     assert line.last_stop is LastStop.FOLLOWED
     line = JudgedPlant().enables()
     line.asks(OFF)
     line.is_cut_off()
-    line.drive.following.on_restart()
+    line.drive.stop_check.on_restart()
     line.is_silent(10.0)
     assert line.last_stop is LastStop.FORWARDED
     assert not line.told

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Final
 
-from bridge.command.follow import LastStop, Verdict
+from bridge.command.stop_check.state import LastStop, Verdict
 from bridge.mapping.fields import ObjectRef
 
 _AGAIN_S: Final = 1.0
@@ -79,7 +79,7 @@ class _Seen:
     why: str = ""
 
 
-class OutputFollowing:
+class OutputStopCheck:
     """The outputs of one node, which have one owner and are stopped together. Times are monotonic seconds.
 
     ``follows`` is kept while the node is not in operation. ``why`` says why the stop is not followed, or not
@@ -129,7 +129,7 @@ class OutputFollowing:
         awaits = self._is_asking or self._read_at < inf or awaits_tpdo
         return self.last_stop is LastStop.FORWARDED and self.is_judged and not awaits
 
-    def told_for_s(self, now: float) -> float:
+    def sent_for_s(self, now: float) -> float:
         """For how long the stop has been on the bus; 0 where it is not, or not judged."""
         return 0.0 if self._since is None or self.awaits_sending else max(0.0, now - self._since)
 

@@ -3,53 +3,52 @@ NMT."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
-from bridge.command.audit import AuditTrail
 from bridge.command.drive import Drive
-from bridge.command.follow import LastStop, Verdict
 from bridge.command.messages.event import Event, Kind
 from bridge.command.messages.request import Action
-from bridge.command.node import Enforce, Node
+from bridge.command.node import Node
 from bridge.command.outputs import Outputs
+from bridge.command.stop_check.state import LastStop, Verdict
 
 _WORST: Final = 1000
 """The highest severity there is (OPC UA Part 5 §6.4.2)."""
 _WORDS: Final = {Action.STOP_NODE: "NMT stop", Action.RESET: "NMT reset node"}
 
 
-def conclude(
-    node: Node,
-    one: Drive | Outputs,
-    verdict: Verdict,
-    now: float,
-    tell: Callable[[Event], None],
-    audit: AuditTrail,
-    enforce: Enforce,
-) -> None:
-    """Report how its last stop ended, and stop the node if it ignores it."""
+@dataclass(frozen=True, slots=True)
+class Conclusion:
+    """Consequences of a verdict: ``logged`` goes to the audit log, ``event`` to people (None: it is of no
+    interest), and ``action`` is taken on the node in the bridge's own name."""
+
+    logged: str
+    event: Event | None = None
+    action: Action | None = None
+
+
+def concluded(node: Node, one: Drive | Outputs, verdict: Verdict, now: float) -> Conclusion:
+    """What follows from how the last stop of ``one`` has ended."""
     took_s = verdict.at - verdict.since
     if verdict.outcome is not LastStop.IGNORED:
-        audit.stop_ended(one.name, verdict.outcome.label, f"after {took_s:.3f} s", now)
-        if verdict.before is LastStop.IGNORED:
-            says = _heard(one) if isinstance(one, Drive) else "its outputs are as they are sent"
-            message = f"follows its stop after all: {says}"
-            tell(Event(now, Kind.WATCHDOG, one.name, 300, message))
-        return
-    action = _reaction(one, verdict)
+        logged = f"after {took_s:.3f} s"
+        if verdict.before is not LastStop.IGNORED:
+            return Conclusion(logged)
+        says = _heard(one) if isinstance(one, Drive) else "its outputs are as they are sent"
+        return Conclusion(logged, _event(one, 300, f"follows its stop after all: {says}", now))
     if verdict.is_cut_off and isinstance(one, Drive):
-        message = _cut_off(node, one, took_s)
-        audit.stop_ended(one.name, verdict.outcome.label, message, now)
-        tell(Event(now, Kind.WATCHDOG, one.name, _WORST, message))
         # What can be done has been done: its node has been told to stop, and takes no more words.
-        return
+        message = _cut_off(node, one, took_s)
+        return Conclusion(message, _event(one, _WORST, message, now))
+    action = _reaction(one, verdict)
     of_one = _of_drive(one, verdict, took_s) if isinstance(one, Drive) else _of_outputs(one, verdict, took_s)
     message = f"{of_one}; {_done(action, node, one)}"
-    audit.stop_ended(one.name, verdict.outcome.label, message, now)
-    tell(Event(now, Kind.WATCHDOG, one.name, _WORST, message))
-    if action is not None:
-        enforce(node.name, action, f"the bridge: {one.name} ignores its stop", now)
+    return Conclusion(message, _event(one, _WORST, message, now), action)
+
+
+def _event(one: Drive | Outputs, severity: int, message: str, now: float) -> Event:
+    return Event(now, Kind.WATCHDOG, one.name, severity, message)
 
 
 def _of_drive(drive: Drive, verdict: Verdict, took_s: float) -> str:
@@ -65,7 +64,7 @@ def _of_drive(drive: Drive, verdict: Verdict, took_s: float) -> str:
 
 
 def _of_outputs(outputs: Outputs, verdict: Verdict, took_s: float) -> str:
-    why = outputs.following.why
+    why = outputs.stop_check.why
     if verdict.before is LastStop.FOLLOWED:
         return f"has other outputs than it is sent: safe values are sent for {took_s:.2f} s, {why}"
     return f"ignores its stop: safe values are sent since {took_s:.2f} s, {why}"

@@ -6,7 +6,7 @@ from math import inf
 
 import pytest
 
-from bridge.command.unfollowed import StopTime, Unfollowed
+from bridge.command.stop_check.sums import StopTime, Unfollowed
 
 OFF_S, RAMP_S = 0.5, 32.0
 LIMIT_S = RAMP_S / 4

@@ -1,4 +1,4 @@
-"""Whether one drive does what its last stop asked: the judgement of ``Follow`` for the drive's words."""
+"""Stop check of one drive: what the judge is told of the drive's words, telegrams and node."""
 
 from __future__ import annotations
 
@@ -6,8 +6,22 @@ from typing import Final
 
 from bridge.command.deadlines import NOW
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.follow import Bounds, Follow, LastStop, Says, Sent, Verdict
 from bridge.command.link import NodeState
+from bridge.command.stop_check.event import (
+    CutOff,
+    Event,
+    HandedOver,
+    NodeOperational,
+    NodeRestarted,
+    NodeStopped,
+    Pause,
+    Report,
+    Sends,
+    Telegram,
+    Time,
+)
+from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopState, Verdict
+from bridge.command.stop_check.step import next_deadline, step
 from bridge.drive import MOVING, DriveState, OwnJudgement, OwnVerdict, StatusWords
 
 _DEADLINES: Final = 3
@@ -17,48 +31,48 @@ _CYCLE_S: Final = 0.1
 """From a word in the node to a telegram with another speed: through a bus interface, there and back."""
 
 
-class Following:
+class DriveStopCheck:
     """To be called on every change of the channel's output, of the drive's status word and of its node."""
 
     def __init__(self, channel: DriveChannel) -> None:
         self._channel = channel
-        self._follow = Follow()
+        self._state = StopState()
         self._output: tuple[int, bool] | None = None
         self._status_word: int | None = None
         self._words = StatusWords(channel.family.status_word)
 
     @property
     def follows(self) -> bool:
-        return self._follow.follows
+        return self._state.follows
 
     @property
     def last_stop(self) -> LastStop:
-        return self._follow.state
+        return self._state.last_stop
 
     @property
     def is_judged(self) -> bool:
         """A stop is on the bus, and the drive's node is in operation."""
-        return self._follow.is_judged
+        return self._state.is_judged
 
-    def told_for_s(self, now: float) -> float:
+    def sent_for_s(self, now: float) -> float:
         """For how long the stop has been on the bus; 0 if there is none, or that is not known."""
-        return self._follow.told_for_s(now)
+        return self._state.sent_for_s(now)
 
     @property
     def awaits_sending(self) -> bool:
-        return self._follow.awaits_sending
+        return self._state.awaits_sending
 
     # what we do
 
     def on_settled(self) -> None:
         """The channel has settled: another output, another state of the node."""
         channel = self._channel
-        self._follow.on_node(is_there=channel.link.node is NodeState.OPERATIONAL)
+        self._tell(NodeOperational(channel.link.node is NodeState.OPERATIONAL))
         words, silent = channel.output
         output = words[0], silent
         if output != self._output:
             self._output = output
-            self._follow.on_output(self._sent(*output))
+            self._tell(Sends(self._sent(*output)))
 
     def _sent(self, word: int, silent: bool) -> Sent:
         words = self._channel.words
@@ -71,22 +85,22 @@ class Following:
     def on_handed_over(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
         """What was to be sent has been handed to the bus. ``rpdo_period_ms`` is how long it may take to the
         drive, ``own`` what the drive does when we fall silent."""
-        self._follow.on_handed_over(now, self._bounds(rpdo_period_ms, own))
+        self._tell(HandedOver(now, self._bounds(rpdo_period_ms, own)))
         self._channel.due(NOW)
 
     def on_cut_off(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
         """The bridge takes the node out of operation: the drive will not be heard any more."""
-        self._follow.on_cut_off(now, self._bounds(rpdo_period_ms, own))
+        self._tell(CutOff(now, self._bounds(rpdo_period_ms, own)))
         self._channel.due(NOW)
 
     def on_node_stopped(self, now: float) -> None:
         """The node has said that it is in a state in which its drives do not run."""
-        self._follow.on_node_stopped(now)
+        self._tell(NodeStopped(now))
         self._channel.due(NOW)
 
     def on_restart(self) -> None:
         """The node has started: what it was told before is over."""
-        self._follow.on_restart()
+        self._tell(NodeRestarted())
 
     def _bounds(self, rpdo_period_ms: int, own: OwnJudgement | None) -> Bounds:
         channel = self._channel
@@ -112,23 +126,25 @@ class Following:
         link = self._channel.link
         last, deadline_s = link.last_pdo, link.pdo_deadline_s
         if last is not None and deadline_s is not None and now - last > deadline_s:
-            self._follow.on_pause(now)
+            self._tell(Pause(now))
             self._channel.due(NOW)
 
     def after_pdo(self, now: float) -> None:
         """The channel has the status word of the TPDO."""
         word = self._channel.drive_status_word
-        if word != self._status_word or not self._follow.is_informed:
+        if word != self._status_word or not self._state.is_informed:
             self._status_word = word
-            self._follow.on_report(self._says(word), now)
+            self._tell(Report(self._says(word), now))
             self._channel.due(NOW)
 
     def on_telegram(self, now: float, speed: float | None) -> None:
         """The TPDO that ``after_pdo`` knows, changed or not. ``speed`` is the actual speed or
         frequency in any unit, None where it is not known."""
-        before = self._follow.state
-        self._follow.on_telegram(now, speed)
-        if self._follow.state is not before:
+        if self._state.says is not Says.ENABLED:
+            return
+        before = self._state.last_stop
+        self._tell(Telegram(now, speed))
+        if self._state.last_stop is not before:
             self._channel.due(NOW)
 
     def _says(self, word: int) -> Says:
@@ -141,10 +157,16 @@ class Following:
 
     # time
 
-    def on_time(self, now: float) -> list[Verdict]:
+    def on_time(self, now: float) -> tuple[Verdict, ...]:
         """What has ended by ``now``; call it when the bus has been drained."""
         link = self._channel.link
-        return self._follow.on_time(now, link.last_pdo if link.is_heard else None, link.pdo_deadline_s)
+        heard_at = link.last_pdo if link.is_heard else None
+        self._state, verdicts = step(self._state, Time(now, heard_at, link.pdo_deadline_s))
+        return verdicts
 
     def next_deadline(self) -> float | None:
-        return self._follow.next_deadline()
+        return next_deadline(self._state)
+
+    def _tell(self, event: Event) -> None:
+        """No verdict comes of it: those are told when the bus has been drained."""
+        self._state, _ = step(self._state, event)

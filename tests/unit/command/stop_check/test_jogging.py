@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.command.follow import Bounds, Follow, LastStop, Says, Sent, Verdict
+from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, Verdict
+from tests.support.judge import Judge
 
 PAUSE_S = 0.1
 WAY_S = 0.02
@@ -73,7 +74,7 @@ class Jogged:
     def __init__(self, motor: Motor, tpdo_s: float, *, has_speed: bool = True) -> None:
         self.motor, self.tpdo_s, self.has_speed = motor, tpdo_s, has_speed
         self.now = 0.0
-        self.follow = Follow()
+        self.follow = Judge()
         self.said = Says.NOTHING
         self.tpdo_at = 0.0
         self.verdicts: list[Verdict] = []
@@ -286,3 +287,31 @@ def test_a_deaf_drive_is_named_within_the_bound_at_any_rhythm(
     most_s = bound_s(run_s, stop_s, SEEN_S, BOUNDS.ramp_s / 4, tpdo_s)
     jogged.jog(word, run_s, stop_s, jogged.now + most_s)
     assert len(jogged.ignored) == 1
+
+
+@pytest.mark.parametrize("has_begun_to_stop", [False, True])
+def test_who_is_named_by_a_sum_follows_after_the_short_bound(has_begun_to_stop: bool) -> None:
+    """Also where its first telegram after that says nothing that is known."""
+    jogged = Jogged(Motor(is_deaf=True), 0.05)
+    jogged.send(Sent.RAMP, STEP_S)
+    judge = jogged.follow
+    if has_begun_to_stop:
+        judge.on_report(Says.STOPPING, jogged.now)
+        judge.on_report(Says.ENABLED, jogged.now)
+    before = LastStop.FOLLOWED if has_begun_to_stop else LastStop.FORWARDED
+    while not jogged.ignored and jogged.now < BOUNDS.ramp_s:
+        jogged.now += 0.05
+        jogged.telegram()
+        jogged.verdicts += judge.on_time(jogged.now, jogged.now, PAUSE_S)
+    (verdict,) = jogged.ignored
+    assert verdict.before is before and verdict.summed is not None
+    judge.on_report(Says.AT_REST, jogged.now)
+    judge.on_report(Says.ENABLED, jogged.now)
+    assert judge.next_deadline() is None, "it does not follow any more"
+    judge.on_report(Says.NOTHING, jogged.now + 0.05)
+    judge.on_report(Says.AT_REST, jogged.now + 0.1)
+    assert judge.on_time(jogged.now + 0.1, jogged.now + 0.1, PAUSE_S) == []
+    at = jogged.now + 0.1 + BOUNDS.off_s
+    assert judge.on_time(at - STEP_S, at - STEP_S, PAUSE_S) == []
+    (verdict,) = judge.on_time(at, at, PAUSE_S)
+    assert (verdict.outcome, verdict.before) == (LastStop.FOLLOWED, LastStop.IGNORED)

@@ -1,0 +1,152 @@
+"""The judgement as two tables: what becomes of a stop on its way to the drive, and what is said of it then.
+
+The code asks these tables for what is next and for what is done; ``docs/explanation/dead-man-chain.md`` has
+them printed. What has to hold for a finding is decided in ``step``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from enum import StrEnum
+from typing import Final
+
+from bridge.command.stop_check.state import LastStop, Place
+
+_P, _L = Place, LastStop
+
+
+class News(StrEnum):
+    """Changes of the word, of the node or of the way to it."""
+
+    __hash__ = str.__hash__
+
+    ENABLES = "a word that enables is in force"
+    STOPS = "a stop is in force, the node is in operation"
+    STOPS_AWAY = "a stop is in force, the node is not in operation"
+    STOPS_OTHERWISE = "another stop is in force, the node is in operation"
+    STOPS_OTHERWISE_AWAY = "another stop is in force, the node is not in operation"
+    HANDED_OVER = "handed to the bus"
+    GONE = "node not in operation any more, not by the bridge"
+    BACK = "node in operation"
+    CUT_OFF = "bridge takes the node out of operation"
+    RESTARTED = "node that the bridge took out of operation has started anew"
+    PAUSE = "first telegram after a pause longer than the deadline"
+
+
+class Deed(StrEnum):
+    """What is done to the state beside the step to the next place."""
+
+    __hash__ = str.__hash__
+
+    NOTHING = "–"
+    FORGIVE = "forget the stop and its outcome"
+    BEGIN = "forwarded"
+    BEGIN_ANEW = "forget what was said, forwarded"
+    BOUND = "the bound begins"
+    CHANGE_BOUND = "the bound of the weaker word holds"
+    FORGET = "forget what was said"
+    LAST_REPORT = "judge by the last report"
+    BOUND_ANEW = "the bound begins anew"
+
+
+class Finding(StrEnum):
+    """What a telegram, or time without one, says of a stop that is on the bus."""
+
+    __hash__ = str.__hash__
+
+    FOLLOWS = "drive does what the stop asks"
+    BEGINS_TO_FOLLOW = "drive begins to do what the stop asks, after it was called ignored"
+    PUSHED = "drive that held the motor is enabled again, the word leaves the voltage on"
+    ENABLED_AGAIN = "drive is enabled again, the word leaves the voltage on"
+    RUNS_ON = "drive does not, within the bound"
+    RUNS_ON_LATE = "drive does not, after the bound"
+    SUMMED = "short stops have added up to a bound"
+    CALM = "drive has done what the stop asks for the short bound"
+
+
+class Say(StrEnum):
+    """What is noted or told; several in this order."""
+
+    __hash__ = str.__hash__
+
+    COUNT = "its time begins"
+    COUNT_NO_MORE = "its time is over"
+    REST = "not enabled: the short bound holds"
+    GRANT_RAMP = "the bound of a ramp begins"
+    GRANT_SHORT = "once, the short bound begins"
+    TELL = "tell"
+
+
+PlaceCell = tuple[Place, Deed]
+OutcomeCell = tuple[LastStop, tuple[Say, ...]]
+
+_STOPPED: Final = (_P.AWAY, _P.TO_SEND, _P.ON_BUS, _P.CHANGING)
+_JUDGED: Final = (_P.ON_BUS, _P.CHANGING)
+
+_PLACES: Final[Mapping[News, Mapping[Iterable[Place], tuple[Place | None, Deed]]]] = {
+    News.ENABLES: {_STOPPED: (_P.ENABLED, Deed.FORGIVE)},
+    News.STOPS: {(_P.ENABLED,): (_P.TO_SEND, Deed.BEGIN)},
+    News.STOPS_AWAY: {(_P.ENABLED,): (_P.AWAY, Deed.BEGIN)},
+    News.STOPS_OTHERWISE: {(_P.ON_BUS,): (_P.CHANGING, Deed.NOTHING)},
+    News.STOPS_OTHERWISE_AWAY: {(_P.CHANGING,): (_P.ON_BUS, Deed.NOTHING)},
+    News.HANDED_OVER: {
+        (_P.TO_SEND,): (_P.ON_BUS, Deed.BOUND),
+        (_P.CHANGING,): (_P.ON_BUS, Deed.CHANGE_BOUND),
+    },
+    News.GONE: {
+        (_P.TO_SEND,): (_P.AWAY, Deed.NOTHING),
+        _JUDGED: (_P.AWAY, Deed.FORGET),
+    },
+    News.BACK: {
+        (_P.ENABLED,): (None, Deed.FORGET),
+        (_P.AWAY, *_JUDGED): (_P.TO_SEND, Deed.BEGIN_ANEW),
+    },
+    News.CUT_OFF: {(_P.ON_BUS,): (None, Deed.LAST_REPORT)},
+    News.RESTARTED: {_JUDGED: (_P.AWAY, Deed.FORGET)},
+    News.PAUSE: {_JUDGED: (None, Deed.BOUND_ANEW)},
+}
+
+_OUTCOMES: Final[Mapping[Finding, Mapping[LastStop, OutcomeCell]]] = {
+    Finding.FOLLOWS: {
+        _L.FORWARDED: (_L.FOLLOWED, (Say.REST, Say.TELL)),
+        _L.FOLLOWED: (_L.FOLLOWED, (Say.REST,)),
+        _L.IGNORED: (_L.IGNORED, (Say.REST,)),
+    },
+    Finding.BEGINS_TO_FOLLOW: {_L.IGNORED: (_L.IGNORED, (Say.COUNT,))},
+    Finding.PUSHED: {_L.FOLLOWED: (_L.FOLLOWED, (Say.GRANT_RAMP,))},
+    Finding.ENABLED_AGAIN: {_L.FOLLOWED: (_L.FOLLOWED, (Say.GRANT_SHORT,))},
+    Finding.RUNS_ON: {_L.IGNORED: (_L.IGNORED, (Say.COUNT_NO_MORE,))},
+    Finding.RUNS_ON_LATE: {
+        _L.FORWARDED: (_L.IGNORED, (Say.TELL,)),
+        _L.FOLLOWED: (_L.IGNORED, (Say.TELL,)),
+        _L.IGNORED: (_L.IGNORED, (Say.COUNT_NO_MORE,)),
+    },
+    Finding.SUMMED: {
+        _L.FORWARDED: (_L.IGNORED, (Say.TELL,)),
+        _L.FOLLOWED: (_L.IGNORED, (Say.TELL,)),
+    },
+    Finding.CALM: {_L.IGNORED: (_L.FOLLOWED, (Say.TELL,))},
+}
+
+
+def _places() -> dict[tuple[Place, News], PlaceCell]:
+    table = {(place, news): (place, Deed.NOTHING) for place in Place for news in News}
+    for news, row in _PLACES.items():
+        for places, (after, deed) in row.items():
+            for place in places:
+                table[place, news] = (after or place, deed)
+    return table
+
+
+def _outcomes() -> dict[tuple[LastStop, Finding], OutcomeCell]:
+    table: dict[tuple[LastStop, Finding], OutcomeCell] = {
+        (outcome, finding): (outcome, ()) for outcome in LastStop for finding in Finding
+    }
+    for finding, row in _OUTCOMES.items():
+        for outcome, cell in row.items():
+            table[outcome, finding] = cell
+    return table
+
+
+PLACE_TABLE: Final = _places()
+OUTCOME_TABLE: Final = _outcomes()

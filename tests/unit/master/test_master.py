@@ -158,12 +158,14 @@ class MasterMachine(RuleBasedStateMachine):
 
     def wait_for_all(self) -> None:
         """Nobody resets a node: only who was taken out of service, or was given up as its ``on_loss`` asks,
-        is started."""
+        is started, and who is not supervised, whose restart may have gone unseen, is reset."""
         quick = self.quick
         for core in quick.network.nodes:
             gave_up = core.table.on_loss in ("stop_node", "nothing") and core.state is NodeState.LOST
             if core.is_out_of_service or gave_up:
                 quick.ask(Action.START_NODE, core.node.name)
+            elif core.table.supervision == "none":
+                quick.ask(Action.RESET, core.node.name)
         until = quick.now + LONGEST_BACK_OFF_S + 15.0
         while quick.states() != "ooooo" and quick.now < until:
             quick.run(5.0)

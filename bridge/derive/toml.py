@@ -35,7 +35,7 @@ def value(plain: Plain) -> str:
     if isinstance(plain, bool):
         return "true" if plain else "false"
     if isinstance(plain, str):
-        return json.dumps(plain).replace("\x7f", "\\u007f")
+        return json.dumps(plain, ensure_ascii=False).replace("\x7f", "\\u007f")
     if not math.isfinite(plain):
         raise ValueError(f"{plain} is no number for a file")
     return str(plain) if isinstance(plain, int) else repr(plain)

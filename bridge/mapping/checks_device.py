@@ -54,7 +54,7 @@ def check_signals(family: Family, file: MergedFile) -> None:
             _check_signal(one, (kind, n), file)
     for n, one in enumerate(family.output):
         try:
-            if one.on_expiry != "hold":
+            if one.factor and one.on_expiry != "hold":
                 one.encode(one.on_expiry)
         except ValueError as error:
             file.fault(("output", n, "on_expiry"), str(error))

@@ -44,8 +44,10 @@ class RemotePolling:
         for asked in self._asked:
             if asked.due <= now:
                 self._frames.append(asked.request)
-                # A late round asks once: what was missed is missed.
-                asked.due = max(asked.due + asked.period_s, now)
+                asked.due += asked.period_s
+                if asked.due <= now:
+                    # A late round asks once: what was missed is missed.
+                    asked.due = now + asked.period_s
 
     def take_frames(self) -> list[Frame]:
         frames, self._frames = self._frames, []

@@ -29,6 +29,7 @@ def test_the_block_itself_is_fine(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
+        ("factor = 0.1", "factor = 0", "output[1].factor: must not be 0"),
         ("factor = 0.1", "factor = 0.1\nlow = 5\nhigh = 1", "output[1].low: is above high, 1"),
         (
             "factor = 0.1",

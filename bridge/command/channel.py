@@ -32,6 +32,7 @@ from bridge.command.link import Link, NodeState
 from bridge.command.messages.event import Event, Kind
 from bridge.command.messages.request import Identity, Outcome, Reply, Request
 from bridge.image import Quality
+from bridge.text import Text
 
 
 class Channel:
@@ -259,22 +260,23 @@ class Channel:
                     self._on_let_go()
                 case Ignored():
                     self._on_ignored(now)
-                case Tell(kind=kind, severity=severity, message=message):
-                    self._tell(now, kind, severity, message)
+                case Tell(kind=kind, severity=severity, said=said):
+                    self._tell(now, kind, severity, said)
         return outcomes
 
     def _on_tripped(self, tripped: Tripped, now: float) -> None:
         self.trips += 1
-        silent = f"{tripped.who} was silent for {tripped.timeout_ms} ms"
-        self._tell(now, Kind.WATCHDOG, 900, f"{silent}: {self._reaction()}")
+        who, reaction = str(tripped.who), self._reaction()
+        said = Text.of("watchdog.tripped", who=who, timeout_ms=tripped.timeout_ms, reaction=reaction)
+        self._tell(now, Kind.WATCHDOG, 900, said)
         self._tripped(tripped.due)
 
-    def _tell(self, now: float, kind: Kind, severity: int, message: str) -> None:
-        self._report(Event(now, kind, self.name, severity, message))
+    def _tell(self, now: float, kind: Kind, severity: int, said: Text) -> None:
+        self._report(Event(now, kind, self.name, severity, said))
 
     # what is different for drives and outputs
 
-    def _reaction(self) -> str:
+    def _reaction(self) -> Text:
         """What the watchdog does that has just tripped, for people."""
         raise NotImplementedError
 

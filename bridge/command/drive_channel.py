@@ -19,6 +19,7 @@ from bridge.config import DriveTable
 from bridge.drive import FAULTED, DriveState, Explained, Meanings, Told
 from bridge.image import Quality
 from bridge.mapping.model import Family
+from bridge.text import Text
 
 
 class DriveChannel(Channel):
@@ -131,8 +132,8 @@ class DriveChannel(Channel):
         if stops is self.leg.silence_stops:
             return
         if why_not and self.settings.falls_silent:
-            message = f"silence does not stop the drive, it gets disable voltage instead: {why_not}"
-            self._tell(now, Kind.WATCHDOG, 700, message)
+            said = Text.of("watchdog.silence_replaced", why=Text.plain(why_not))
+            self._tell(now, Kind.WATCHDOG, 700, said)
         self._happen(event.OwnWatch(stops), now)
 
     def on_status_word(self, word: int, now: float) -> None:
@@ -175,7 +176,8 @@ class DriveChannel(Channel):
         self._status.on_emcy(told)
         if is_its_own:
             severity = 100 if told.is_gone else 700
-            self._tell(now, Kind.EMERGENCY, severity, f"emergency {told.code:04X}h: {told.text}")
+            said = Text.of("node.emergency", number=told.code, text=Text.plain(told.text))
+            self._tell(now, Kind.EMERGENCY, severity, said)
         self._settled(now)
 
     def on_drive_fault(self, current: float | None, last: float | None, now: float) -> None:
@@ -187,11 +189,12 @@ class DriveChannel(Channel):
         if state in (NodeState.OPERATIONAL, NodeState.DISABLED):
             self._status.link_fault = 0.0
         if state is NodeState.LOST:
-            self._link_is_lost(self.family.faults.node_missing, "the node is lost", now)
+            self._link_is_lost(self.family.faults.node_missing, Text.of("watchdog.node_lost"), now)
 
-    def _link_is_lost(self, fault: float, reason: str, now: float) -> None:
+    def _link_is_lost(self, fault: float, why: Text, now: float) -> None:
         self._status.link_fault = self._status.last_fault = fault
-        self._tell(now, Kind.WATCHDOG, 700, f"{self.family.faults.prefix}{fault:.1f}: {reason}")
+        said = Text.of("watchdog.link_fault", prefix=self.family.faults.prefix, fault=fault, why=why)
+        self._tell(now, Kind.WATCHDOG, 700, said)
 
     def _why_unplaced(self, now: float) -> str:
         if not self._followed:
@@ -208,18 +211,19 @@ class DriveChannel(Channel):
         self.doubts.forget(names, [self._places[name] for name in names if name in self._places])
 
     def _is_silent(self, now: float) -> None:
-        self._link_is_lost(self.family.faults.telegram_downtime, "no process data from the drive", now)
+        self._link_is_lost(self.family.faults.telegram_downtime, Text.of("watchdog.no_process_data"), now)
 
     def _on_tripped(self, tripped: Tripped, now: float) -> None:
         self._status.last_fault = self.family.faults.controller_silent
         super()._on_tripped(tripped, now)
 
-    def _reaction(self) -> str:
+    def _reaction(self) -> Text:
         reaction = self.settings.on_expiry
         if reaction == "silence" and not self.leg.silence_stops:
             reaction = "disable_voltage"
-        return f"{reaction}, {self._status.fault_text(self.family.faults.controller_silent, self.state)}"
+        fault = self._status.fault_text(self.family.faults.controller_silent, self.state)
+        return Text.of("watchdog.reaction", reaction=Text.word("reaction", reaction), fault=fault)
 
     def _on_ignored(self, now: float) -> None:
         self._status.last_fault = self.family.faults.controller_silent
-        self._tell(now, Kind.WATCHDOG, 500, "the controller is silent; ignored (telegram_downtime_s)")
+        self._tell(now, Kind.WATCHDOG, 500, Text.of("watchdog.silence_ignored"))

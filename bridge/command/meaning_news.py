@@ -11,6 +11,7 @@ from bridge.command.messages.event import Event, Kind
 from bridge.command.setpoint_doubts import InForce
 from bridge.drive import Codes, Key, is_scale, no_scale
 from bridge.mapping.model import Family, Meaning, Slot
+from bridge.text import Text
 
 
 class HasWords(Protocol):
@@ -65,7 +66,7 @@ class MeaningNews:
         gone = [leaf for leaf, one in before.items() if leaf not in after and any(one.words)]
         self._is_commanded_otherwise |= bool(gone)
         affected = [*self._doubted(before, after), *self._affected_by(name, setting)]
-        self._tell((name, in_set), setting, had, "; ".join(affected), now)
+        self._tell((name, in_set), setting, had, affected, now)
 
     def on_code(self, meaning: Meaning, code: int | None, now: float, in_set: int = 1) -> None:
         """What the drive says of what one word carries; None where it refuses to tell."""
@@ -76,7 +77,7 @@ class MeaningNews:
             return
         codes = {**known, meaning.leaf: of_sets}
         self._is_commanded_otherwise |= self._drive.on_codes(codes)
-        affected = f"{meaning.leaf} has another meaning"
+        affected = [Text.of("meaning.other", leaf=meaning.leaf)]
         self._tell((meaning.parameter, in_set), code, had, affected, now)
 
     def on_overdue(self, overdue: frozenset[Key], now: float) -> None:
@@ -94,32 +95,46 @@ class MeaningNews:
             self._is_commanded_otherwise = False
             channel.start_anew(now)
 
-    def _doubted(self, before: Mapping[str, InForce], after: Mapping[str, InForce]) -> list[str]:
+    def _doubted(self, before: Mapping[str, InForce], after: Mapping[str, InForce]) -> list[Text]:
         note = self._drive.channel.doubts.note
         return [
-            f"command/{name}: {why}"
+            Text.of("meaning.in_doubt", leaf=name, why=Text.plain(why))
             for name, one in before.items()
             if name in after and (why := note(name, one, after[name]))
         ]
 
-    def _affected_by(self, name: str, setting: float | None) -> list[str]:
+    def _affected_by(self, name: str, setting: float | None) -> list[Text]:
         """The values that depend on a parameter, and what changes with it."""
         family = self._drive.family
-        found: list[str] = []
+        found: list[Text] = []
         for value in family.values_of(self._drive.slot):
             is_steady = name in family.steady_of(value)
             if name in value.when or is_steady:
-                found.append(f"{value.leaf} has another meaning")
+                found.append(Text.of("meaning.other", leaf=value.leaf))
             elif name in value.scaled_by and setting is not None and not is_scale(setting):
-                found.append(no_scale(name, setting))
+                found.append(Text.plain(no_scale(name, setting)))
             elif name in value.scaled_by:
-                found.append(f"{value.leaf} has another scale")
+                found.append(Text.of("meaning.other_scale", leaf=value.leaf))
         return list(dict.fromkeys(found))
 
-    def _tell(self, key: Key, setting: float | None, had: float | None, affected: str, now: float) -> None:
-        told = "cannot be read" if setting is None else f"is {setting:g}"
-        was = "could not be read" if had is None else f"was {had:g}"
-        message = f"{key[0]} of parameter set {key[1]} {told}, it {was}: {affected}"
-        self._report(Event(now, Kind.CONFIGURATION, self._drive.name, 500, message))
+    def _tell(
+        self, key: Key, setting: float | None, had: float | None, affected: Sequence[Text], now: float
+    ) -> None:
+        said = _changed(*key, setting, had, tuple(affected))
+        self._report(Event(now, Kind.CONFIGURATION, self._drive.name, 500, said))
         self.drop_old_setpoints(now)
         self._drive.refresh(now)
+
+
+def _changed(
+    name: str, in_set: int, setting: float | None, had: float | None, affected: tuple[Text, ...]
+) -> Text:
+    if setting is None and had is None:
+        return Text.of("meaning.unreadable", parameter=name, in_set=in_set, affected=affected)
+    if setting is None:
+        return Text.of("meaning.lost", parameter=name, in_set=in_set, before=had or 0, affected=affected)
+    if had is None:
+        return Text.of("meaning.found", parameter=name, in_set=in_set, setting=setting, affected=affected)
+    return Text.of(
+        "meaning.changed", parameter=name, in_set=in_set, setting=setting, before=had, affected=affected
+    )

@@ -18,7 +18,7 @@ from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import Output as Sent
 from bridge.command.link import Link, NodeState
 from bridge.command.messages.event import Event, Kind
-from bridge.command.messages.request import Action, Code, Outcome, Reply, Request
+from bridge.command.messages.request import Action, Code, Outcome, Reply, Request, refused
 from bridge.command.output_words import ACTIVE, OutputWords
 from bridge.command.stop_check.outputs import Answer, OutputStopCheck, Question, StoppedOutput
 from bridge.command.stop_check.state import Verdict
@@ -28,6 +28,7 @@ from bridge.drive import ControlWords, OwnJudgement
 from bridge.image import Image, Quality, Value
 from bridge.mapping.fields import ObjectRef
 from bridge.mapping.model import ControlWord, Family
+from bridge.text import Text
 
 _SAFE: Final = {"mask": ACTIVE, "value": 0}
 _CONTROL_WORD: Final = ControlWord.model_validate(
@@ -111,8 +112,8 @@ class OutputChannel(Channel):
     def handle(self, request: Request, now: float, reply: Reply) -> None:
         if request.action is Action.START:
             self.on_refused(now)
-            message = f"{request.action} by {request.identity} refused: outputs are written"
-            self._tell(now, Kind.REFUSED, 300, message)
+            said = refused(request.action, str(request.identity), Text.of("request.not_started"))
+            self._tell(now, Kind.REFUSED, 300, said)
             reply(Outcome(Code.UNKNOWN_POINT, "outputs are written, and not started", forwarded=False))
             return
         super().handle(request, now, reply)
@@ -125,8 +126,8 @@ class OutputChannel(Channel):
             # Nothing comes back of outputs: they are as good as their node is there.
             self.link.on_pdo(now)
 
-    def _reaction(self) -> str:
-        return "its outputs are safe, acknowledge"
+    def _reaction(self) -> Text:
+        return Text.of("watchdog.outputs_safe")
 
 
 class Outputs(Commanded):

@@ -41,6 +41,7 @@ from bridge.config import Site
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family
 from bridge.parameter import AxisNames, Ledger
+from bridge.text import Text
 
 CarryOut = Callable[[Request, float, Reply], bool]
 """Takes a command on a node or a bus, or a request for a parameter; False where there is nobody to do it."""
@@ -88,7 +89,7 @@ class Plant:
         self._outcomes: deque[tuple[Reply, Outcome]] = deque()
         self._gate = EventGate()
         self._guard = Guard("event")
-        self.because: Callable[[Event], str] = lambda event: ""
+        self.because: Callable[[Event], Text | str] = lambda event: ""
         """Finds what has caused an event."""
         self._refused_by_others = 0
         self._is_closing = False
@@ -180,7 +181,7 @@ class Plant:
         if not self._gate.admits(event):
             return
         with self._guard:
-            event = replace(event, cause=event.cause or self.because(event))
+            event = replace(event, because=event.because or self.because(event))
         for listener in tuple(self._listeners):
             with self._guard:
                 listener(event)
@@ -266,14 +267,10 @@ class Plant:
     ) -> None:
         is_known = target in self.drives or target in self.nodes or target in self._buses
         source = target.removeprefix("bus/") if is_known else "bridge"
-        # Several requests that are told as one have nothing in what they differ.
-        what = what or "requests"
-        if target and not is_known:
-            what = f"{what} on {target[:_LONGEST_NAME]!r}"
-        who = identity if identity.user else identity.source.label
+        unknown = "" if is_known else target[:_LONGEST_NAME]
+        who = str(identity) if identity.user else identity.source.label
         self._refused_by_others += count
-        message = f"{what} by {who} refused"
-        self.report(Event(now, Kind.REFUSED, source, 300, f"{message}: {why}" if why else message))
+        self.report(Event(now, Kind.REFUSED, source, 300, _refused(what, unknown, who, why)))
 
     def _counting_refusals(self, request: Request, now: float, reply: Reply) -> Reply:
         """``reply`` for what no drive refuses by itself: a refusal is an event and counts as a drive's."""
@@ -308,9 +305,9 @@ class Plant:
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""
         for one in self._deadlines.sweep(now):
-            message = "a fault of the bridge's own: it had not planned a deadline of this drive"
             if self._missed_limit.allows(now):
-                self.report(Event(now, Kind.WATCHDOG, one.name, _SEVERITY_MISSED, message))
+                said = Text.of("watchdog.deadline_missed")
+                self.report(Event(now, Kind.WATCHDOG, one.name, _SEVERITY_MISSED, said))
         self.set("bridge/missed_deadlines", self._deadlines.missed, now)
         for one in self._commanded.values():
             one.look(now)
@@ -387,9 +384,9 @@ class Plant:
         if not tell:
             return
         if state is NodeState.LOST:
-            self.report(Event(now, Kind.NODE_LOST, node.name, 800, "node lost"))
+            self.report(Event(now, Kind.NODE_LOST, node.name, 800, Text.of("node.lost")))
         elif state is NodeState.OPERATIONAL:
-            self.report(Event(now, Kind.NODE_BACK, node.name, 200, "node operational"))
+            self.report(Event(now, Kind.NODE_BACK, node.name, 200, Text.of("node.operational")))
 
 
 class PlantView:
@@ -447,6 +444,22 @@ class PlantView:
 
     def on_connection(self, identity: Identity, *, is_there: bool, has_others: bool = False) -> None:
         self._plant.on_connection(identity, self._clock(), is_there=is_there, has_others=has_others)
+
+
+def _refused(what: str, target: str, who: str, why: str) -> Text:
+    """``what`` is empty where several requests that differ in it are told as one, ``target`` where the event
+    is of it."""
+    action = Text.plain(what) if what else Text.of("request.several")
+    if what in Action.__members__.values():
+        action = Text.word("action", what)
+    reason = Text.plain(why)
+    if target and why:
+        return Text.of("request.refused_on", action=action, target=target, who=who, why=reason)
+    if target:
+        return Text.of("request.refused_on_unsaid", action=action, target=target, who=who)
+    if why:
+        return Text.of("request.refused", action=action, who=who, why=reason)
+    return Text.of("request.refused_unsaid", action=action, who=who)
 
 
 def _unit_ids(site: Site) -> dict[tuple[str, int], int]:

@@ -8,6 +8,7 @@ from bridge.base.ratelimit import RateLimit
 from bridge.can.interface import BusStatus
 from bridge.command import Event, Kind, Plant
 from bridge.config import BusTable
+from bridge.text import Text
 
 _LOAD_PERIOD_S: Final = 1.0
 _ERRORS_EVERY_S: Final = 10.0
@@ -54,5 +55,8 @@ class BusPoints:
         number = status.error_frames - self._errors_told
         if number and self._error_limit.allows(now):
             self._errors_told = status.error_frames
-            what = "an error frame" if number == 1 else f"{number} error frames"
-            self._plant.report(Event(now, Kind.BUS, self._bus.name, 500, f"{what}: {status.last_error}"))
+            error = Text.plain(status.last_error)
+            said = Text.of("bus.error_frames", number=number, error=error)
+            if number == 1:
+                said = Text.of("bus.error_frame", error=error)
+            self._plant.report(Event(now, Kind.BUS, self._bus.name, 500, said))

@@ -8,6 +8,7 @@ from bridge.command import Event, Kind, Plant
 from bridge.config import BusTable
 from bridge.master.listening import Listening, Part, listen_s
 from bridge.node.node import NodeCore
+from bridge.text import Text
 
 
 class Charge:
@@ -48,11 +49,7 @@ class Charge:
             return
         self._forget(now, f"another bridge is in charge of {self._bus.name}")
         until_ms = self._listening.silence_s * 1000
-        self._tell(
-            f"passive: another bridge is in charge of this bus: it sent {sign}. Nothing is sent until that "
-            f"has been silent for {until_ms:.0f} ms",
-            now,
-        )
+        self._tell(Text.of("bus.gives_way", sign=Text.plain(sign), until_ms=until_ms), now)
         self._say_passive(now)
 
     def on_time(self, now: float) -> None:
@@ -61,7 +58,7 @@ class Charge:
         if not self._listening.on_time(now) or not was_left:
             return
         silent_ms = self._listening.silence_s * 1000
-        self._tell(f"the other bridge has been silent for {silent_ms:.0f} ms: this one takes over", now)
+        self._tell(Text.of("bus.takes_over", silent_ms=silent_ms), now)
         for node in self._nodes:
             if not node.is_out_of_service:
                 node.say("waiting", now)
@@ -89,5 +86,5 @@ class Charge:
             if not node.is_out_of_service:
                 node.say(f"passive: another bridge is in charge of {self._bus.name}", now)
 
-    def _tell(self, message: str, now: float) -> None:
-        self._plant.report(Event(now, Kind.BUS, self._bus.name, 800, message))
+    def _tell(self, said: Text, now: float) -> None:
+        self._plant.report(Event(now, Kind.BUS, self._bus.name, 800, said))

@@ -24,6 +24,7 @@ from bridge.node.node import NodeCore
 from bridge.node.process.command_frames import Command, commands_of
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.wire import Handler
+from bridge.text import Text
 
 _AGAIN_S: Final = 10.0
 """How often an intruder that goes on is reported, with the number of frames since the last time."""
@@ -56,7 +57,7 @@ class Intruders:
     ) -> None:
         """``acts`` says whether this bridge is in charge: while another one is, nobody is an intruder."""
         self.count = 0
-        self.last = ""
+        self.last: Text | str = ""
         self._bus = bus
         self._nodes = nodes
         self._plant = plant
@@ -212,11 +213,10 @@ class Intruders:
         if since is None and not all(node.is_held or node.is_out_of_service for node in stopped):
             since = self._pauses.end((frame.can_id, is_worse))
         if since is not None:
-            more = f" ({since + 1} frames since the last message)" if since else ""
-            self.last = f"{said()}, from somebody else{more}{_answer(stopped, self._nodes)}"
+            self.last = _answered(_met(said(), since), stopped, self._nodes)
             severity = _HARMLESS if affected is None else _SEVERE
-            event = Event(frame.time, Kind.INTRUDER, self._bus.name, severity, f"intruder: {self.last}")
-            self._plant.report(event)
+            told = Text.of("intruder.seen", what=self.last)
+            self._plant.report(Event(frame.time, Kind.INTRUDER, self._bus.name, severity, told))
         due = [node for node in stopped if self._is_due(node, frame.time, brings_back=brings_back)]
         running = [node for node in due if not node.is_held]
         if running:
@@ -258,8 +258,7 @@ class Intruders:
     def _reset(self, series: _Series, now: float) -> None:
         node, series.reset_at = series.node, now
         node.hold_by_reset(now)
-        message = "reset node: an intruder keeps a drive enabled, which an NMT stop does not stop"
-        self._plant.report(Event(now, Kind.INTRUDER, node.node.name, _SEVERE, message))
+        self._plant.report(Event(now, Kind.INTRUDER, node.node.name, _SEVERE, Text.of("intruder.reset")))
 
     def next_deadline(self) -> float | None:
         if not self._series and not self._answers.are_asked:
@@ -309,12 +308,20 @@ def _follows_sync(node: NodeCore) -> bool:
     return any(pdo.is_synchronous for pdos in node.wire.pdos for pdo in (*pdos.rpdos, *pdos.tpdos))
 
 
-def _answer(stopped: Sequence[NodeCore], nodes: Sequence[NodeCore]) -> str:
+def _met(frame: str, since: int) -> Text:
+    """``since`` are frames that were not told of."""
+    if since:
+        return Text.of("intruder.met_again", frame=Text.plain(frame), frames=since + 1)
+    return Text.of("intruder.met", frame=Text.plain(frame))
+
+
+def _answered(met: Text, stopped: Sequence[NodeCore], nodes: Sequence[NodeCore]) -> Text:
     if not stopped:
-        return ""
+        return met
+    answer = Text.of("intruder.some_stop", nodes=", ".join(node.node.name for node in stopped))
     if len(stopped) == len(nodes) > 1:
-        return "; all nodes get an NMT stop"
-    return f"; NMT stop of {', '.join(node.node.name for node in stopped)}"
+        answer = Text.of("intruder.all_stop")
+    return Text.of("intruder.answered", what=met, answer=answer)
 
 
 def _said_state(data: bytes) -> str:

@@ -7,6 +7,7 @@ from typing import Final
 from bridge.base.ratelimit import RateLimit
 from bridge.command import Event, Kind, Plant
 from bridge.command.worst_case import REACTION_BOUND_MS
+from bridge.text import Text
 
 HANG_MS: Final = 100
 """From so long on the bus process counts as having been too slow to notice what went on."""
@@ -44,18 +45,18 @@ class Lateness:
         late_ms = 1000 * (now - due)
         self._round_ms = max(self._round_ms, late_ms)
         if late_ms > REACTION_BOUND_MS and self._round_limit.allows(now):
-            self._tell(f"a round came {late_ms:.0f} ms late", _SEVERITY_ROUND, now)
+            said = Text.of("bridge.round_late", late_ms=late_ms, allowed_ms=REACTION_BOUND_MS)
+            self._tell(said, _SEVERITY_ROUND, now)
 
     def on_stop(self, due: float, now: float) -> None:
         late_ms = 1000 * (now - due)
         self._trip_ms = max(self._trip_ms, late_ms)
         if late_ms > REACTION_BOUND_MS and self._trip_limit.allows(now):
-            what = f"the stop of a silent controller's drive was handed over {late_ms:.0f} ms late"
-            self._tell(what, _SEVERITY_TRIP, now)
+            said = Text.of("bridge.stop_late", late_ms=late_ms, allowed_ms=REACTION_BOUND_MS)
+            self._tell(said, _SEVERITY_TRIP, now)
 
-    def _tell(self, what: str, severity: int, now: float) -> None:
-        message = f"{what}; {REACTION_BOUND_MS} ms are allowed for"
-        self._plant.report(Event(now, Kind.WATCHDOG, "bridge", severity, message))
+    def _tell(self, said: Text, severity: int, now: float) -> None:
+        self._plant.report(Event(now, Kind.WATCHDOG, "bridge", severity, said))
 
     def refresh(self, now: float) -> None:
         self._plant.set("bridge/hangs", self._hangs, now)

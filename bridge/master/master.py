@@ -25,6 +25,7 @@ from bridge.master.network import Network
 from bridge.master.standstill import Alarm
 from bridge.master.suspend import SuspendWatch
 from bridge.master.timer import LoopTimer
+from bridge.text import Text
 
 _log = logging.getLogger(__name__)
 
@@ -272,11 +273,11 @@ class Master:
             return
         self.gaps += 1
         self._lateness.on_hang(self._last_round, now)
-        message = f"the bridge hung for {pause_s * 1000:.0f} ms; all drives were left without commands"
+        said = Text.of("bus.bridge_hung", pause_ms=pause_s * 1000)
         if slept_s:
-            message = f"the machine was suspended for {slept_s:.1f} s; all drives were left without commands"
+            said = Text.of("bus.machine_suspended", slept_s=slept_s)
         for line in hung:
-            self._plant.report(Event(now, Kind.BUS, line.bus.name, 900, message))
+            self._plant.report(Event(now, Kind.BUS, line.bus.name, 900, said))
             line.network.came_back(now)
             for node in line.network.nodes:
                 for one in node.node.commanded:
@@ -313,11 +314,12 @@ class Master:
         if status.state is line.shown or not line.limit.allows(now):
             return
         line.shown = status.state
-        state = status.state.name.lower().replace("_", "-")
-        message = f"bus {line.bus.name} is {state}"
+        state = Text.word("controller_state", status.state.name.lower())
+        said = Text.of("bus.state", bus=line.bus.name, state=state)
         if status.state is not ControllerState.OK and status.last_error:
-            message += f": {status.last_error}"
-        self._plant.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], message))
+            error = Text.plain(status.last_error)
+            said = Text.of("bus.state_after", bus=line.bus.name, state=state, error=error)
+        self._plant.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], said))
 
     def _tell_refusal(self, line: Line, now: float) -> None:
         """The kernel no longer takes bursts, or takes them again."""
@@ -325,10 +327,10 @@ class Master:
         if refusal == line.shown_refusal or not line.limit.allows(now):
             return
         line.shown_refusal = refusal
-        message = "the kernel sends the bursts again"
+        said = Text.of("bus.bursts_sent_again")
         if refusal:
-            message = f"the kernel takes no bursts ({refusal}): the bridge sends them itself, less evenly"
-        self._plant.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 200, message))
+            said = Text.of("bus.bursts_refused", refusal=Text.plain(refusal))
+        self._plant.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 200, said))
 
     def _arm(self, now: float) -> None:
         times = [self._refresh_at]

@@ -32,6 +32,7 @@ from bridge.node import nmt_commands as node_commands
 from bridge.node.neighbours import Neighbour
 from bridge.node.node import NodeCore
 from bridge.node.wire import Handler
+from bridge.text import Text, render
 
 NOTHING: Final[Mapping[str, Sequence[Download]]] = MappingProxyType({})
 
@@ -251,7 +252,8 @@ class Network:
     def stop_others(self, node: Neighbour, why: str, now: float) -> None:
         """A node is lost without which the others must not go on."""
         self._gate.stopped_by(node)
-        self._plant.report(Event(now, Kind.BUS, self.bus.name, 800, f"all nodes are stopped: {why}"))
+        said = Text.of("bus.all_stopped", why=Text.plain(why))
+        self._plant.report(Event(now, Kind.BUS, self.bus.name, 800, said))
         each = self._takes_over(self.nodes)
         for other in self.nodes:
             # The lost one included, if it still hears us.
@@ -405,7 +407,7 @@ class Network:
         self._plant.set(f"{top}/held_by", ", ".join(self._gate.missing), now)
         self._watch.refresh(now)
         self._plant.set(f"{top}/intruders", self._intruders.count, now)
-        self._plant.set(f"{top}/last_intruder", self._intruders.last, now)
+        self._plant.set(f"{top}/last_intruder", render(self._intruders.last), now)
         self._plant.set(f"{top}/passive", self.charge.is_left, now)
         for node in self.nodes:
             node.wire.refresh(now)

@@ -9,6 +9,7 @@ from bridge.base.ratelimit import Pauses
 from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import Frame
 from bridge.command import Event, Kind, Plant
+from bridge.text import Text
 
 _NODES: Final = range(1, 128)
 _FORGET_S: Final = 60.0
@@ -54,8 +55,7 @@ class BusWatch:
         what = nmt.describe(frame.data)
         self._tell(
             "master",
-            f"another NMT master is on the bus: it sent {what}. A second controller, a tool, or a drive set "
-            "as quasi master (Lenze: C00352 = 1) must be found and switched off",
+            Text.of("bus.second_master", command=Text.plain(what)),
             frame.time,
             700,
         )
@@ -63,10 +63,10 @@ class BusWatch:
     def _on_stranger(self, frame: Frame) -> None:
         node_id = frame.can_id - cobid.ERROR_CONTROL
         self._strangers[node_id] = frame.time
-        does = "starts" if frame.data == b"\0" else "is on the bus"
+        starts = frame.data == b"\0"
         self._tell(
             f"stranger {node_id}",
-            f"A: node {node_id} {does} and is not in the site file: add it or take it off the bus",
+            Text.of("bus.stranger_starts" if starts else "bus.stranger", id=node_id),
             frame.time,
             500,
         )
@@ -79,16 +79,17 @@ class BusWatch:
     def on_duplicate(self, node_id: int, sign: str, now: float) -> None:
         """A configured node id behaves as if two devices had it."""
         self._duplicates[node_id] = now
+        name = self._known.get(node_id, "unknown")
         self._tell(
             f"duplicate {node_id}",
-            f"node id {node_id} ({self._known.get(node_id, 'unknown')}) seems to be used twice: {sign}",
+            Text.of("bus.id_used_twice", id=node_id, name=name, sign=Text.plain(sign)),
             now,
             700,
         )
 
-    def _tell(self, key: str, message: str, now: float, severity: int) -> None:
+    def _tell(self, key: str, said: Text, now: float, severity: int) -> None:
         if self._pauses.take(now, key) is not None:
-            self._plant.report(Event(now, Kind.BUS, self._bus, severity, message))
+            self._plant.report(Event(now, Kind.BUS, self._bus, severity, said))
 
     def refresh(self, now: float) -> None:
         """Bring the points of the bus up to date."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.base.ratelimit import Pauses
+from bridge.text import Text
 
 BETWEEN_BOOTS_S: Final = 0.2
 _FIRST_S: Final = 1.0
@@ -62,8 +63,8 @@ class BackOff:
         """Lost again and again soon after each boot-up: not every time is told."""
         return self._losses >= _MANY
 
-    def report(self, now: float) -> str | None:
+    def report(self, now: float) -> Text | None:
         """What to tell of a node that flaps, once a minute."""
         if not self.is_flapping or self._pauses.take(now) is None:
             return None
-        return f"the node is lost again and again: {self._losses} times, soon after each boot-up"
+        return Text.of("node.lost_again", times=self._losses)

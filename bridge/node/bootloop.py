@@ -6,6 +6,7 @@ from collections import deque
 from typing import Final
 
 from bridge.base.ratelimit import Pauses
+from bridge.text import Text
 
 _MANY: Final = 4
 _WITHIN_S: Final = 20.0
@@ -49,11 +50,9 @@ class BootLoop:
     def is_looping(self) -> bool:
         return self._pause_s > 0
 
-    def report(self, now: float) -> str | None:
+    def report(self, now: float) -> Text | None:
         """What to report, once a minute while it goes on."""
         if not self.is_looping or self._pauses.take(now) is None:
             return None
         since, self._since_told = self._since_told, 0
-        return (
-            f"the node starts again and again: {since} boot-up messages; asked again in {self._pause_s:g} s"
-        )
+        return Text.of("node.starts_again", starts=since, pause_s=self._pause_s)

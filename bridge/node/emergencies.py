@@ -12,6 +12,7 @@ from bridge.command import Drive, Event, Kind, Plant
 from bridge.command.node import Node
 from bridge.drive import EmergencyReader
 from bridge.node.emergency_log import EmergencyLog
+from bridge.text import Text
 
 _COMES: Final = 700
 _GONE: Final = 100
@@ -59,8 +60,8 @@ class Emergencies:
         is_of_one_drive = len(concerned) == 1 or any(one.slot.emcy_drive is not None for one in concerned)
         if self._node.device or (concerned and not is_of_one_drive):
             severity = _GONE if told.is_gone else _COMES
-            message = f"emergency {told.code:04X}h: {told.text}"
-            self._plant.report(Event(at, Kind.EMERGENCY, self._node.name, severity, message))
+            said = Text.of("node.emergency", number=told.code, text=Text.plain(told.text))
+            self._plant.report(Event(at, Kind.EMERGENCY, self._node.name, severity, said))
         for drive in concerned:
             drive.channel.on_emcy(told, at, is_its_own=is_of_one_drive)
             drive.refresh(at)

@@ -13,6 +13,7 @@ from bridge.command.outputs import Outputs
 from bridge.node.leaving import Leaving
 from bridge.node.put_off import CANCELS_WORDS
 from bridge.node.wire import NodeWire
+from bridge.text import Text
 
 NMT: Final = {
     Action.RESET: NmtCommand.RESET_NODE,
@@ -75,7 +76,8 @@ def answer(
         reply(Outcome(Code.NOT_ALLOWED, why, forwarded=False))
         return False
     who = str(request.identity)
-    plant.report(Event(now, Kind.OWNER, name, 400, f"{request.action} by {who}"))
+    told = Text.of("request.by", action=Text.word("action", request.action), who=who)
+    plant.report(Event(now, Kind.OWNER, name, 400, told))
     each = not is_bus or request.action is Action.START_NODE
     each |= NMT.get(request.action) in CANCELS_WORDS and any(one.leaving.takeover_s for one in nodes)
     for one in nodes:

@@ -11,6 +11,7 @@ from bridge.command.node import Node
 from bridge.node.backoff import BackOff
 from bridge.node.boot import BootError
 from bridge.node.bootloop import BootLoop
+from bridge.text import Text
 
 
 class NodeView:
@@ -44,19 +45,20 @@ class NodeView:
         failure = error.letter, error.detail
         if self._failure != failure:
             self._failure = failure
-            self._tell(Kind.CONFIGURATION, 600, f"boot-up failed: {error}", now)
+            said = Text.of("node.boot_failed", error=Text.plain(str(error)))
+            self._tell(Kind.CONFIGURATION, 600, said, now)
 
     def errors(self, text: str, now: float) -> None:
         """What the node says of its errors, empty where it has none; an event when it is something else."""
         self._plant.set(f"{self._top}/device_errors", text, now)
         if text and text != self._errors:
-            self._tell(Kind.EMERGENCY, 300, f"the node says: {text}", now)
+            self._tell(Kind.EMERGENCY, 300, Text.of("node.says", errors=Text.plain(text)), now)
         self._errors = text
 
     def shows_habits(self, news: Sequence[str], habits: Sequence[str], now: float) -> None:
         """``news`` are habits of the node in operation that are to be told, ``habits`` all of them."""
         for text in news:
-            self._tell(Kind.CONFIGURATION, 300, text, now)
+            self._tell(Kind.CONFIGURATION, 300, Text.plain(text), now)
         self.say("; ".join([self._success, *habits]), now)
 
     def identified(self, found: Identification, now: float) -> bool:
@@ -65,23 +67,17 @@ class NodeView:
         before, self._identification = self._identification, found
         if before is None:
             return False
-        told = [
-            f"{name} {getattr(found, name):08X}h, was {getattr(before, name):08X}h"
-            for name in ("vendor", "product", "revision")
-            if getattr(found, name) != getattr(before, name)
-        ]
-        if found.serial != before.serial:
-            told.append(f"serial number {found.serial}, was {before.serial}")
-        if told:
-            text = f"another device than before: {', '.join(told)}. Its settings may be others"
-            self._tell(Kind.CONFIGURATION, 600, text, now)
-        return bool(told)
+        changes = _changes(before, found)
+        if changes:
+            self._tell(Kind.CONFIGURATION, 600, Text.of("node.other_device", changes=changes), now)
+        return bool(changes)
 
     def resets(self, why: str, now: float) -> None:
-        self._tell(Kind.CONFIGURATION, 500, f"reset communication by the bridge, once: {why}", now)
+        said = Text.of("node.reset_communication", why=Text.plain(why))
+        self._tell(Kind.CONFIGURATION, 500, said, now)
 
     def restarted(self, now: float) -> None:
-        self._tell(Kind.NODE_LOST, 800, "the node has restarted", now)
+        self._tell(Kind.NODE_LOST, 800, Text.of("node.restarted"), now)
 
     def loops(self, loop: BootLoop, now: float) -> None:
         """Once a minute, where the node starts again and again."""
@@ -96,7 +92,20 @@ class NodeView:
             self._tell(Kind.NODE_LOST, 800, told, now)
 
     def stays(self, now: float) -> None:
-        self._tell(Kind.NODE_BACK, 200, "node operational, and no longer lost again and again", now)
+        self._tell(Kind.NODE_BACK, 200, Text.of("node.stays"), now)
 
-    def _tell(self, kind: Kind, severity: int, message: str, now: float) -> None:
-        self._plant.report(Event(now, kind, self._node.name, severity, message))
+    def _tell(self, kind: Kind, severity: int, said: Text, now: float) -> None:
+        self._plant.report(Event(now, kind, self._node.name, severity, said))
+
+
+def _changes(before: Identification, found: Identification) -> tuple[Text, ...]:
+    told: list[Text] = []
+    if found.vendor != before.vendor:
+        told.append(Text.of("node.other_vendor", now=found.vendor, before=before.vendor))
+    if found.product != before.product:
+        told.append(Text.of("node.other_product", now=found.product, before=before.product))
+    if found.revision != before.revision:
+        told.append(Text.of("node.other_revision", now=found.revision, before=before.revision))
+    if found.serial != before.serial:
+        told.append(Text.of("node.other_serial", now=found.serial, before=before.serial))
+    return tuple(told)

@@ -29,6 +29,7 @@ from bridge.node.process.stop_words import StopWords
 from bridge.node.process.tpdo import node_tpdos
 from bridge.node.put_off import PutOff
 from bridge.node.read_back import ReadBack
+from bridge.text import Text
 
 Handler = Callable[[Frame], None]
 _SDO_BYTES: Final = 8
@@ -184,8 +185,8 @@ class NodeWire:
             self.habits.note(Odd.TPDO_LENGTH, len(frame.data), due)
         elif frame.can_id == self._emcy_id and len(frame.data) != _EMCY_BYTES:
             self.habits.note(Odd.EMCY_LENGTH, len(frame.data), _EMCY_BYTES)
-        message = f"{frame!r} does not fit: {why}"
-        self._plant.report(Event(frame.time, Kind.CONFIGURATION, self._node.name, 300, message))
+        said = Text.of("node.frame_does_not_fit", frame=repr(frame), why=Text.plain(why))
+        self._plant.report(Event(frame.time, Kind.CONFIGURATION, self._node.name, 300, said))
 
     def on_time(self, now: float) -> None:
         self._emergencies.on_time(now)
@@ -201,8 +202,8 @@ class NodeWire:
     def _tell_learned(self, now: float) -> None:
         """Something is learned when a transfer ends well, which an answer brings about."""
         for why in self.sdo.take_learned():
-            message = f"block transfer is not used any more: {why}"
-            self._plant.report(Event(now, Kind.CONFIGURATION, self._node.name, 300, message))
+            said = Text.of("node.no_block_transfer", why=Text.plain(why))
+            self._plant.report(Event(now, Kind.CONFIGURATION, self._node.name, 300, said))
 
     def send_put_off(self, now: float) -> None:
         """The NMT command that waits, if its time has come."""

@@ -16,6 +16,7 @@ from bridge.command.audit import AuditEntry
 from bridge.config import Site
 from bridge.image import Value
 from bridge.service.audit_file import AuditFile
+from bridge.text import Text
 
 _PERIOD_S: Final = 0.5
 _LONGEST_TEXT: Final = 300
@@ -118,10 +119,11 @@ class AuditLog:
                 self._tell(file, fault, now)
 
     def _tell(self, file: AuditFile, fault: str, now: float) -> None:
-        severity, message = 300, f"the audit log is written again; {file.all_lost} lines are missing"
+        severity, said = 300, Text.of("audit.written_again", lost=file.all_lost)
         if fault:
-            severity, message = 600, f"the audit log is not written: {file.path}: {fault}"
-        self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", severity, message))
+            severity = 600
+            said = Text.of("audit.not_written", file=str(file.path), error=Text.plain(fault))
+        self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", severity, said))
 
     def _on_entry(self, entry: AuditEntry) -> None:
         file = self.refused if entry.is_refused else self.file

@@ -16,6 +16,7 @@ from bridge.base.notify import Notifier
 from bridge.base.quietlog import about
 from bridge.base.ratelimit import Pauses
 from bridge.command import Event, Kind, Plant
+from bridge.text import Text
 
 _log = logging.getLogger(__name__)
 
@@ -155,8 +156,9 @@ class Parts:
         self._settled(part, now)
         if self._pauses.take(now, part.name) is not None:
             self._told.add(part.name)
-            message = f"{part.title} {how}; it is started again in {pause_s:.1f} s"
-            self._plant.report(Event(now, Kind.FRONT, "bridge", 700, message))
+            what = Text.plain(f"{part.title} {how}")
+            said = Text.of("front.ended", what=what, pause_s=pause_s)
+            self._plant.report(Event(now, Kind.FRONT, "bridge", 700, said))
 
     def _serves(self, part: Part) -> None:
         if part.name not in self._failing and part.name not in self._unknown:
@@ -166,7 +168,8 @@ class Parts:
         self._settled(part, now)
         if part.name in self._told:
             self._told.discard(part.name)
-            self._plant.report(Event(now, Kind.FRONT, "bridge", 200, f"{part.title} serves again"))
+            said = Text.of("front.serves_again", part=Text.plain(part.title))
+            self._plant.report(Event(now, Kind.FRONT, "bridge", 200, said))
 
     def _settled(self, part: Part, now: float) -> None:
         self._unknown.discard(part.name)

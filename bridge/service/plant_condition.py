@@ -14,6 +14,7 @@ from bridge.condition.own_faults import with_faults
 from bridge.condition.told import condition, recent_json, troubles_json
 from bridge.condition.troubles import Troubles
 from bridge.mapping import Family
+from bridge.text import Text
 
 LOOK_EVERY_S: Final = 0.5
 _PORTION: Final = 20
@@ -87,18 +88,18 @@ class PlantCondition:
         """What no single event tells. A cause is told once, as soon as it is found."""
         present: set[tuple[str, str, float]] = set()
         for one in shown:
-            message = _said(one.trouble)
-            if not message:
+            said = _said(one.trouble)
+            if not said:
                 continue
             found = (*one.key, one.since_ms)
             present.add(found)
             if found not in self._told_causes and one.until_ms is None:
                 source = one.trouble.place.removeprefix("bus/")
                 severity = 900 if one.rank is not Rank.WARNING else 500
-                self._plant.report(Event(now, Kind.CAUSE, source, severity, message))
+                self._plant.report(Event(now, Kind.CAUSE, source, severity, said))
         self._told_causes = present
 
-    def because(self, event: Event) -> str:
+    def because(self, event: Event) -> Text | str:
         """What has caused an event, as a phrase; empty where nothing known has."""
         kind = _NOTICED.get(event.kind)
         if kind is None or event.source == "bridge" or event.severity < _NO_NEWS:
@@ -107,16 +108,16 @@ class PlantCondition:
         return _said(cause) or f"{cause.kind.replace('_', ' ')} at {cause.place}" if cause else ""
 
 
-def _said(trouble: Trouble) -> str:
-    """A cause that is found by what several have in common, in words."""
+def _said(trouble: Trouble) -> Text | None:
+    """A cause that is found by what several have in common."""
     facts = dict(trouble.facts)
     match trouble.kind:
         case "bus_silent":
             bus = trouble.place.removeprefix("bus/")
-            return f"no node of {bus} answers: cable at the box, terminator or supply of the bus"
+            return Text.of("cause.bus_silent", bus=bus)
         case "controllers_silent":
-            return f"{facts['owner']} fell silent with {facts['drives']} drives"
+            return Text.of("cause.controllers_silent", owner=str(facts["owner"]), drives=int(facts["drives"]))
         case "box_slow":
-            return f"this box was too slow for {facts['ms']} ms"
+            return Text.of("cause.box_slow", ms=int(facts["ms"]))
         case _:
-            return ""
+            return None

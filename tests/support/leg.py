@@ -17,6 +17,7 @@ from bridge.config import DriveTable
 from bridge.drive import DriveState, Meanings
 from bridge.image import Value
 from bridge.mapping import load_family
+from bridge.text import render
 
 PLC = Identity(Source.MODBUS, "192.168.1.10")
 TOKENS = LifeSign(start=4711, step=20_002)
@@ -131,4 +132,4 @@ class Leg:
 
 def told(effects: list[Effect]) -> list[Any]:
     """The sentences among them."""
-    return [effect.message for effect in effects if isinstance(effect, Tell)]
+    return [render(effect.said) for effect in effects if isinstance(effect, Tell)]

@@ -27,6 +27,7 @@ TIMEOUT_S = 5.0
 GUARDED = (
     "site",
     "faults/de",
+    "texts/de",
     "integration",
     "export/modbus.csv",
     f"parameters/{DRIVE}",
@@ -167,6 +168,8 @@ def test_a_login_gives_what_the_role_may_see(browser: Browser) -> None:
     assert browser.request("GET", "/api/export/can0.dbc").body.startswith(b"VERSION")
     assert browser.request("GET", "/api/export/..%2fsite.toml").status == 404
     assert browser.request("GET", "/api/faults/xx").status == 404
+    assert browser.request("GET", "/api/texts/xx").status == 404
+    assert browser.request("GET", "/api/texts/de").json["node.lost"] == "Knoten nicht erreichbar"
     assert [drive["name"] for drive in site["drives"]] == [DRIVE]
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from bridge.command.messages.event import Kind
 from bridge.command.messages.request import Identity, Outcome
+from bridge.text import Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,7 @@ class Tell:
 
     kind: Kind
     severity: int
-    message: str
+    said: Text
 
 
 Effect = Answer | StartBegun | StartEnded | Heard | Tripped | LetGo | Ignored | Tell

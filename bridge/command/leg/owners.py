@@ -19,6 +19,7 @@ from bridge.command.messages.event import Kind
 from bridge.command.messages.freshness import arrival_of
 from bridge.command.messages.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Request, Role
 from bridge.command.messages.telegram import Refusal
+from bridge.text import Text
 
 _LEASE_MS: Final = (100, 600_000)
 GONE_S: Final = 10.0
@@ -142,7 +143,7 @@ def _hand_over(turn: Turn, identity: Identity, lease_s: float | None = None) -> 
     turn.owner = Owner(identity, lease_s, alive_until=None if changes else turn.owner.alive_until)
     _renew(turn, turn.now)
     if changes:
-        turn.tell(Kind.OWNER, 200, f"controlled by {identity.named_beside(before)}")
+        turn.tell(Kind.OWNER, 200, Text.of("owner.controls", who=identity.named_beside(before)))
 
 
 def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
@@ -152,14 +153,14 @@ def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
     owner = turn.owner.identity
     if owner is not None and not _owner_is_replaceable(turn) and not identity.goes_on_as(owner):
         who, whom = identity.named_beside(owner), owner.named_beside(identity)
-        turn.tell(Kind.OWNER, 500, f"{who} takes control away from {whom}")
+        turn.tell(Kind.OWNER, 500, Text.of("owner.taken_away", who=who, whom=whom))
     _hand_over(turn, identity, ttl_ms / 1000)
 
 
 def release(turn: Turn, identity: Identity) -> Outcome:
     if not identity.goes_on_as(turn.owner.identity):
         return Outcome(Code.OK, "not in control")
-    turn.tell(Kind.OWNER, 200, f"released by {turn.owner.identity}")
+    turn.tell(Kind.OWNER, 200, Text.of("owner.released", who=str(turn.owner.identity)))
     turn.leave()
     return DONE
 
@@ -185,7 +186,8 @@ def set_timeout(turn: Turn, identity: Identity, timeout_ms: int) -> None:
     judges_by_itself = timeout_ms > 0 or settings.control == "lease"
     quiet_until = None if judges_by_itself else (timer.heard_at or turn.now) + GONE_S
     turn.owner = turn.owner._replace(quiet_until=quiet_until, alive_until=alive_until)
-    turn.tell(Kind.CONFIGURATION, 400, f"fieldbus_timeout_ms = {timeout_ms}, by {identity}")
+    said = Text.of("owner.timeout_set", timeout_ms=timeout_ms, who=str(identity))
+    turn.tell(Kind.CONFIGURATION, 400, said)
 
 
 def on_connection(turn: Turn, event: Connection) -> None:

@@ -46,10 +46,12 @@ from bridge.command.messages.request import (
     Start,
     TakeControl,
     Write,
+    refused,
 )
 from bridge.command.messages.telegram import Refusal
 from bridge.drive import FAULTED
 from bridge.image import Value
+from bridge.text import Text
 
 _OVERWRITTEN: Final = Outcome(Code.CANCELLED, "a control word was written meanwhile")
 
@@ -157,10 +159,9 @@ def _handle(turn: Turn, request: Request) -> None:
             turn.effects.append(Answer(_carry_out(turn, request)))
     except Refusal as refusal:
         who = request.identity.named_beside(turn.owner.identity)
-        message = f"{request.action} by {who} refused: {refusal.message}"
-        turn.tell(Kind.REFUSED, 300, message)
-        refused = Outcome(refusal.code, refusal.message, forwarded=False)
-        turn.effects.append(Answer(refused, is_refused=True))
+        turn.tell(Kind.REFUSED, 300, refused(request.action, who, refusal.message))
+        outcome = Outcome(refusal.code, refusal.message, forwarded=False)
+        turn.effects.append(Answer(outcome, is_refused=True))
 
 
 def _is_stale(turn: Turn, request: Request) -> bool:
@@ -295,8 +296,8 @@ def _acknowledge(turn: Turn, request: Request, *, pulse: bool) -> None:
     turn.hear(arrival_of(request, turn.now))
     turn.clear(pulse=pulse)
     if was_tripped:
-        by = turn.owner.identity
-        turn.tell(Kind.WATCHDOG, 200, f"acknowledged by {by}; the drive stays stopped")
+        by = str(turn.owner.identity)
+        turn.tell(Kind.WATCHDOG, 200, Text.of("watchdog.acknowledged", who=by))
 
 
 def _stop(turn: Turn, request: Request) -> Outcome:
@@ -307,7 +308,8 @@ def _stop(turn: Turn, request: Request) -> Outcome:
         if not _is_stale(turn, request) and alive.is_there(turn, who):
             owners.hear(turn, request)
     else:
-        turn.tell(Kind.OWNER, 400, f"{action} by {who.named_beside(owner.identity)}")
+        named = who.named_beside(owner.identity)
+        turn.tell(Kind.OWNER, 400, Text.of("request.by", action=Text.word("action", action), who=named))
         if turn.timer.timeout_ms == 0 and owner.identity is not None and owner.stopped_until is None:
             # Whoever is there answers to a stop of its drive.
             turn.owner = owner._replace(stopped_until=turn.now + owners.GONE_S)

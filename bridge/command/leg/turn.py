@@ -29,6 +29,7 @@ from bridge.command.messages.event import Kind
 from bridge.command.messages.request import Code, Outcome
 from bridge.config import Reaction
 from bridge.drive import FAULTED, MOVING, ControlWords, DriveState
+from bridge.text import Text
 
 _ACKNOWLEDGE_PULSE_S: Final = 0.1
 """How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
@@ -141,8 +142,8 @@ class Turn:
 
     # what is done
 
-    def tell(self, kind: Kind, severity: int, message: str) -> None:
-        self.effects.append(Tell(kind, severity, message))
+    def tell(self, kind: Kind, severity: int, said: Text) -> None:
+        self.effects.append(Tell(kind, severity, said))
 
     def keep_at_rest(self) -> None:
         """What was written for a drive that is not enabled yet must not make it jump when it is."""
@@ -206,8 +207,7 @@ class Turn:
         """The owner goes; the drive is stopped first."""
         site_ms = self.settings.timeout_ms
         if self.timer.timeout_ms != site_ms:
-            message = f"fieldbus_timeout_ms = {site_ms} again, as in the site file"
-            self.tell(Kind.CONFIGURATION, 400, message)
+            self.tell(Kind.CONFIGURATION, 400, Text.of("owner.timeout_of_site", timeout_ms=site_ms))
         self.timer = Timer(site_ms)
         self.stop(self.settings.words.stop(self.sent.words[0]))
         self.owner = Owner(lease_s=self.owner.lease_s)
@@ -227,7 +227,7 @@ class Turn:
                 self._trip(timer.deadline)
         lease_until = self.owner.lease_until
         if lease_until is not None and self.now >= lease_until:
-            self.tell(Kind.OWNER, 300, f"the lease of {self.owner.identity} ran out")
+            self.tell(Kind.OWNER, 300, Text.of("owner.lease_ran_out", who=str(self.owner.identity)))
             self.leave()
 
     def _trip(self, due: float) -> None:
@@ -317,8 +317,7 @@ class Turn:
             )
             _send(self)
             if is_untaken:
-                why = "the drive has not taken the position that was written: no answer within 1 s"
-                self.tell(Kind.REFUSED, 500, why)
+                self.tell(Kind.REFUSED, 500, Text.of("start.position_not_taken"))
         if self.is_enabling:
             if not was_enabling:
                 self.motion = Motion.SEEN if self.is_enabled else Motion.EXPECTED

@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Final
 
 from bridge.base.ratelimit import PerSecond
+from bridge.text import Text, render
 
 
 class Kind(StrEnum):
@@ -27,20 +28,30 @@ class Kind(StrEnum):
 @dataclass(frozen=True, slots=True)
 class Event:
     """``source`` is a drive, a node or a bus by its name in the site; ``severity`` is that of OPC UA
-    (1 … 1000, Part 5 §6.4.2); ``time`` is monotonic. ``cause`` is what has brought it about, as a phrase;
+    (1 … 1000, Part 5 §6.4.2); ``time`` is monotonic. ``because`` is what has brought it about, as a phrase;
     empty where nothing known has."""
 
     time: float
     kind: Kind
     source: str
     severity: int
-    message: str
-    cause: str = ""
+    said: Text | str
+    because: Text | str = ""
+
+    @property
+    def message(self) -> str:
+        """What is said, in English."""
+        return render(self.said)
+
+    @property
+    def cause(self) -> str:
+        """What has brought it about, in English."""
+        return render(self.because)
 
     @property
     def text(self) -> str:
-        """The message with its cause."""
-        return f"{self.message} (because: {self.cause})" if self.cause else self.message
+        """The message with its cause, in English."""
+        return f"{self.message} (because: {self.cause})" if self.because else self.message
 
 
 REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))

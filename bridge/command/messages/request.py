@@ -8,6 +8,7 @@ from enum import IntEnum, StrEnum
 from typing import Any, ClassVar, Final
 
 from bridge.image import Value
+from bridge.text import Text
 
 
 class Source(IntEnum):
@@ -161,6 +162,11 @@ class Outcome:
 
 
 DONE = Outcome(Code.OK)
+
+
+def refused(action: Action, who: str, why: Text | str) -> Text:
+    """What is told of a request that is refused."""
+    return Text.of("request.refused", action=Text.word("action", action), who=who, why=Text.plain(why))
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ from bridge.command import (
     WriteParameter,
 )
 from bridge.command.link import NodeState
+from bridge.command.messages.request import refused
 from bridge.command.node import Node
 from bridge.node.parameters.own_watch import OwnWatch
 from bridge.node.parameters.polling import Came, ParameterPolling
@@ -47,6 +48,7 @@ from bridge.parameter import (
 )
 from bridge.parameter.codec import check_raw, decode, shown
 from bridge.parameter.protection import Gate
+from bridge.text import Text
 
 _CODES: Final = {
     Why.UNKNOWN_NAME: Code.UNKNOWN_PARAMETER,
@@ -267,8 +269,12 @@ class NodeParameters:
         self._show(drive, entry, self._as_listed(drive, entry, reading))
         if result.changed:
             self._own_watch.forget(drive, entry, "was changed", self._now)
-            was = "" if result.before is None else f" (was {shown(entry, result.before)})"
-            self._tell(drive.name, 400, f"{reading}{was}, by {request.identity}")
+            told, who = str(reading), str(request.identity)
+            said = Text.of("parameter.changed", reading=told, who=who)
+            if result.before is not None:
+                before = shown(entry, result.before)
+                said = Text.of("parameter.changed_from", reading=told, before=before, who=who)
+            self._tell(drive.name, 400, said)
         self._warn(drive.name, result.warning)
         message = "" if result.changed else "the drive holds this value already: not written again"
         conclude(Outcome(Code.OK, message, value=reading.value, time=reading.time))
@@ -288,7 +294,7 @@ class NodeParameters:
         if isinstance(result, ParameterError):
             conclude(_failed(result))
             return
-        self._tell(self._node.name, 400, "parameters saved in the EEPROM")
+        self._tell(self._node.name, 400, Text.of("parameter.saved"))
         self._warn(self._node.name, result)
         conclude(Outcome(Code.OK, "saved"))
 
@@ -297,17 +303,17 @@ class NodeParameters:
         if outcome.abort_code:
             drive.on_sdo_refused(outcome.abort_code, self._now)
         if not outcome.ok and request.action is not Action.READ_PARAMETER:
-            message = f"{request.action} by {request.identity} refused: {outcome.message}"
             drive.on_refused(self._now)
-            self._plant.report(Event(self._now, Kind.REFUSED, drive.name, 300, message))
+            said = refused(request.action, str(request.identity), outcome.message)
+            self._plant.report(Event(self._now, Kind.REFUSED, drive.name, 300, said))
         reply(outcome)
 
-    def _tell(self, source: str, severity: int, message: str) -> None:
-        self._plant.report(Event(self._now, Kind.CONFIGURATION, source, severity, message))
+    def _tell(self, source: str, severity: int, said: Text) -> None:
+        self._plant.report(Event(self._now, Kind.CONFIGURATION, source, severity, said))
 
     def _warn(self, source: str, warning: str) -> None:
         if warning:
-            self._tell(source, 600, warning)
+            self._tell(source, 600, Text.plain(warning))
 
     # points
 

@@ -26,6 +26,7 @@ from bridge.northbound.page.topics import Topics
 from bridge.northbound.page.troubles import Troubles
 from bridge.northbound.page.viewer import BadMessage
 from bridge.northbound.view import View
+from bridge.text import as_json
 
 _TICK_S: Final = 0.05
 """A trend has a row for each tick."""
@@ -248,7 +249,9 @@ class Tabs:
             "source": event.source,
             "severity": event.severity,
             "message": event.message,
+            "text": as_json(event.said),
             "cause": event.cause,
+            "cause_text": as_json(event.because),
         }
         self._events.append(shown)
         data = _encode({"event": shown})

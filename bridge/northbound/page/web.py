@@ -39,6 +39,7 @@ from bridge.northbound.page.system import System, SystemFacts
 from bridge.northbound.page.tabs import Tabs
 from bridge.northbound.page.throttle import FIRST_PAUSE_S, Throttle
 from bridge.northbound.view import View
+from bridge.text.templates import LANGUAGES, source
 
 _log = logging.getLogger(__name__)
 
@@ -141,6 +142,7 @@ class Page:
             Route("/api/session", self._session),
             Route("/api/site", self._site),
             Route("/api/faults/{language}", self._faults),
+            Route("/api/texts/{language}", self._texts),
             Route("/api/login", self._login, methods=["POST"]),
             Route("/api/logout", self._logout, methods=["POST"]),
             *Integration(site, backstage.exports, self._is_inside).routes,
@@ -283,6 +285,17 @@ class Page:
             return self._json({"error": "language"}, 404)
         headers = {"cache-control": "no-cache"}
         return Response(_encode(self._fault_texts[language]), headers=headers, media_type="application/json")
+
+    async def _texts(self, request: Request) -> Response:
+        """Templates of what the bridge says."""
+        if self._session_of(request) is None:
+            return self._json({"error": "login"}, 401)
+        language = request.path_params["language"]
+        if language not in LANGUAGES:
+            return self._json({"error": "language"}, 404)
+        return Response(
+            source(language), headers={"cache-control": "no-cache"}, media_type="application/json"
+        )
 
     def _json(self, body: Mapping[str, Any], status: int = 200) -> Response:
         headers = {"cache-control": "no-store"}

@@ -18,6 +18,7 @@ from bridge.drive import DriveState
 from bridge.master import intruders
 from bridge.master.intruders import Intruders
 from bridge.node.node import NodeCore
+from bridge.text import render
 
 RUN, STOP = b"\x01", b"\x00"
 """What a played command says."""
@@ -249,7 +250,7 @@ def test_an_rpdo_stops_its_node(make: Any) -> None:
     bus.sees(0x206, STOP)
     assert bus.stopped == [(["n6"], "the bridge, because of an intruder: RPDO 206 (206h): stop")]
     assert bus.said == "intruder: RPDO 206 (206h): stop, from somebody else; NMT stop of n6"
-    assert (bus.core.count, bus.core.last) == (1, bus.said.removeprefix("intruder: "))
+    assert (bus.core.count, render(bus.core.last)) == (1, bus.said.removeprefix("intruder: "))
 
 
 def test_sync_stops_those_that_follow_it(make: Any) -> None:

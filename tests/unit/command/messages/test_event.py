@@ -49,4 +49,4 @@ def test_what_happens_to_a_drive_is_always_told(kind: Kind):
 def test_the_text_has_the_cause_behind_the_message_where_one_is_known():
     lost = Event(5.0, Kind.NODE_LOST, "conveyor", 700, "node lost")
     assert lost.text == "node lost"
-    assert replace(lost, cause="can0 is silent").text == "node lost (because: can0 is silent)"
+    assert replace(lost, because="can0 is silent").text == "node lost (because: can0 is silent)"

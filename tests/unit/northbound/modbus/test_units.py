@@ -9,6 +9,7 @@ import pytest
 
 from bridge.command import Code, Event, Kind
 from bridge.command.audit import AuditEntry
+from bridge.text import Text, render
 from tests.support.modbus_site import READY, Rig
 from tests.support.phrases import Book, read
 
@@ -69,5 +70,8 @@ def test_a_read_of_a_unit_that_does_not_exist_is_in_the_log(caplog: pytest.LogCa
 def test_the_page_says_it_in_german(unit: int) -> None:
     told = Told()
     told.rig.write(0, 0x047E, unit=unit)
-    BOOK.said(told.refusals[0])
+    (said,) = [event.said for event in told.events if event.kind is Kind.REFUSED]
+    assert isinstance(said, Text)
+    BOOK.said(render(dict(said.facts)["why"]))
     assert BOOK.unknown == []
+    assert render(said, "de").startswith(f"Schreiben an 'unit {unit}' von modbus:10.0.0.5 abgelehnt: ")

@@ -186,7 +186,7 @@ def test_german_is_german() -> None:
 @pytest.mark.parametrize(
     ("said", "german"),
     [
-        ("node lost", "Knoten nicht erreichbar"),
+        ("the node has restarted", "der Knoten ist neu gestartet"),
         (
             "local:anna#1f may only read",
             "local:anna#1f darf nur lesen",

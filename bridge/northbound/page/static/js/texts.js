@@ -4,6 +4,7 @@ import { computed, effect, signal } from "./ui.js";
 import { kept } from "./store.js";
 import { en } from "./texts/en.js";
 import { de } from "./texts/de.js";
+import { rendered } from "./texts/text.js";
 
 const TEXTS = { en, de };
 const browsers = navigator.language.toLowerCase().startsWith("de") ? ["de", "en"] : ["en", "de"];
@@ -37,8 +38,20 @@ const faults = signal({});
 /** {text, cause, remedy} of a family's fault in the reader's language, or {} where they stay as they are. */
 export function faultIn(family, number) {
   if (language.value === "en" || !family || !number) return {};
-  load(language.value);
+  load(language.value, "faults", faults);
   return faults.value[language.value]?.[family]?.[number] ?? {};
+}
+
+const templates = signal({});
+
+/** What the bridge says, in the reader's language: `english` is made of `text`, {code, facts}, or has none. */
+export function worded(text, english) {
+  if (language.value === "en") return english;
+  if (!text) return translated(english);
+  const known = templates.value[language.value];
+  if (known) return rendered(text, known, translated);
+  load(language.value, "texts", templates);
+  return english;
 }
 
 const book = signal(null);
@@ -64,12 +77,13 @@ async function openBook() {
 
 const loading = new Set();
 
-async function load(wanted) {
-  if (loading.has(wanted)) return;
-  loading.add(wanted);
-  const answer = await fetch(`api/faults/${wanted}`);
-  if (answer.ok) faults.value = { ...faults.value, [wanted]: await answer.json() };
-  else loading.delete(wanted);
+async function load(wanted, what, into) {
+  const address = `api/${what}/${wanted}`;
+  if (loading.has(address)) return;
+  loading.add(address);
+  const answer = await fetch(address);
+  if (answer.ok) into.value = { ...into.value, [wanted]: await answer.json() };
+  else loading.delete(address);
 }
 
 /** The text for a number of things: `key.one` or `key.other`. */

@@ -4,7 +4,7 @@ import { html } from "../ui.js";
 import { events } from "../live.js";
 import { may } from "../session.js";
 import { clock, number, quantity } from "../format.js";
-import { maybe, t, translated } from "../texts.js";
+import { maybe, t, translated, worded } from "../texts.js";
 import { good } from "../drivestate.js";
 import { Failure, useFetched } from "../fetched.js";
 import { Icon } from "../icons.js";
@@ -82,7 +82,7 @@ function Events() {
       ${all.length === 0 && html`<p class="quiet">${t("system.no_events")}</p>`}
       ${all.length > 0 && html`<div class="scroll log" tabindex="0" role="group" aria-label=${t("system.events")}><table class="rows">
         <thead><tr>${["time", "source", "kind", "message"].map((name) => html`<th scope="col">${t(`system.${name}`)}</th>`)}</tr></thead>
-        <tbody>${all.map((one) => html`<tr><td>${clock(one.time)}</td><td>${one.source}</td><td>${t(`event.${one.kind}`)}</td><td>${translated(one.message)}${one.cause && html` <small>${t("system.because", { cause: translated(one.cause) })}</small>`}</td></tr>`)}</tbody>
+        <tbody>${all.map((one) => html`<tr><td>${clock(one.time)}</td><td>${one.source}</td><td>${t(`event.${one.kind}`)}</td><td>${worded(one.text, one.message)}${one.cause && html` <small>${t("system.because", { cause: worded(one.cause_text, one.cause) })}</small>`}</td></tr>`)}</tbody>
       </table></div>`}
     </section>
   `;

@@ -1,0 +1,54 @@
+// Texts of the bridge in words: a code with facts fills the template that has this code, as bridge/text/templates.py
+// does it. The facts of a text may be texts themselves.
+
+const JOINED_BY = ", ";
+const PIECE = /\{\{|\}\}|\{(\w+)(!r)?(?::([^}]*))?\}/g;
+
+/** `text`, {code, facts}, by `templates`, a mapping of codes. `plain` puts English sentences that have no code into the
+ * reader's language. */
+export function rendered(text, templates, plain = (sentence) => sentence) {
+  if (text.code === "plain") return plain(text.facts.text);
+  return templates[text.code].replace(PIECE, (piece, name, quoted, format) => {
+    if (!name) return piece[0];
+    return shown(text.facts[name], quoted, format, (one) => rendered(one, templates, plain));
+  });
+}
+
+function shown(fact, quoted, format, words) {
+  if (Array.isArray(fact)) return fact.map(words).join(format || JOINED_BY);
+  if (typeof fact === "object") return words(fact);
+  if (typeof fact === "string") return quoted ? inQuotes(fact) : fact;
+  return format ? formatted(fact, format) : String(fact);
+}
+
+// As Python writes a string.
+function inQuotes(text) {
+  const mark = text.includes("'") && !text.includes('"') ? '"' : "'";
+  return mark + text.replaceAll("\\", "\\\\").replaceAll(mark, `\\${mark}`).replaceAll("\n", "\\n") + mark;
+}
+
+/** `number` in a format of Python's: decimals (".1f"), six digits ("g"), hexadecimal ("04X"). */
+export function formatted(number, format) {
+  const [, decimals] = /^\.(\d+)f$/.exec(format) ?? [];
+  if (decimals) return fixed(number, Number(decimals));
+  if (format === "g") return general(number);
+  const [, width] = /^0?(\d*)X$/.exec(format) ?? [];
+  if (width !== undefined) return number.toString(16).toUpperCase().padStart(Number(width), "0");
+  return String(number);
+}
+
+// A number that lies exactly between two goes to the even one.
+function fixed(number, decimals) {
+  if (number < 0) return `-${fixed(-number, decimals)}`;
+  const halves = number * 2 ** (decimals + 1);
+  const scaled = number * 10 ** decimals;
+  if (Number.isInteger(halves) && Math.abs(scaled % 1) === 0.5) return (2 * Math.round(scaled / 2) / 10 ** decimals).toFixed(decimals);
+  return number.toFixed(decimals);
+}
+
+function general(number) {
+  const exponent = number === 0 ? 0 : Number(number.toExponential(5).split("e")[1]);
+  if (exponent >= -4 && exponent < 6) return String(Number(number.toPrecision(6)));
+  const [digits, power] = number.toExponential(5).split("e");
+  return `${Number(digits)}e${power[0]}${power.slice(1).padStart(2, "0")}`;
+}

@@ -1,0 +1,6 @@
+"""What the bridge says to people: a code with facts, and its words in each language."""
+
+from bridge.text.templates import LANGUAGES, render
+from bridge.text.text import Fact, Text, as_json
+
+__all__ = ["LANGUAGES", "Fact", "Text", "as_json", "render"]

@@ -29,6 +29,7 @@ from bridge.command.messages.request import (
     WriteParameter,
 )
 from bridge.image import Image, Value
+from bridge.text import Text, render
 
 Values = dict[str, Value]
 
@@ -74,8 +75,13 @@ class Ending(NamedTuple):
     """An outcome, or what a protocol says that it has refused by itself."""
 
     code: str
-    message: str = ""
+    said: Text | str = ""
     forwarded: bool = False
+
+    @property
+    def message(self) -> str:
+        """What is said, in English."""
+        return render(self.said)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,13 +134,13 @@ def shared_by(one: Identity, other: Identity) -> Identity:
 def _sum_of(one: AuditEntry, other: AuditEntry) -> AuditEntry:
     """An entry for both, of one protocol, with one code; empty in what they differ."""
     first, last = one.ending, other.ending
-    message = last.message if first.message == last.message else ""
+    said = last.said if first.said == last.said else ""
     return replace(
         other,
         identity=shared_by(one.identity, other.identity),
         target=other.target if one.target == other.target else "",
         action=other.action if one.action == other.action else "",
-        ending=Ending(last.code, message, first.forwarded and last.forwarded),
+        ending=Ending(last.code, said, first.forwarded and last.forwarded),
         count=one.count + other.count,
     )
 
@@ -202,7 +208,7 @@ class AuditTrail:
         old = self._held(request)
 
         def conclude(outcome: Outcome) -> None:
-            ending = Ending(outcome.code, outcome.message, outcome.ok and outcome.forwarded)
+            ending = Ending(outcome.code, outcome.said, outcome.ok and outcome.forwarded)
             who, new = request.identity, _asked(request)
             self._note(AuditEntry(now, who, request.target, request.action, ending, old, new))
             reply(outcome)

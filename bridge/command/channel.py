@@ -131,8 +131,8 @@ class Channel:
     def is_tripped(self) -> bool:
         return self.leg.stage.is_tripped
 
-    def refusal(self, identity: Identity) -> str:
-        """Why ``identity`` may not command it, whose owner is there, over any of its connections; empty where
+    def refusal(self, identity: Identity) -> Text | None:
+        """Why ``identity`` may not command it, whose owner is there, over any of its connections; None where
         it may."""
         owner = self.leg.owner.identity
         if owner is not None and identity.is_same(owner):

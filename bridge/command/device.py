@@ -15,6 +15,7 @@ from bridge.image import Image, Quality, Value
 from bridge.mapping.device import Signal
 from bridge.mapping.fields import ObjectRef
 from bridge.mapping.model import Family
+from bridge.text import Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,11 +171,13 @@ class Device:
         """One of its outputs is anything but safe."""
         return self.outputs is not None and self.outputs.is_moving
 
-    def refusal(self, identity: Identity) -> str:
-        """Why ``identity`` may not command it; empty where it may."""
+    def refusal(self, identity: Identity) -> Text | None:
+        """Why ``identity`` may not command it; None where it may."""
         if self.outputs:
             return self.outputs.channel.refusal(identity)
-        return f"{identity} may only read" if identity.role < Role.OPERATOR else ""
+        if identity.role < Role.OPERATOR:
+            return Text.of("request.may_only_read", who=str(identity))
+        return None
 
     @property
     def control(self) -> str:

@@ -24,6 +24,7 @@ from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, Paramete
 from bridge.drive.own_supervision import why_silence_does_not_stop
 from bridge.image import Image, Point, Quality, Value
 from bridge.mapping.model import Family, Meaning, Slot
+from bridge.text import Text
 
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
 _FAULT: Final = ("fault_text", "fault_number", "fault_cause", "fault_remedy")
@@ -270,8 +271,8 @@ class Drive(Commanded):
         channel = self.channel
         return channel.state in MOVING or channel.words.enables(channel.output.words[0])
 
-    def refusal(self, identity: Identity) -> str:
-        """Why ``identity`` may not command it; empty where it may."""
+    def refusal(self, identity: Identity) -> Text | None:
+        """Why ``identity`` may not command it; None where it may."""
         return self.channel.refusal(identity)
 
     def on_refused(self, now: float) -> None:

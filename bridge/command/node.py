@@ -14,6 +14,7 @@ from bridge.config import BusTable, NodeTable
 from bridge.mapping.axes import profile_of
 from bridge.mapping.model import Family, ObjectRef
 from bridge.parameter import AxisNames, Names
+from bridge.text import Text
 
 Enforce = Callable[[str, Action, str, float], None]
 """Does something to a node in the bridge's own name; the second text says why."""
@@ -29,8 +30,8 @@ class HasParameters(Protocol):
         """What it moves is in motion or may be: parameters on which that rests are left alone."""
         ...
 
-    def refusal(self, identity: Identity) -> str:
-        """Why ``identity`` may not command it; empty where it may."""
+    def refusal(self, identity: Identity) -> Text | None:
+        """Why ``identity`` may not command it; None where it may."""
         ...
 
     def on_refused(self, now: float) -> None:

@@ -10,6 +10,7 @@ from bridge.command.messages.telegram import Refusal, Telegram
 from bridge.config import SafeValue
 from bridge.image import Value
 from bridge.mapping.device import Output
+from bridge.text import Text
 
 _BITS: Final = 16
 _MASK: Final = (1 << _BITS) - 1
@@ -111,7 +112,8 @@ class OutputWords:
             place = self.places.get(name)
             if place is None:
                 known = ", ".join(self.places)
-                raise Refusal(Code.UNKNOWN_POINT, f"{self._name}/output has no {name!r}; it has {known}")
+                said = Text.of("telegram.no_output", node=self._name, leaf=name, known=known)
+                raise Refusal(Code.UNKNOWN_POINT, said)
             try:
                 raw = self._with_bit(words, place, bit, value) if bit else place.output.encode(value)
             except ValueError as error:

@@ -114,7 +114,7 @@ class OutputChannel(Channel):
             self.on_refused(now)
             said = refused(request.action, str(request.identity), Text.of("request.not_started"))
             self._tell(now, Kind.REFUSED, 300, said)
-            reply(Outcome(Code.UNKNOWN_POINT, "outputs are written, and not started", forwarded=False))
+            reply(Outcome(Code.UNKNOWN_POINT, Text.of("request.outputs_not_started"), forwarded=False))
             return
         super().handle(request, now, reply)
 

@@ -200,28 +200,30 @@ class Plant:
         """
         reply = self.audit.follow(request, now, reply)
         if self._is_closing and request.action not in STOP_ACTIONS:
-            reply(Outcome(Code.NOT_READY, "the bridge is being stopped", forwarded=False))
+            reply(Outcome(Code.NOT_READY, Text.of("request.bridge_ends"), forwarded=False))
             return False
         if request.action in NODE_ACTIONS:
             reply = self._counting_refusals(request, now, reply)
             is_taken = carry_out(request, now, reply)
             if not is_taken:
-                reply(Outcome(Code.UNKNOWN_TARGET, f"there is no node {request.target!r}"))
+                reply(Outcome(Code.UNKNOWN_TARGET, Text.of("request.no_node", node=request.target)))
             return is_taken
         one = self._commanded.get(request.target)
         if one is None and request.target not in self.devices:
             reply = self._counting_refusals(request, now, reply)
-            reply(Outcome(Code.UNKNOWN_TARGET, f"there is no drive {request.target!r}"))
+            reply(Outcome(Code.UNKNOWN_TARGET, Text.of("request.no_drive", drive=request.target)))
             return False
         if request.action in PARAMETER_ACTIONS:
             is_taken = carry_out(request, now, reply)
             if not is_taken:
                 reply = self._counting_refusals(request, now, reply)
-                reply(Outcome(Code.NOT_READY, f"{request.target} is on no bus", forwarded=False))
+                said = Text.of("request.on_no_bus", target=request.target)
+                reply(Outcome(Code.NOT_READY, said, forwarded=False))
             return is_taken
         if one is None:
             reply = self._counting_refusals(request, now, reply)
-            reply(Outcome(Code.READ_ONLY, f"{request.target} has no outputs", forwarded=False))
+            said = Text.of("request.no_outputs", target=request.target)
+            reply(Outcome(Code.READ_ONLY, said, forwarded=False))
             return False
         before, until = one.channel.wired, one.channel.until
         one.channel.handle(request, now, reply)
@@ -263,7 +265,7 @@ class Plant:
         )
 
     def _report_refusal(
-        self, what: str, identity: Identity, target: str, why: str, now: float, count: int = 1
+        self, what: str, identity: Identity, target: str, why: Text | str, now: float, count: int = 1
     ) -> None:
         is_known = target in self.drives or target in self.nodes or target in self._buses
         source = target.removeprefix("bus/") if is_known else "bridge"
@@ -277,7 +279,7 @@ class Plant:
 
         def conclude(outcome: Outcome) -> None:
             if not outcome.ok and request.action is not Action.READ_PARAMETER:
-                self._report_refusal(request.action, request.identity, request.target, outcome.message, now)
+                self._report_refusal(request.action, request.identity, request.target, outcome.said, now)
             reply(outcome)
 
         return conclude
@@ -446,7 +448,7 @@ class PlantView:
         self._plant.on_connection(identity, self._clock(), is_there=is_there, has_others=has_others)
 
 
-def _refused(what: str, target: str, who: str, why: str) -> Text:
+def _refused(what: str, target: str, who: str, why: Text | str) -> Text:
     """``what`` is empty where several requests that differ in it are told as one, ``target`` where the event
     is of it."""
     action = Text.plain(what) if what else Text.of("request.several")

@@ -20,6 +20,7 @@ from bridge.mirror import protocol
 from bridge.mirror.endpoint import LEASE_MS
 from bridge.mirror.protocol import Answered, Changed, Connected, Counted, Delta, Malformed, Snapshot
 from bridge.mirror.rejections import Rejections
+from bridge.text import Text
 from bridge.zenohlink import Answer, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
@@ -125,7 +126,7 @@ class MirrorClient:
     def _on_answer(self, reply: Reply, asking: asyncio.Task[Outcome]) -> None:
         self._asking.discard(asking)
         with self._guard:
-            reply(Outcome(Code.CANCELLED, "closed meanwhile") if asking.cancelled() else asking.result())
+            reply(Outcome(Code.CANCELLED, Text.of("link.closed")) if asking.cancelled() else asking.result())
 
     async def request(self, request: Request, timeout_s: float = 5.0) -> Outcome:
         """Send ``request`` to the bus process; any number may be under way at once.
@@ -146,7 +147,7 @@ class MirrorClient:
                 return answered.outcome
         # The deltas may still come where nothing is answered: a snapshot will tell.
         self._in_step = False
-        return Outcome(Code.TIMED_OUT, "the bus process did not answer", forwarded=False)
+        return Outcome(Code.TIMED_OUT, Text.of("link.no_answer"), forwarded=False)
 
     async def _follow_to(self, answered: Answered) -> None:
         """Wait until the image shows what ``answered`` is about. Where that takes too long, no value may

@@ -18,6 +18,7 @@ from bridge.image import Feed, Point
 from bridge.mirror import protocol
 from bridge.mirror.endpoint import LEASE_MS, close_to_others, prepare_folder
 from bridge.mirror.protocol import Answered, Changed, Connected, Delta, Malformed, Prompt, Rejected, Snapshot
+from bridge.text import Text
 from bridge.zenohlink import Asked, Message, Pace, ZenohLink, zenoh_config
 
 _POINTS_PER_DELTA: Final = 500
@@ -259,7 +260,7 @@ class MirrorPublisher:
         # may start moving after that; stopping is right at any time, also by a word that does not enable.
         is_late = now > deadline_s
         if is_late and request.action not in TAKEN_LATE:
-            reply(Outcome(Code.TIMED_OUT, "the request came too late to be carried out", forwarded=False))
+            reply(Outcome(Code.TIMED_OUT, Text.of("link.too_late"), forwarded=False))
             return
         if is_late or request.received_at is None or request.received_at > now:
             # Too late, no time, or one that is still to come: nobody knows how old it is.

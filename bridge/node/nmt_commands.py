@@ -70,7 +70,8 @@ def answer(
     is_bus = request.target.startswith("bus/")
     why = refusal(request, [commanded for one in nodes for commanded in one.node.commanded])
     if is_bus and request.action not in NMT:
-        reply(Outcome(Code.UNKNOWN_TARGET, f"a bus has no {request.action}", forwarded=False))
+        why = Text.of("request.no_bus_action", action=Text.word("action", request.action))
+        reply(Outcome(Code.UNKNOWN_TARGET, why, forwarded=False))
         return False
     if why:
         reply(Outcome(Code.NOT_ALLOWED, why, forwarded=False))
@@ -86,20 +87,21 @@ def answer(
     return not each
 
 
-def refusal(request: Request, commanded: Sequence[Drive | Outputs]) -> str | None:
+def refusal(request: Request, commanded: Sequence[Drive | Outputs]) -> Text | None:
     """Why this identity may not command the node now, or None if it may.
 
     A command on the node touches all its drives, so nobody gives one while another identity controls
     one of them; an engineer may.
     """
     if request.identity.role < Role.OPERATOR:
-        return f"{request.identity} may only read"
+        return Text.of("request.may_only_read", who=str(request.identity))
     if request.identity.role >= Role.ENGINEER:
         return None
     for one in commanded:
         owner = one.channel.owner
         if owner is not None and not request.identity.goes_on_as(owner):
-            return f"{one.name} is controlled by {owner.named_beside(request.identity)}"
+            by = owner.named_beside(request.identity)
+            return Text.of("request.one_controlled_by", name=one.name, owner=by)
     return None
 
 

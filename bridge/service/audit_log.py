@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 import msgspec
 
@@ -16,7 +16,7 @@ from bridge.command.audit import AuditEntry
 from bridge.config import Site
 from bridge.image import Value
 from bridge.service.audit_file import AuditFile
-from bridge.text import Text
+from bridge.text import Text, as_json
 
 _PERIOD_S: Final = 0.5
 _LONGEST_TEXT: Final = 300
@@ -46,6 +46,7 @@ def as_line(entry: AuditEntry, epoch_ns: int) -> bytes:
         "old": {_cut(leaf): _shown(value) for leaf, value in entry.old.items()},
         "new": {_cut(leaf): _shown(value) for leaf, value in entry.new.items()},
         "message": _cut(ending.message),
+        "text": _all_cut(as_json(ending.said)),
         "count": entry.count if entry.count != 1 else None,
     }
     known = {key: value for key, value in where_known.items() if value or value is False}
@@ -56,6 +57,20 @@ def _cut(text: str) -> str:
     # A lone surrogate has no UTF-8.
     text = text.encode("utf-8", "replace").decode("utf-8")
     return text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]}…"
+
+
+def _all_cut(told: object) -> object:
+    """JSON with each of its strings cut."""
+    match told:
+        case str():
+            return _cut(told)
+        case dict():
+            facts = cast("dict[str, object]", told)
+            return {name: _all_cut(one) for name, one in facts.items()}
+        case list():
+            return [_all_cut(one) for one in cast("list[object]", told)]
+        case _:
+            return told
 
 
 def _shown(value: Value) -> Value:

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from math import isfinite
+from typing import Any, Final
+
+PLAIN: Final = "plain"
+"""Code of a sentence that has none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +32,7 @@ class Text:
     @classmethod
     def plain(cls, said: Text | str) -> Text:
         """An English sentence that has no code; a text as it is."""
-        return said if isinstance(said, Text) else cls("plain", (("text", said),))
+        return said if isinstance(said, Text) else cls(PLAIN, (("text", said),))
 
 
 Fact = str | int | float | Text | tuple[Text, ...]
@@ -37,12 +41,16 @@ Fact = str | int | float | Text | tuple[Text, ...]
 
 def as_json(said: Text | str) -> dict[str, Any] | None:
     """``{"code": …, "facts": {…}}``, also of the texts among the facts; None of a sentence without a code."""
-    if isinstance(said, str):
-        return None
-    return {"code": said.code, "facts": {name: _json_of(fact) for name, fact in said.facts}}
+    return None if isinstance(said, str) or said.code == PLAIN else _object_of(said)
+
+
+def _object_of(text: Text) -> dict[str, Any]:
+    return {"code": text.code, "facts": {name: _json_of(fact) for name, fact in text.facts}}
 
 
 def _json_of(fact: Fact) -> object:
     if isinstance(fact, Text):
-        return as_json(fact)
-    return [as_json(one) for one in fact] if isinstance(fact, tuple) else fact
+        return _object_of(fact)
+    if isinstance(fact, float) and not isfinite(fact):
+        return str(fact)
+    return [_object_of(one) for one in fact] if isinstance(fact, tuple) else fact

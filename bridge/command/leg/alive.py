@@ -9,8 +9,8 @@ from bridge.command.leg.turn import Turn
 from bridge.command.messages.request import Action, Code, Identity, Request
 from bridge.command.messages.telegram import Refusal
 from bridge.image import Value
+from bridge.text import Text
 
-_MISSING: Final = "the life sign is missing or too old: write supervision/life_sign to command/life_sign"
 _PROVES: Final = frozenset((Action.KEEP_ALIVE, Action.RESET_FAULT, Action.START))
 """Commands that have no place for a token, and count as telegrams."""
 
@@ -21,13 +21,13 @@ def read(turn: Turn, who: Identity, token: Value | None) -> float | None:
     life = turn.settings.life
     if life is None:
         if token is not None:
-            raise Refusal(Code.UNKNOWN_POINT, "this drive asks for no life sign")
+            raise Refusal(Code.UNKNOWN_POINT, Text.of("life_sign.not_asked_for"))
         return None
     until = turn.owner.alive_until if who.goes_on_as(turn.owner.identity) else None
     if token is None:
         return until
     if isinstance(token, bool) or not isinstance(token, int | float) or token not in range(0x1_0000):
-        raise Refusal(Code.OUT_OF_RANGE, "life_sign takes 0…65535")
+        raise Refusal(Code.OUT_OF_RANGE, Text.of("life_sign.range"))
     issued_at = life.issued_at(int(token), turn.now)
     if issued_at is None:
         return until
@@ -41,7 +41,7 @@ def is_missing(turn: Turn, until: float | None) -> bool:
 
 
 def refusal() -> Refusal:
-    return Refusal(Code.NOT_VALID, _MISSING)
+    return Refusal(Code.NOT_VALID, Text.of("life_sign.missing"))
 
 
 def is_there(turn: Turn, who: Identity) -> bool:

@@ -10,13 +10,12 @@ from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import Output, Way
 from bridge.command.messages.request import Code, Outcome
+from bridge.text import Text
 
-SILENT: Final = "nothing is sent, so that the drive's own supervision stops it"
-SENT_BEFORE: Final = (
-    "sent in this silence already; nothing is sent, so that the drive's own supervision stops it"
-)
-_KEPT: Final = "the setpoints stay at rest until the drive is enabled"
-_REPLACED: Final = "a stop that is in force is sent instead"
+SILENT: Final = Text.of("request.silent")
+SENT_BEFORE: Final = Text.of("request.sent_before")
+_KEPT: Final = Text.of("request.setpoints_at_rest")
+_REPLACED: Final = Text.of("request.stop_in_force")
 
 
 class Words(NamedTuple):
@@ -39,7 +38,7 @@ class Edge(NamedTuple):
 Asked = Words | Stop | Edge
 
 
-def why_not(settings: LegSettings, asked: Asked, way: Way, sent: Output) -> str:
+def why_not(settings: LegSettings, asked: Asked, way: Way, sent: Output) -> Text | str:
     """Why the bus does not say what is asked, where ``sent`` goes this ``way``; empty where it does."""
     if way.why_unsent:
         return way.why_unsent
@@ -76,8 +75,10 @@ def judged(
     return [_not_forwarded(one, why) if isinstance(one, Answer) else one for one in effects]
 
 
-def _not_forwarded(answer: Answer, why: str) -> Answer:
+def _not_forwarded(answer: Answer, why: Text | str) -> Answer:
     if answer.is_refused or not answer.outcome.forwarded:
         return answer
-    message = answer.outcome.message
-    return Answer(Outcome(Code.OK, f"{message}; {why}" if message else why, forwarded=False))
+    done = answer.outcome.said
+    if done:
+        why = Text.of("request.and_not_sent", done=Text.plain(done), why=Text.plain(why))
+    return Answer(Outcome(Code.OK, why, forwarded=False))

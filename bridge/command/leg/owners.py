@@ -28,39 +28,39 @@ that connects anew for each telegram, and for a person who was stopped."""
 _NO_TIMES: Final = [None, None, None]
 
 
-def refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> str:
-    """Why ``identity`` may not command the drive now, in one sentence; empty where it may."""
+def refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> Text | None:
+    """Why ``identity`` may not command the drive now, in one sentence; None where it may."""
     if identity.role < Role.OPERATOR:
-        return f"{identity} may only read"
+        return Text.of("request.may_only_read", who=str(identity))
     if control == "none":
-        return "the site file gives nobody control of this drive"
+        return Text.of("request.nobody_controls")
     if identity.goes_on_as(owner.identity):
-        return ""
+        return None
     if control == "lease":
-        return (
-            "take control of the drive first" if owner.identity is None else _taken(owner.identity, identity)
-        )
+        if owner.identity is None:
+            return Text.of("request.take_control_first")
+        return _taken(owner.identity, identity)
     if identity.source.label != control:
-        return f"the drive is controlled by {control}"
+        return Text.of("request.controlled_by", owner=control)
     if owner.identity is None or is_replaceable:
-        return ""
+        return None
     return _taken(owner.identity, identity)
 
 
-def _taken(owner: Identity, identity: Identity) -> str:
-    return f"the drive is controlled by {owner.named_beside(identity)}"
+def _taken(owner: Identity, identity: Identity) -> Text:
+    return Text.of("request.controlled_by", owner=owner.named_beside(identity))
 
 
-def _take_refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> str:
-    """Why ``identity`` may not take control now, empty where it may. An engineer always may."""
+def _take_refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> Text | None:
+    """Why ``identity`` may not take control now, None where it may. An engineer always may."""
     if control != "lease":
         may_break = identity.role >= Role.ENGINEER and identity.source.label == control
-        return "" if may_break else refusal(control, owner, identity, is_replaceable=is_replaceable)
+        return None if may_break else refusal(control, owner, identity, is_replaceable=is_replaceable)
     if identity.role < Role.OPERATOR:
-        return f"{identity} may only read"
+        return Text.of("request.may_only_read", who=str(identity))
     if owner.identity is None or is_replaceable or identity.role >= Role.ENGINEER:
-        return ""
-    return "" if identity.goes_on_as(owner.identity) else _taken(owner.identity, identity)
+        return None
+    return None if identity.goes_on_as(owner.identity) else _taken(owner.identity, identity)
 
 
 def check_authority(turn: Turn, request: Request) -> None:
@@ -149,7 +149,7 @@ def _hand_over(turn: Turn, identity: Identity, lease_s: float | None = None) -> 
 def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
     low, high = _LEASE_MS
     if turn.settings.control == "lease" and not low <= ttl_ms <= high:
-        raise Refusal(Code.OUT_OF_RANGE, f"ttl_ms takes {low}…{high}")
+        raise Refusal(Code.OUT_OF_RANGE, Text.of("request.ttl_range", low=low, high=high))
     owner = turn.owner.identity
     if owner is not None and not _owner_is_replaceable(turn) and not identity.goes_on_as(owner):
         who, whom = identity.named_beside(owner), owner.named_beside(identity)
@@ -159,7 +159,7 @@ def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
 
 def release(turn: Turn, identity: Identity) -> Outcome:
     if not identity.goes_on_as(turn.owner.identity):
-        return Outcome(Code.OK, "not in control")
+        return Outcome(Code.OK, Text.of("request.not_in_control"))
     turn.tell(Kind.OWNER, 200, Text.of("owner.released", who=str(turn.owner.identity)))
     turn.leave()
     return DONE
@@ -170,12 +170,12 @@ def set_timeout(turn: Turn, identity: Identity, timeout_ms: int) -> None:
     none. A trip stays a trip."""
     settings, timer = turn.settings, turn.timer
     if not settings.timeout_writable:
-        raise Refusal(Code.NOT_ALLOWED, "the site file does not allow to change fieldbus_timeout_ms")
+        raise Refusal(Code.NOT_ALLOWED, Text.of("request.timeout_fixed"))
     if not identity.goes_on_as(turn.owner.identity):
-        raise Refusal(Code.NOT_ALLOWED, "only who controls the drive may change fieldbus_timeout_ms")
+        raise Refusal(Code.NOT_ALLOWED, Text.of("request.timeout_of_owner"))
     low, high = settings.timeout_range_ms
     if not low <= timeout_ms <= high:
-        raise Refusal(Code.OUT_OF_RANGE, f"fieldbus_timeout_ms takes {low}…{high} here")
+        raise Refusal(Code.OUT_OF_RANGE, Text.of("request.timeout_range", low=low, high=high))
     runs = timeout_ms and timer.heard_at is not None and not timer.is_overdue
     deadline = (timer.heard_at or 0.0) + timeout_ms / 1000 if runs else None
     alive_until = turn.owner.alive_until

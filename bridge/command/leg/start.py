@@ -11,6 +11,7 @@ from bridge.command.leg.table import Deed, Stimulus
 from bridge.command.leg.turn import Turn
 from bridge.command.messages.request import DONE, Code, Outcome
 from bridge.drive import FAULTED, DriveState
+from bridge.text import Text
 
 _LIMIT_S: Final = 3.0
 _BRAKING_S: Final = 1.0
@@ -28,7 +29,7 @@ def begin(turn: Turn, word: int) -> None:
     """Start with the word that enables; the drive may be enabled and has no fault."""
     before, now, state = turn.start, turn.now, turn.drive
     if before is not None:
-        turn.effects.append(StartEnded(Outcome(Code.CANCELLED, "started anew")))
+        turn.effects.append(StartEnded(Outcome(Code.CANCELLED, Text.of("start.started_anew"))))
     turn.effects.append(StartBegun())
     is_enabled = state is DriveState.OPERATION_ENABLED
     is_late = turn.motion in MAY_FOLLOW_LATE
@@ -71,7 +72,8 @@ def on_report(turn: Turn, report: Report, *, is_news: bool) -> None:
     if not is_news and stage not in AWAITS_REPORT:
         return
     if state in FAULTED:
-        _give_up(turn, Stimulus.SAYS_FAULT, Code.NOT_READY, f"the drive went into fault: {report.fault_text}")
+        why = Text.of("start.fault", fault=Text.plain(report.fault_text))
+        _give_up(turn, Stimulus.SAYS_FAULT, Code.NOT_READY, why)
     elif stage is Stage.LEADING:
         _go_on(turn, state)
     elif stage is not Stage.SETTLING or not _may_be_old(turn, start, state, is_news=is_news):
@@ -124,8 +126,7 @@ def on_time(turn: Turn) -> None:
     if start is None:
         return
     if now >= start.until:
-        label = turn.drive.label.replace("_", " ")
-        why = f"the drive did not start, it is {label}"
+        why = Text.of("start.overdue", state=Text.word("drive_state", turn.drive.label))
         _give_up(turn, Stimulus.START_OVERDUE, Code.TIMED_OUT, why)
         return
     if start.believed_at is not None and now >= start.believed_at:
@@ -162,8 +163,8 @@ def _believe_without_report(turn: Turn, start: Start) -> None:
         turn.lead(start.word)
 
 
-def _give_up(turn: Turn, stimulus: Stimulus, code: Code, message: str) -> None:
-    turn.happens(stimulus, Outcome(code, message))
+def _give_up(turn: Turn, stimulus: Stimulus, code: Code, why: Text) -> None:
+    turn.happens(stimulus, Outcome(code, why))
     turn.stop(turn.word_at_rest)
 
 

@@ -53,10 +53,10 @@ from bridge.drive import FAULTED
 from bridge.image import Value
 from bridge.text import Text
 
-_OVERWRITTEN: Final = Outcome(Code.CANCELLED, "a control word was written meanwhile")
+_OVERWRITTEN: Final = Outcome(Code.CANCELLED, Text.of("start.overwritten"))
 
-_CAME_LATE: Final = "came late, and counts as a stop only"
-_IS_LIFELESS: Final = "came without a life sign, and counts as a stop only"
+_CAME_LATE: Final = Text.of("request.came_late")
+_IS_LIFELESS: Final = Text.of("request.came_lifeless")
 
 
 def initial(settings: LegSettings) -> LegState:
@@ -87,7 +87,7 @@ def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tu
         case ActualWords(words=words):
             _follow(turn, words)
         case NodeBack():
-            turn.happens(Stimulus.NODE_BACK, Outcome(Code.CANCELLED, "the node has restarted"))
+            turn.happens(Stimulus.NODE_BACK, Outcome(Code.CANCELLED, Text.of("node.restarted")))
         case StartAnew():
             _start_anew(turn)
         case BridgeGap():
@@ -127,7 +127,7 @@ def _follow(turn: Turn, actual: tuple[int, ...]) -> None:
 
 
 def _start_anew(turn: Turn) -> None:
-    turn.happens(Stimulus.ANEW, Outcome(Code.CANCELLED, "the drive has to be enabled anew"))
+    turn.happens(Stimulus.ANEW, Outcome(Code.CANCELLED, Text.of("start.enable_anew")))
     turn.trip = turn.trip._replace(burst=None)
     turn.stop(turn.settings.words.stop(turn.sent.words[0]))
 
@@ -159,8 +159,8 @@ def _handle(turn: Turn, request: Request) -> None:
             turn.effects.append(Answer(_carry_out(turn, request)))
     except Refusal as refusal:
         who = request.identity.named_beside(turn.owner.identity)
-        turn.tell(Kind.REFUSED, 300, refused(request.action, who, refusal.message))
-        outcome = Outcome(refusal.code, refusal.message, forwarded=False)
+        turn.tell(Kind.REFUSED, 300, refused(request.action, who, refusal.said))
+        outcome = Outcome(refusal.code, refusal.said, forwarded=False)
         turn.effects.append(Answer(outcome, is_refused=True))
 
 
@@ -171,7 +171,7 @@ def _is_stale(turn: Turn, request: Request) -> bool:
 def _stale(turn: Turn, request: Request) -> Refusal:
     """Why it does not count that it can have waited for so long."""
     limit_ms = limit_ms_of(request, turn.timer.timeout_ms)
-    return Refusal(Code.STALE, f"may have waited on its way for longer than {limit_ms} ms")
+    return Refusal(Code.STALE, Text.of("request.may_be_old", limit_ms=limit_ms))
 
 
 def _carry_out(turn: Turn, request: Request) -> Outcome:
@@ -192,7 +192,8 @@ def _carry_out(turn: Turn, request: Request) -> Outcome:
         case SetTimeout(timeout_ms=timeout_ms):
             owners.set_timeout(turn, request.identity, timeout_ms)
         case _:
-            raise Refusal(Code.UNKNOWN_POINT, f"a drive knows no {request.action}")
+            action = Text.word("action", request.action)
+            raise Refusal(Code.UNKNOWN_POINT, Text.of("request.unknown_action", action=action))
     return DONE
 
 
@@ -211,7 +212,7 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
     word = telegram.control_word
     if word is not None and not words.is_valid(word):
         turn.happens(Stimulus.INVALID)
-        raise Refusal(Code.NOT_VALID, f"control word {word:04X}h: the bit 'control data valid' is 0")
+        raise Refusal(Code.NOT_VALID, Text.of("request.data_not_valid", word=word))
     is_late = _is_stale(turn, request)
     if is_late or alive.is_missing(turn, alive_until):
         if word is None or not is_owner or words.enables(word):
@@ -230,7 +231,7 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
             # The edge itself goes on to the drive; whatever else the word asks has to be asked anew.
             turn.word |= mask
             turn.asked = Words(word, telegram.setpoints)
-            return Outcome(Code.OK, "acknowledged; the drive stays stopped")
+            return Outcome(Code.OK, Text.of("request.acknowledged"))
         if not is_edge and not turn.word & mask:
             word &= ~mask  # what was sent meanwhile would make an edge of a bit that never fell
     turn.hear(arrival_of(request, turn.now), tuple(values))
@@ -263,7 +264,7 @@ def _take(turn: Turn, word: int | None, setpoints: tuple[int, ...], values: Mapp
     return turn.happens(Stimulus.STOP_WORD if is_stop else Stimulus.ENABLING_WORD, _OVERWRITTEN)
 
 
-def _take_stale_stop(turn: Turn, word: int, why: str) -> Outcome:
+def _take_stale_stop(turn: Turn, word: int, why: Text) -> Outcome:
     """The owner's stop, however long it has waited, or by a program that may be dead; ``why``. It is no sign
     of life, acknowledges nothing and brings no setpoints."""
     acknowledge = turn.settings.words.acknowledge_mask
@@ -284,7 +285,7 @@ def _reset_fault(turn: Turn, request: Request) -> Outcome:
         turn.edges = turn.edges._replace(pressed_by=request.identity)
         if was_pressed:
             owners.hear(turn, request)
-            return Outcome(Code.OK, "no edge: the telegram before it acknowledged, too", forwarded=False)
+            return Outcome(Code.OK, Text.of("request.no_edge"), forwarded=False)
     owners.own(turn, request)
     _acknowledge(turn, request, pulse=True)
     turn.asked = Edge()
@@ -323,7 +324,8 @@ def _stop(turn: Turn, request: Request) -> Outcome:
     if turn.has_been_sent(word):
         turn.happens(Stimulus.STOP_AGAIN)
         return Outcome(Code.OK, SENT_BEFORE, forwarded=False)
-    turn.happens(Stimulus.STOP, Outcome(Code.CANCELLED, f"{action} by {who}"))
+    by = Text.of("request.by", action=Text.word("action", action), who=str(who))
+    turn.happens(Stimulus.STOP, Outcome(Code.CANCELLED, by))
     turn.stop_as_asked(word)
     turn.asked = Stop(changes[action])
     return DONE
@@ -333,12 +335,12 @@ def _start(turn: Turn, request: Request, direction: int) -> None:
     words = turn.settings.words
     bits = {0: 0, 1: words.forward, -1: words.reverse}.get(direction)
     if bits is None:
-        raise Refusal(Code.OUT_OF_RANGE, f"direction takes 1, -1 or 0, not {direction}")
+        raise Refusal(Code.OUT_OF_RANGE, Text.of("request.direction_range", direction=direction))
     if direction < 0 and not bits:
         # Forward is what such a drive does with a positive setpoint: that needs no bit.
-        raise Refusal(Code.OUT_OF_RANGE, "direction -1: here the sign of the setpoint is the direction")
+        raise Refusal(Code.OUT_OF_RANGE, Text.of("request.direction_by_sign"))
     if turn.is_tripped or turn.drive in FAULTED:
-        raise Refusal(Code.ACKNOWLEDGE_FIRST, "acknowledge first")
+        raise Refusal(Code.ACKNOWLEDGE_FIRST, Text.of("request.acknowledge_first"))
     if not turn.may_enable:
         raise Refusal(Code.NOT_READY, turn.why_blocked)
     if turn.way.why_unsent:

@@ -126,14 +126,14 @@ class Turn:
         return self.way.is_open and (not self.way.why_unplaced or self.is_commanded)
 
     @property
-    def why_blocked(self) -> str:
+    def why_blocked(self) -> Text:
         if self.is_tripped:
-            return "tripped: acknowledge first"
+            return Text.of("request.tripped")
         if self.way.why:
-            return self.way.why
+            return Text.plain(self.way.why)
         if self.way.why_unplaced and not self.is_commanded:
-            return self.way.why_unplaced
-        return "restart interlock: send a control word that does not enable first"
+            return Text.plain(self.way.why_unplaced)
+        return Text.of("request.interlocked")
 
     @property
     def word_at_rest(self) -> int:
@@ -203,7 +203,7 @@ class Turn:
         self.timer = Timer(timeout_ms, heard_at, deadline)
         self.effects.append(Heard(names))
 
-    def leave(self, of_start: str = "control of the drive has changed") -> None:
+    def leave(self) -> None:
         """The owner goes; the drive is stopped first."""
         site_ms = self.settings.timeout_ms
         if self.timer.timeout_ms != site_ms:
@@ -212,7 +212,7 @@ class Turn:
         self.stop(self.settings.words.stop(self.sent.words[0]))
         self.owner = Owner(lease_s=self.owner.lease_s)
         self.edges = self.edges._replace(bit=None)
-        self.happens(Stimulus.LEFT, Outcome(Code.CANCELLED, of_start))
+        self.happens(Stimulus.LEFT, Outcome(Code.CANCELLED, Text.of("start.owner_changed")))
 
     # time
 
@@ -232,7 +232,7 @@ class Turn:
 
     def _trip(self, due: float) -> None:
         reaction, then_silence_s = self.settings.reaction, self.settings.then_silence_s
-        self.happens(_EXPIRED[reaction], Outcome(Code.CANCELLED, "the watchdog tripped"))
+        self.happens(_EXPIRED[reaction], Outcome(Code.CANCELLED, Text.of("start.watchdog_tripped")))
         if reaction != "hold":
             self.drop_setpoints()
             self.trip = Trip(

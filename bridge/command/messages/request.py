@@ -8,7 +8,7 @@ from enum import IntEnum, StrEnum
 from typing import Any, ClassVar, Final
 
 from bridge.image import Value
-from bridge.text import Text
+from bridge.text import Text, render
 
 
 class Source(IntEnum):
@@ -143,14 +143,14 @@ class Code(StrEnum):
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """The end of a request. ``forwarded`` is False where a write was taken but not sent to the drive
-    (while tripped or interlocked); ``message`` is one sentence for a human.
+    (while tripped or interlocked); ``said`` is one sentence for a human.
 
     ``value`` is what a parameter holds, as it was read (back) at ``time`` in seconds of the monotonic
     clock; ``abort_code`` is the drive's, where it has refused.
     """
 
     code: Code
-    message: str = ""
+    said: Text | str = ""
     forwarded: bool = True
     value: Value | None = None
     time: float = 0.0
@@ -159,6 +159,11 @@ class Outcome:
     @property
     def ok(self) -> bool:
         return self.code is Code.OK
+
+    @property
+    def message(self) -> str:
+        """What is said, in English."""
+        return render(self.said)
 
 
 DONE = Outcome(Code.OK)

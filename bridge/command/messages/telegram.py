@@ -10,17 +10,21 @@ from bridge.command.messages.request import Code
 from bridge.drive import ControlWords, Meanings, ParameterSet, ValueCodec, Written, codecs
 from bridge.image import Value
 from bridge.mapping.model import Family, Slot
+from bridge.text import Text, render
 
 _WORD_MASK = 0xFFFF
 
 
 class Refusal(Exception):
-    """A request is not carried out and changes nothing; ``code`` and ``message`` are its outcome."""
+    """A request is not carried out and changes nothing; ``code`` and ``said`` are its outcome."""
 
-    def __init__(self, code: Code, message: str) -> None:
-        super().__init__(message)
+    def __init__(self, code: Code, said: Text | str) -> None:
+        super().__init__(said)
         self.code = code
-        self.message = message
+        self.said = said
+
+    def __str__(self) -> str:
+        return render(self.said)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +47,7 @@ class _Setpoints:
         for one in written:
             mask, bits = self._masks.get(one.place, 0), self._bits.get(one.place, 0)
             if (bits ^ one.bits) & mask & one.mask:
-                raise Refusal(Code.OUT_OF_RANGE, f"{leaf} and the word it is made from do not agree")
+                raise Refusal(Code.OUT_OF_RANGE, Text.of("telegram.contradiction", leaf=leaf))
         for one in written:
             self._masks[one.place] = self._masks.get(one.place, 0) | one.mask
             self._bits[one.place] = self._bits.get(one.place, 0) | one.bits
@@ -128,11 +132,12 @@ class TelegramDecoder:
             return (Written(place, _WORD_MASK, _as_word(leaf, value)),)
         if codec is None:
             known = ", ".join(["control_word", *self._setpoints, *self._values])
-            raise Refusal(Code.UNKNOWN_POINT, f"{self._name}/command has no {leaf!r}; it has {known}")
+            said = Text.of("telegram.no_command", drive=self._name, leaf=leaf, known=known)
+            raise Refusal(Code.UNKNOWN_POINT, said)
         found, lack = self._meanings.codec(codec, in_set)
         self._check_carried(leaf, found.places)
         if lack:
-            raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {lack.why}")
+            raise _not_configured(leaf, lack.why)
         return _from_value(found, value)
 
     def _goes_by_the_drive(self, leaf: str, value: Value) -> bool:
@@ -146,7 +151,7 @@ class TelegramDecoder:
         for name in (leaf, *(self._names[place] for place in places)):
             why = self._unserved.get(f"command/{name}")
             if why:
-                raise Refusal(Code.NOT_CONFIGURED, f"{leaf}: {why}")
+                raise _not_configured(leaf, why)
 
     def _as_reported(
         self, leaf: str, value: Value, word: int, written: tuple[Written, ...]
@@ -165,8 +170,8 @@ class TelegramDecoder:
         if same:
             return written
         if self._words.enables(word):
-            message = f"{leaf}: parameter set {in_set} is commanded, and the drive is in set {reported}"
-            raise Refusal(Code.NOT_READY, message)
+            said = Text.of("telegram.other_set", leaf=leaf, in_set=in_set, reported=reported)
+            raise Refusal(Code.NOT_READY, said)
         return tuple(replace(one, bits=0) for one in written)
 
     def _in_other_set(
@@ -198,9 +203,14 @@ class TelegramDecoder:
             left.difference_update(old.places)
         if left and self._words.enables(word):
             names = ", ".join(self._names[place] for place in sorted(left))
-            message = f"what {names} means in parameter set {in_set} is not known: write it with the switch"
-            raise Refusal(Code.NOT_CONFIGURED, message)
+            said = Text.of("telegram.set_not_known", names=names, in_set=in_set)
+            raise Refusal(Code.NOT_CONFIGURED, said)
         return tuple(kept)
+
+
+def _not_configured(leaf: str, why: str) -> Refusal:
+    said = Text.of("telegram.not_configured", leaf=leaf, why=Text.plain(why))
+    return Refusal(Code.NOT_CONFIGURED, said)
 
 
 def _from_value(codec: ValueCodec, value: Value) -> tuple[Written, ...]:
@@ -215,7 +225,7 @@ def _from_value(codec: ValueCodec, value: Value) -> tuple[Written, ...]:
 def _as_number(leaf: str, value: object) -> float:
     """``value`` as a number; callers on the network may send anything."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise Refusal(Code.OUT_OF_RANGE, f"{leaf} takes a number")
+        raise Refusal(Code.OUT_OF_RANGE, Text.of("telegram.number", leaf=leaf))
     try:
         return float(value)
     except OverflowError:  # an integer of more than 308 digits
@@ -227,7 +237,7 @@ def _as_word(leaf: str, value: object) -> int:
     and enables. Signed numbers belong to the scaled values."""
     number = _as_number(leaf, value)
     if not 0 <= number <= _WORD_MASK:
-        raise Refusal(Code.OUT_OF_RANGE, f"{leaf} takes 0…65535, not {number:g}")
+        raise Refusal(Code.OUT_OF_RANGE, Text.of("telegram.word_range", leaf=leaf, number=number))
     if not number.is_integer():
-        raise Refusal(Code.OUT_OF_RANGE, f"{leaf} takes a whole number, not {number:g}")
+        raise Refusal(Code.OUT_OF_RANGE, Text.of("telegram.whole_number", leaf=leaf, number=number))
     return int(number)

@@ -143,12 +143,13 @@ class NodeParameters:
 
     def _refusal(self, request: Request, drive: HasParameters) -> Outcome | None:
         """Why this is not even asked of the drive."""
-        why = "" if request.action is Action.READ_PARAMETER else _why_not_set(request.identity, drive)
+        why = None if request.action is Action.READ_PARAMETER else _why_not_set(request.identity, drive)
         if why:
             return _no(Code.NOT_ALLOWED, why)
         is_there = request.action is Action.READ_PARAMETER and self._state in _ANSWERS
         if not (is_there or self._state is NodeState.OPERATIONAL):
-            return _no(Code.NOT_READY, f"the drive's node is {self._state.value}")
+            state = Text.word("node_state", self._state.value)
+            return _no(Code.NOT_READY, Text.of("node.state_of_drives", state=state))
         if request.action is not Action.SAVE_PARAMETERS and self._channels[drive.name] is None:
             return _no(
                 Code.NOT_CONFIGURED,
@@ -182,7 +183,8 @@ class NodeParameters:
         if why := self._own_watch.why_kept(drive, entry, command.value):
             conclude(_no(Code.NOT_ALLOWED, why))
         elif key in self._writing:
-            conclude(_no(Code.BUSY, f"{entry.name} of {drive.name} is being written"))
+            why = Text.of("parameter.busy", parameter=entry.name, owner=drive.name)
+            conclude(_no(Code.BUSY, why))
         else:
             self._writing.add(key)
             steps = access.write(entry, command.value, now, gate)
@@ -276,8 +278,8 @@ class NodeParameters:
                 said = Text.of("parameter.changed_from", reading=told, before=before, who=who)
             self._tell(drive.name, 400, said)
         self._warn(drive.name, result.warning)
-        message = "" if result.changed else "the drive holds this value already: not written again"
-        conclude(Outcome(Code.OK, message, value=reading.value, time=reading.time))
+        already = "" if result.changed else Text.of("parameter.held_already")
+        conclude(Outcome(Code.OK, already, value=reading.value, time=reading.time))
 
     def _as_listed(self, drive: HasParameters, entry: Entry, reading: Reading) -> Reading | ParameterError:
         """What was written as bytes, as the value that it is of."""
@@ -296,7 +298,7 @@ class NodeParameters:
             return
         self._tell(self._node.name, 400, Text.of("parameter.saved"))
         self._warn(self._node.name, result)
-        conclude(Outcome(Code.OK, "saved"))
+        conclude(Outcome(Code.OK, Text.of("parameter.is_saved")))
 
     def _conclude(self, request: Request, drive: HasParameters, reply: Reply, outcome: Outcome) -> None:
         """Tell the outcome; a refusal of a write is an event, too."""
@@ -304,7 +306,7 @@ class NodeParameters:
             drive.on_sdo_refused(outcome.abort_code, self._now)
         if not outcome.ok and request.action is not Action.READ_PARAMETER:
             drive.on_refused(self._now)
-            said = refused(request.action, str(request.identity), outcome.message)
+            said = refused(request.action, str(request.identity), outcome.said)
             self._plant.report(Event(self._now, Kind.REFUSED, drive.name, 300, said))
         reply(outcome)
 
@@ -339,13 +341,13 @@ class NodeParameters:
             drive.on_parameter(name, float(result.value), self._now)
 
 
-def _why_not_set(identity: Identity, drive: HasParameters) -> str:
+def _why_not_set(identity: Identity, drive: HasParameters) -> Text | None:
     """Why ``identity`` may not set parameters: an engineer may, and where its protocol knows no roles, who
     controls the drive or could."""
     if identity.role >= Role.ENGINEER:
-        return ""
+        return None
     if not identity.may_set_parameters:
-        return f"{identity} may not set parameters: an engineer may"
+        return Text.of("parameter.not_by_you", who=str(identity))
     return drive.refusal(identity)
 
 
@@ -353,5 +355,5 @@ def _failed(error: ParameterError) -> Outcome:
     return Outcome(_CODES[error.why], str(error), forwarded=False, abort_code=error.abort_code)
 
 
-def _no(code: Code, message: str) -> Outcome:
-    return Outcome(code, message, forwarded=False)
+def _no(code: Code, why: Text | str) -> Outcome:
+    return Outcome(code, why, forwarded=False)

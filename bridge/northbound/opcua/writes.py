@@ -31,6 +31,7 @@ from bridge.image import Value
 from bridge.northbound.opcua.nodes import VariableNode
 from bridge.northbound.opcua.values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.view import View
+from bridge.text import Text
 from bridge.uaserver.arrivals import received_at
 from bridge.uaserver.library import GOOD, AttributeIds, ServiceError, StatusCodes, get, status, ua
 
@@ -83,7 +84,7 @@ async def ask(view: View, request: Request) -> Outcome:
             ANSWER_LIMIT_S,
             extra=about(request.target),
         )
-        return Outcome(Code.TIMED_OUT, "no outcome in time", forwarded=False)
+        return Outcome(Code.TIMED_OUT, Text.of("request.no_outcome"), forwarded=False)
 
 
 class Writer:

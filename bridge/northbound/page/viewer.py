@@ -18,6 +18,7 @@ from bridge.command import Action, Code, Do, Identity, Outcome, Request, Role, S
 from bridge.command.messages.request import COMMANDS
 from bridge.northbound.page.hearing import Wish
 from bridge.northbound.view import View
+from bridge.text import Text, as_json
 
 MOST_BYTES: Final = 16_384
 """Of one message."""
@@ -164,6 +165,7 @@ class Viewer:
                 "ok": outcome.ok,
                 "code": str(outcome.code),
                 "message": outcome.message,
+                "text": as_json(outcome.said),
                 "forwarded": outcome.forwarded,
                 "value": outcome.value,
                 "abort_code": outcome.abort_code,
@@ -173,12 +175,12 @@ class Viewer:
         try:
             action = Action(ask.action)
         except ValueError:
-            answered(Outcome(Code.UNKNOWN_POINT, f"there is no {ask.action[:80]!r}", forwarded=False))
+            unknown = Text.of("request.unknown", action=ask.action[:80])
+            answered(Outcome(Code.UNKNOWN_POINT, unknown, forwarded=False))
             return
         fields = {name: value for name, value in ask.fields.items() if name in _FIELDS.get(action, ())}
         if len(fields) != len(ask.fields):
-            message = f"{action} takes {', '.join(_FIELDS.get(action, ())) or 'no fields'}"
-            answered(Outcome(Code.OUT_OF_RANGE, message, forwarded=False))
+            answered(Outcome(Code.OUT_OF_RANGE, _takes(action), forwarded=False))
             return
         try:
             kind = COMMANDS.get(action)
@@ -209,3 +211,11 @@ class Viewer:
 
     def _give_back(self, target: str) -> None:
         self._view.submit(Request(self.identity, target, Do(Action.RELEASE_CONTROL)), lambda outcome: None)
+
+
+def _takes(action: Action) -> Text:
+    fields = ", ".join(_FIELDS.get(action, ()))
+    named = Text.word("action", action)
+    if not fields:
+        return Text.of("request.no_fields", action=named)
+    return Text.of("request.fields", action=named, fields=fields)

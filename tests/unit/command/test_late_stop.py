@@ -10,6 +10,7 @@ from bridge.command.leg.effect import StartEnded
 from bridge.drive import DriveState
 from tests.support.leg import Leg, settings_of
 from tests.support.leg_words import LENZE
+from tests.support.outcomes import in_english
 
 SHUT_DOWN, RUN, ACKNOWLEDGE = 0x047E, 0x047F, 0x0080
 """NORD's (BU 2500 §6.5.1, §6.8)."""
@@ -40,7 +41,7 @@ def drive() -> Drive:
 
 def test_it_is_sent_without_setpoints_and_is_no_sign_of_life(drive: Drive):
     assert drive.late(SHUT_DOWN) == SHUT_DOWN
-    assert drive.outcome == Outcome(Code.OK, "came late, and counts as a stop only")
+    assert in_english(drive.outcome) == Outcome(Code.OK, "came late, and counts as a stop only")
     assert not any(drive.setpoints)
     assert drive.state.timer.deadline == 101.0
     drive.writes(RUN)
@@ -73,7 +74,7 @@ def test_to_a_drive_that_is_being_stopped_it_is_not_forwarded(on_expiry: str):
     drive.trips()
     before = drive.state.sent
     drive.late(SHUT_DOWN)
-    assert drive.outcome == Outcome(Code.OK, "tripped: acknowledge first", forwarded=False)
+    assert in_english(drive.outcome) == Outcome(Code.OK, "tripped: acknowledge first", forwarded=False)
     assert drive.state.sent == before
 
 

@@ -28,6 +28,7 @@ from bridge.command.link import NodeState
 from bridge.config import Site
 from bridge.image import Quality, Reading
 from tests.support import sites
+from tests.support.outcomes import in_english
 from tests.support.rig import ENABLE, ENABLED, OPERATOR, PLC, READY, SHUT_DOWN
 from tests.unit.command.test_plant import SITE, Hall
 
@@ -114,7 +115,9 @@ def test_a_bridge_that_is_stopped_stops_its_drives_and_takes_stops_alone(running
     outcomes: list[Outcome] = []
     for command in (Start(), Do(Action.RESET), Write({"control_word": ENABLE})):
         running.view.submit(Request(PLC, FU1, command), outcomes.append)
-    assert outcomes == [Outcome(Code.NOT_READY, "the bridge is being stopped", forwarded=False)] * 3
+    assert [in_english(one) for one in outcomes] == [
+        Outcome(Code.NOT_READY, "the bridge is being stopped", forwarded=False)
+    ] * 3
     assert running.flushed == []
     assert running.submit(Action.DISABLE_VOLTAGE, identity=OPERATOR).ok
     assert len(running.flushed) == 1
@@ -284,7 +287,7 @@ def test_without_a_bus_nobody_looks_after_parameters_and_nodes() -> None:
     outcomes: list[Outcome] = []
     for target, command in ((FU1, ReadParameter("P102")), ("conveyor", Do(Action.RESET))):
         assert not plant.submit(Request(PLC, target, command), 1.0, outcomes.append)
-    assert outcomes == [
+    assert [in_english(one) for one in outcomes] == [
         Outcome(Code.NOT_READY, f"{FU1} is on no bus", forwarded=False),
         Outcome(Code.UNKNOWN_TARGET, "there is no node 'conveyor'"),
     ]

@@ -9,6 +9,7 @@ from bridge.command.leg.effect import StartEnded
 from bridge.command.leg.event import NodeBack
 from bridge.drive import DriveState
 from tests.support.leg import OPEN, Leg, settings_of
+from tests.support.outcomes import in_english
 from tests.support.rig import OPERATOR, OTHER_PLC
 
 SHUT_DOWN, RUN = 0x047E, 0x047F
@@ -90,7 +91,7 @@ def test_it_is_given_up_after_3_s(drive: Drive):
     assert drive.end is None
     drive.at(103.0)
     why = "the drive did not start, it is switch on inhibited"
-    assert drive.end == Outcome(Code.TIMED_OUT, why)
+    assert in_english(drive.end) == Outcome(Code.TIMED_OUT, why)
 
 
 def test_a_drive_that_nobody_hears_is_made_ready_after_1_s_and_enabled_after_2(unheard: Drive):
@@ -195,7 +196,7 @@ def test_a_start_that_replaces_another_is_the_one_that_goes_on(drive: Drive):
     drive.says(INHIBITED)
     drive.starts()
     drive.asks(Start(direction=1))
-    assert drive.end == Outcome(Code.CANCELLED, "started anew")
+    assert in_english(drive.end) == Outcome(Code.CANCELLED, "started anew")
     drive.says(READY)
     assert drive.sent == 0x0C7F
     drive.says(ENABLED)

@@ -13,14 +13,18 @@ from typing import Final, NamedTuple, get_args
 import pytest
 
 from bridge.can.interface import ControllerState
+from bridge.command.link import NodeState
 from bridge.command.messages.request import Action
 from bridge.config import DriveTable
+from bridge.drive import DriveState
 from bridge.text import LANGUAGES, Text
 from bridge.text.templates import parse, source, templates
 
 GROUPS: Final[Mapping[str, Iterable[str]]] = {
     "action": list(Action),
     "controller_state": [state.name.lower() for state in ControllerState],
+    "drive_state": [state.label for state in DriveState],
+    "node_state": [state.value for state in NodeState],
     "reaction": get_args(DriveTable.model_fields["on_expiry"].annotation),
 }
 """Words out of enumerations."""

@@ -1,8 +1,8 @@
 // How a request ended, in words.
 
-import { t, translated } from "./texts.js";
+import { t, worded } from "./texts.js";
 
 /** The bridge's own sentence; where it has none, what its code means. */
 export function told(outcome) {
-  return translated(outcome.message) || t(`outcome.${outcome.code}`);
+  return worded(outcome.text, outcome.message) || t(`outcome.${outcome.code}`);
 }

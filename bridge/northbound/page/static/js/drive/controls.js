@@ -3,7 +3,7 @@
 import { html, useEffect, useRef } from "../ui.js";
 import { leaveNow, leaving, stay, whileMoving } from "../leaving.js";
 import { may } from "../session.js";
-import { t, translated } from "../texts.js";
+import { t, worded } from "../texts.js";
 import { clock } from "../format.js";
 import { told } from "../outcome.js";
 import { ownState } from "../drivestate.js";
@@ -87,6 +87,6 @@ function text({ action, outcome }) {
   if (action === "cut_off") return t("drive.was_cut_off", { time: clock(outcome.at) });
   if (action === "keep_alive") return t("outcome.lost", { message: told(outcome) });
   const what = t(`action.${action}`);
-  if (outcome.ok) return t("outcome.not_forwarded", { what, message: translated(outcome.message) });
+  if (outcome.ok) return t("outcome.not_forwarded", { what, message: worded(outcome.text, outcome.message) });
   return t("outcome.refused", { what, message: told(outcome) });
 }

@@ -3,7 +3,7 @@
 import { html, useState } from "../ui.js";
 import { number } from "../format.js";
 import { NumberField, numbersIn } from "../numberfield.js";
-import { t, translated } from "../texts.js";
+import { t, worded } from "../texts.js";
 import { told } from "../outcome.js";
 import { held, write } from "./held.js";
 import { chosen, isChosen, isText, limitsOf, range, shown } from "./value.js";
@@ -20,7 +20,7 @@ export function Editor({ holder, entry, described, onWritten }) {
     setSaid({ text: t("parameters.writing"), isBusy: true });
     const outcome = await write(holder, entry.name, value);
     setSaid(outcome.ok
-      ? { text: translated(outcome.message) || t("parameters.written", { value: shown(entry, outcome.value) }) }
+      ? { text: worded(outcome.text, outcome.message) || t("parameters.written", { value: shown(entry, outcome.value) }) }
       : { isFailure: true, text: t("outcome.refused", { what: entry.name, message: told(outcome) }) });
     if (outcome.ok) onWritten();
   };

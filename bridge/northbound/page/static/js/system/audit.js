@@ -2,7 +2,7 @@
 
 import { html, useMemo, useState } from "../ui.js";
 import { clock } from "../format.js";
-import { t, translated } from "../texts.js";
+import { t, worded } from "../texts.js";
 import { Failure, useFetched } from "../fetched.js";
 import { matching } from "../rows.js";
 
@@ -27,7 +27,7 @@ export function Audit() {
         <tbody>${found.slice(0, DRAWN).map((one) => html`<tr>
           <td>${clock(Date.parse(one.t))}</td><td>${one.source}:${one.user}</td><td>${one.target}</td>
           <td>${one.action}${one.new && html` <small>${Object.entries(one.new).map(([name, value]) => `${name} = ${value}`).join(", ")}</small>`}${one.count > 1 && html` <small>× ${one.count}</small>`}</td>
-          <td>${one.code}${one.message && html` <small>${translated(one.message)}</small>`}</td></tr>`)}</tbody>
+          <td>${one.code}${one.message && html` <small>${worded(one.text, one.message)}</small>`}</td></tr>`)}</tbody>
       </table></div>
     </section>
   `;

@@ -9,6 +9,8 @@ import errno
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.text import Text, render
+
 _EXHAUSTED: Final = frozenset((errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM))
 
 
@@ -38,19 +40,40 @@ class Fault:
     """One fault in a file the user wrote.
 
     ``key`` is the dotted path of the value (``bus[0].node[1].id``), ``line`` counts from 1 and is
-    0 where the file as a whole is meant; ``hint`` says what would be right.
+    0 where the file as a whole is meant; ``advice`` says what would be right.
     """
 
     file: str
     line: int
     key: str
-    message: str
-    hint: str = ""
+    said: Text | str
+    advice: Text | str = ""
+
+    @property
+    def message(self) -> str:
+        """What is wrong, in English."""
+        return render(self.said)
+
+    @property
+    def hint(self) -> str:
+        """What would be right, in English."""
+        return render(self.advice)
+
+    @property
+    def text(self) -> Text:
+        """All of it in one."""
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        said, advice = Text.plain(self.said), Text.plain(self.advice)
+        if self.key and self.advice:
+            return Text.of("file.key_advised", place=place, key=self.key, said=said, advice=advice)
+        if self.key:
+            return Text.of("file.key", place=place, key=self.key, said=said)
+        if self.advice:
+            return Text.of("file.at_advised", place=place, said=said, advice=advice)
+        return Text.of("file.at", place=place, said=said)
 
     def __str__(self) -> str:
-        place = f"{self.file}:{self.line}" if self.line else self.file
-        hint = f" ({self.hint})" if self.hint else ""
-        return f"{place}: {self.key}: {self.message}{hint}" if self.key else f"{place}: {self.message}{hint}"
+        return render(self.text)
 
 
 class FileFaults(BridgeError):

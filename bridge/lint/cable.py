@@ -12,6 +12,7 @@ from typing import Final
 from bridge.config import CableTable
 from bridge.lint.bus import BusView
 from bridge.lint.report import LintReport
+from bridge.text import Text
 from bridge.tomlfile import Key
 
 _TERMINATIONS: Final = 2
@@ -109,8 +110,7 @@ def check_cable(bus: BusView, report: LintReport) -> None:
     if manuals:
         _check_length(bus, manuals, report)
     else:
-        message = "its length is not judged: of no maker of this bus's nodes a table is known here"
-        report.warning(key, message)
+        report.warning(key, Text.of("check.cable_not_judged"))
     for place, segment in enumerate(cable):
         nodes = segment.nodes or len(bus.nodes) + 1
         for manual in manuals:
@@ -119,13 +119,12 @@ def check_cable(bus: BusView, report: LintReport) -> None:
         if segment.terminations not in (None, _TERMINATIONS):
             report.warning(
                 (*key, place, "terminations"),
-                f"{segment.terminations} terminating resistors: two of 120 Ω, one at each end of a segment",
+                Text.of("check.terminations", number=segment.terminations),
             )
         if segment.longest_stub_m and manuals:
             report.warning(
                 (*key, place, "longest_stub_m"),
-                f"a stub of {segment.longest_stub_m:g} m: nodes are in a line, without branches "
-                f"({manuals[0].line})",
+                Text.of("check.stub", length=segment.longest_stub_m, source=manuals[0].line),
             )
 
 
@@ -140,13 +139,12 @@ def _check_length(bus: BusView, manuals: Sequence[Manual], report: LintReport) -
         return
     slower = [manual.fastest(total_m + repeaters_m) for manual in manuals]
     rates = [one for one in slower if one is not None]
-    hint = "a shorter cable"
+    advice = Text.of("check.cable_advice")
     if len(rates) == len(slower):
-        hint = f"bitrate = {min(rates)}, or a shorter cable"
-    message = (
-        f"{total_m:g} m of cable are too long for {rate / 1000:g} kbit/s: {max(0.0, most_m):g} m at most"
-    )
-    report.warning((*bus.key, "cable"), f"{message} ({strictest.source})", hint)
+        advice = Text.of("check.cable_rate_advice", rate=min(rates))
+    most_m, source = max(0.0, most_m), strictest.source
+    said = Text.of("check.cable_long", length=total_m, rate=rate / 1000, most=most_m, source=source)
+    report.warning((*bus.key, "cable"), said, advice)
 
 
 def _check_wires(segment: CableTable, key: Key, manual: Manual, report: LintReport) -> None:
@@ -154,10 +152,9 @@ def _check_wires(segment: CableTable, key: Key, manual: Manual, report: LintRepo
     area_mm2 = segment.cross_section_mm2
     if area_mm2 is None or least_mm2 is None or area_mm2 >= least_mm2:
         return
-    message = f"{area_mm2:g} mm² are too thin for {segment.length_m:g} m: {least_mm2:g} mm² at least"
-    report.warning(
-        (*key, "cross_section_mm2"), f"{message} ({manual.source})", "thicker wires, or a repeater"
-    )
+    length_m, source = segment.length_m, manual.source
+    said = Text.of("check.wires_thin", area=area_mm2, length=length_m, least=least_mm2, source=source)
+    report.warning((*key, "cross_section_mm2"), said, Text.of("check.wires_advice"))
 
 
 def _check_segment(
@@ -170,8 +167,12 @@ def _check_segment(
     most_m = longest_m if is_first else longest_m - segment.repeater_m
     if segment.length_m <= most_m:
         return
-    message = (
-        f"{segment.length_m:g} m are too long a segment for {nodes} nodes with {area_mm2:g} mm²: "
-        f"{max(0.0, most_m):g} m at most ({manual.source})"
+    said = Text.of(
+        "check.segment_long",
+        length=segment.length_m,
+        nodes=nodes,
+        area=area_mm2,
+        most=max(0.0, most_m),
+        source=manual.source,
     )
-    report.warning((*key, "length_m"), message, "thicker wires, or a repeater")
+    report.warning((*key, "length_m"), said, Text.of("check.wires_advice"))

@@ -7,6 +7,7 @@ from bridge.lint.report import LintReport
 from bridge.mapping.fields import ObjectRef
 from bridge.parameter import Names
 from bridge.parameter.effect import Effect
+from bridge.text import Text
 
 
 def check_moving(bus: BusView, report: LintReport) -> None:
@@ -20,7 +21,6 @@ def check_moving(bus: BusView, report: LintReport) -> None:
                 continue
             report.error(
                 setting.key,
-                f"{names.at(address).name} of {node.table.name} is {value} at every boot-up: that commands "
-                "what the node moves, and nobody owns it yet",
-                "leave it out; its owner writes it",
+                Text.of("check.moves", parameter=names.at(address).name, node=node.table.name, value=value),
+                Text.of("check.moves_advice"),
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import Final
 
 from bridge.canopen import cobid
@@ -9,6 +10,7 @@ from bridge.canopen.sync import LAST_SYNCHRONOUS, REMOTE_TYPES
 from bridge.lint.bus import BusView, DriveView, NodeView, PdoView
 from bridge.lint.report import LintReport
 from bridge.mapping.model import Family
+from bridge.text import Text
 
 _MOST_BYTES: Final = 8
 _FIRST_EVENT: Final = 254
@@ -27,7 +29,7 @@ def _check_identifier(pdo: PdoView, report: LintReport) -> None:
     if pdo.enabled and not cobid.is_for_pdos(pdo.cob_id):
         report.error(
             pdo.cob_id_key or pdo.key,
-            f"{pdo.name} cannot have COB-ID {pdo.cob_id:X}h: it is none of those for PDOs",
+            Text.of("check.no_pdo_cob_id", pdo=pdo.name, cob_id=pdo.cob_id),
             "181h…57Fh or 680h…6DFh",
         )
 
@@ -38,16 +40,25 @@ def _check_type(family: Family, pdo: PdoView, report: LintReport) -> None:
     if pdo.type_key is None:
         return
     if LAST_SYNCHRONOUS < kind < REMOTE_TYPES[0]:
-        why = "241…251 are reserved"
+        why = Text.of("check.type_reserved")
     elif pdo.receives and kind in REMOTE_TYPES:
-        why = "252 and 253 are for TPDOs sent on request"
+        why = Text.of("check.type_on_request")
     elif kind in forbidden:
-        why = f"{family.family.name} does not have {', '.join(map(str, forbidden))}"
+        types = ", ".join(map(str, forbidden))
+        why = Text.of("check.type_unknown", family=family.family.name, types=types)
     else:
         return
-    events = " or ".join(str(one) for one in (_FIRST_EVENT, _FIRST_EVENT + 1) if one not in forbidden)
-    hint = f"0…240, with SYNC, or {events}, with each change" if events else "0…240, with SYNC"
-    report.error(pdo.type_key, f"{pdo.name} cannot have type {kind}: {why}", hint)
+    said = Text.of("check.pdo_type", pdo=pdo.name, type=kind, why=why)
+    report.error(pdo.type_key, said, _types_instead(forbidden))
+
+
+def _types_instead(forbidden: Container[int]) -> Text:
+    events = [one for one in (_FIRST_EVENT, _FIRST_EVENT + 1) if one not in forbidden]
+    if len(events) > 1:
+        return Text.of("check.type_events_advice", event=events[0], other=events[1])
+    if events:
+        return Text.of("check.type_advice", event=events[0])
+    return Text.of("check.type_sync_advice")
 
 
 def _check_drive(bus: BusView, node: NodeView, drive: DriveView, report: LintReport) -> None:
@@ -59,23 +70,30 @@ def _check_drive(bus: BusView, node: NodeView, drive: DriveView, report: LintRep
         if not pdo.enabled:
             is_downloaded = pdo.cob_id_key is not None and pdo.cob_id_key[: len(pdo.key)] != pdo.key
             key = pdo.cob_id_key if pdo.cob_id_key and is_downloaded else (*pdo.key, "enable")
-            report.error(key, f"{pdo.name} is off: {drive.name} has no process data without it")
+            report.error(key, Text.of("check.pdo_off", pdo=pdo.name, drive=drive.name))
         if pdo.length > _MOST_BYTES:
-            report.error(pdo.key, f"{pdo.name} has {pdo.length} bytes, a PDO has at most {_MOST_BYTES}")
+            said = Text.of("check.pdo_long", pdo=pdo.name, length=pdo.length, most=_MOST_BYTES)
+            report.error(pdo.key, said)
         elif pdo.receives and family.process.exact_length and pdo.length != length:
             report.error(
                 (*pdo.key, "mapping"),
-                f"{pdo.name} has {pdo.length} bytes; {family.family.name} evaluates only {length}",
-                f"{pdo.words} words of 16 bits",
+                Text.of(
+                    "check.pdo_length",
+                    pdo=pdo.name,
+                    length=pdo.length,
+                    family=family.family.name,
+                    wanted=length,
+                ),
+                Text.of("check.pdo_length_advice", words=pdo.words),
             )
         if pdo.transmission_type in (*range(1, 241), 252) and not bus.sync_s:
             report.error(
                 (*pdo.key, "transmission_type"),
-                f"{pdo.name} waits for SYNC (type {pdo.transmission_type}), and the bus has none",
-                "254, or a sync_period_ms",
+                Text.of("check.pdo_without_sync", pdo=pdo.name, type=pdo.transmission_type),
+                Text.of("check.pdo_without_sync_advice"),
             )
         if pdo.inhibit_ms and 0 < pdo.event_ms < pdo.inhibit_ms:
             report.warning(
                 (*pdo.key, "event_ms"),
-                f"{pdo.event_ms} ms is shorter than the inhibit time of {pdo.inhibit_ms:g} ms",
+                Text.of("check.event_short", time=pdo.event_ms, inhibit=pdo.inhibit_ms),
             )

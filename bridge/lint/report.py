@@ -8,6 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from bridge.base.errors import Fault, FileFaults
+from bridge.text import Text
 from bridge.tomlfile import Key, TomlFile, dotted
 
 
@@ -38,15 +39,17 @@ class LintReport:
         except FileFaults:  # the file has gone since it was loaded: its content still counts
             self._file = None
 
-    def error(self, key: Key, message: str, hint: str = "") -> None:
-        self._add(Severity.ERROR, key, message, hint)
+    def error(self, key: Key, said: Text | str, advice: Text | str = "") -> None:
+        self._add(Severity.ERROR, key, said, advice)
 
-    def warning(self, key: Key, message: str, hint: str = "") -> None:
-        self._add(Severity.WARNING, key, message, hint)
+    def warning(self, key: Key, said: Text | str, advice: Text | str = "") -> None:
+        self._add(Severity.WARNING, key, said, advice)
 
-    def _add(self, severity: Severity, key: Sequence[int | str], message: str, hint: str) -> None:
+    def _add(
+        self, severity: Severity, key: Sequence[int | str], said: Text | str, advice: Text | str
+    ) -> None:
         line = self._file.line(key) if self._file else 0
-        fault = Fault(self._path, line, dotted(key), message, hint)
+        fault = Fault(self._path, line, dotted(key), said, advice)
         self._findings.append(LintFinding(severity, fault))
 
     def findings(self) -> tuple[LintFinding, ...]:

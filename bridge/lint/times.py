@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from bridge.canopen.sync import LAST_SYNCHRONOUS, tpdo_deadline_s
@@ -9,6 +10,7 @@ from bridge.config import IGNORE_ALL_S, LIFE_SIGN_MS
 from bridge.lint.bus import BusView, DriveView, NodeView
 from bridge.lint.report import LintReport
 from bridge.node.process.held import held_s, least_deadman_ms
+from bridge.text import Text
 
 _SLOW_ANSWER_MS: Final = 50
 """How long an SDO answer may take: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind
@@ -49,20 +51,19 @@ def _check_supervision(bus: BusView, node: NodeView, report: LintReport) -> None
         other = "guarding" if table.supervision == "heartbeat" else "heartbeat"
         report.error(
             (*node.key, "supervision"),
-            f"{node.family.family.name} has no {' and no '.join(missing)}",
-            f'{table.supervision} is not possible; "{other}" or "none" may be',
+            _lacks(node.family.family.name, missing),
+            Text.of("check.supervision_advice", kind=table.supervision, other=other),
         )
     if table.supervision == "none":
         return
     if table.supervision == "guarding" and table.life_time_factor == 1:
-        message = "is 1: a single lost frame counts as a lost node"
-        report.warning((*node.key, "life_time_factor"), message, "at least 2")
+        said, advice = Text.of("check.one_lost_frame"), Text.of("check.at_least", least=2)
+        report.warning((*node.key, "life_time_factor"), said, advice)
     if table.supervision_ms < 2 * bus.table.sync_period_ms:
         report.warning(
             (*node.key, "supervision_ms"),
-            f"{table.supervision_ms} ms is less than two SYNC periods: a full cycle delays a sign of life "
-            "by one",
-            f"at least {2 * bus.table.sync_period_ms}",
+            Text.of("check.supervision_short", time=table.supervision_ms),
+            Text.of("check.at_least", least=2 * bus.table.sync_period_ms),
         )
 
 
@@ -70,13 +71,13 @@ def _check_sdo(node: NodeView, report: LintReport) -> None:
     timeout_ms, life = node.table.sdo_timeout_ms, life_ms(node)
     key = (*node.key, "sdo_timeout_ms")
     if timeout_ms < _SLOW_ANSWER_MS:
-        message = f"{timeout_ms} ms is shorter than drives take for some parameters"
-        report.warning(key, message, f"at least {_SLOW_ANSWER_MS}")
+        said = Text.of("check.sdo_timeout_short", time=timeout_ms)
+        report.warning(key, said, Text.of("check.at_least", least=_SLOW_ANSWER_MS))
     elif life and timeout_ms > _SDO_LIVES * life:
         report.warning(
             key,
-            f"{timeout_ms} ms: the node counts as lost after {life} ms, long before this time-out ends",
-            f"at most {_SDO_LIVES * life}, or a longer supervision_ms",
+            Text.of("check.sdo_timeout_long", time=timeout_ms, life=life),
+            Text.of("check.sdo_timeout_advice", most=_SDO_LIVES * life),
         )
 
 
@@ -89,15 +90,14 @@ def _check_controller(bus: BusView, drive: DriveView, report: LintReport) -> Non
     if timeout_ms < 2 * period_ms:
         report.error(
             key,
-            f"{timeout_ms} ms is less than two RPDO periods of {period_ms:g} ms: one lost frame is a trip",
-            f"at least {2 * period_ms:g}",
+            Text.of("check.timeout_short", time=timeout_ms, period=period_ms),
+            Text.of("check.at_least", least=2 * period_ms),
         )
     elif bus.table.deadman_ms > timeout_ms:
         report.warning(
             key,
-            f"{timeout_ms} ms is shorter than deadman_ms = {bus.table.deadman_ms}: a drive would run on for "
-            "longer after a hang of the bridge than after its controller fell silent",
-            f"at least {bus.table.deadman_ms}, or a shorter deadman_ms",
+            Text.of("check.timeout_below_deadman", time=timeout_ms, deadman=bus.table.deadman_ms),
+            Text.of("check.deadman_advice", least=bus.table.deadman_ms),
         )
 
 
@@ -108,9 +108,8 @@ def _check_life_sign(drive: DriveView, report: LintReport) -> None:
         return
     report.warning(
         (*drive.key, "fieldbus_timeout_ms"),
-        f"leaves {left_ms} ms for a token of the life sign: it may be {LIFE_SIGN_MS} ms old when it is read, "
-        f"and reading it, the program's cycle and writing it back take up to {_ROUND_TRIP_MS} ms",
-        f"at least {LIFE_SIGN_MS + _ROUND_TRIP_MS}",
+        Text.of("check.life_sign", left=left_ms, old=LIFE_SIGN_MS, most=_ROUND_TRIP_MS),
+        Text.of("check.at_least", least=LIFE_SIGN_MS + _ROUND_TRIP_MS),
     )
 
 
@@ -121,16 +120,14 @@ def _check_range(drive: DriveView, report: LintReport) -> None:
         return
     low, high = table.timeout_range_ms
     if not table.fieldbus_timeout_writable:
-        message = "has no effect: the owner may not set its time-out"
-        report.warning(key, message, "fieldbus_timeout_writable = true, or leave it out")
+        report.warning(key, Text.of("check.range_fixed"), Text.of("check.range_fixed_advice"))
         return
     if low == 0:
-        message = "begins with 0: the owner may switch off the time-out that stops its drive"
-        report.warning(key, message, "at least 1, better two RPDO periods and more")
+        report.warning(key, Text.of("check.range_from_0"), Text.of("check.range_from_0_advice"))
     own_ms = table.fieldbus_timeout_ms
     if own_ms and not low <= own_ms <= high:
-        message = f"{low}…{high} ms does not include the site's own fieldbus_timeout_ms = {own_ms}"
-        report.warning(key, message, "a range that does: an owner that changed it cannot set it back")
+        said = Text.of("check.range_without_own", low=low, high=high, time=own_ms)
+        report.warning(key, said, Text.of("check.range_without_own_advice"))
 
 
 def _check_held(bus: BusView, drive: DriveView, report: LintReport) -> None:
@@ -144,13 +141,16 @@ def _check_held(bus: BusView, drive: DriveView, report: LintReport) -> None:
     if kind > LAST_SYNCHRONOUS or not sync_ms or held_s(bus.table, kind):
         return
     least_ms = least_deadman_ms(bus.table, kind)
-    longer = f", or deadman_ms = {least_ms}" if least_ms <= min(timeout_ms, _LONGEST_DEADMAN_MS) else ""
+    advice = Text.of("check.stop_waits_advice")
+    if least_ms <= min(timeout_ms, _LONGEST_DEADMAN_MS):
+        advice = Text.of("check.stop_waits_deadman_advice", deadman=least_ms)
+    time_ms = max(1, kind) * sync_ms
     report.warning(
         rpdo.type_key or drive.key,
-        f"{rpdo.name} of type {kind} waits for SYNC for up to {max(1, kind) * sync_ms} ms: with deadman_ms = "
-        f"{bus.table.deadman_ms} no SYNC makes the stop effective if bridge and controller fail together; "
-        "then only the drive's own time-out stops it",
-        f"type 254 or 255, a shorter sync_period_ms{longer}",
+        Text.of(
+            "check.stop_waits_for_sync", pdo=rpdo.name, type=kind, time=time_ms, deadman=bus.table.deadman_ms
+        ),
+        advice,
     )
 
 
@@ -167,20 +167,24 @@ def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: Lint
         deadline_s = given_ms / 1000 or None
     if downtime_s <= 0:
         if downtime_s == 0 and node.table.supervision == "none":
-            message = "is 0, and the node is not supervised: nobody would notice a lost drive"
-            report.warning(key, message)
+            report.warning(key, Text.of("check.nobody_notices"))
         return
     if deadline_s is None:
         if given_ms == 0:
-            message = "has no effect: tpdo_deadline_ms = 0 says that the TPDO is never late"
-            report.warning(key, message, "leave one of the two out")
+            report.warning(key, Text.of("check.tpdo_never_late"), Text.of("check.leave_one_out"))
         elif node.dictionary or drive.table.tpdo:
-            message = f"has no effect: {tpdo.name} is sent only when a value changes"
-            report.warning(key, message, "an event_ms, or a synchronous transmission type")
+            said = Text.of("check.tpdo_on_change", pdo=tpdo.name)
+            report.warning(key, said, Text.of("check.tpdo_on_change_advice"))
     elif downtime_s < deadline_s:
         report.warning(
             key,
-            f"{downtime_s:g} s is shorter than the pauses of {tpdo.name}, which is late only after "
-            f"{deadline_s:.3g} s",
-            f"at least {deadline_s:.3g}, or a shorter event_ms or transmission type",
+            Text.of("check.downtime_short", time=downtime_s, pdo=tpdo.name, late=deadline_s),
+            Text.of("check.downtime_advice", least=deadline_s),
         )
+
+
+def _lacks(family: str, objects: Sequence[str]) -> Text:
+    """``objects`` are one or two that supervision needs."""
+    if len(objects) == 1:
+        return Text.of("check.no_error_control", family=family, object=objects[0])
+    return Text.of("check.no_guarding", family=family, object=objects[0], other=objects[1])

@@ -35,7 +35,7 @@ def placed(fault: Fault, keys: Mapping[str | None, str], site: Path) -> Fault:
     """The fault at the line of the site file's key that it is about; ``keys`` are those that name files, by
     the files."""
     if fault.file in keys:
-        fault = replace(fault, key=keys[fault.file], message=f"{fault.file} {fault.message}")
+        fault = replace(fault, key=keys[fault.file], said=f"{fault.file} {fault.message}")
     if not fault.key:
         return fault
     steps = [name or int(number) for name, number in _STEP.findall(fault.key)]

@@ -74,7 +74,7 @@ def _kept_or_new(settings: OpcUaTable, folder: Path) -> OwnCertificate:
             return load_own(certificate, key)
         except FileFaults as error:
             hint = f"take {CERTIFICATE} and {KEY} away: new ones are made, which clients have to trust anew"
-            raise FileFaults([replace(fault, hint=hint) for fault in error.faults]) from None
+            raise FileFaults([replace(fault, advice=hint) for fault in error.faults]) from None
     uri = settings.application_uri or _kept_uri(folder) or _first_uri()
     own = new_own(certificate, key, uri, names_of(settings.listen, settings.names))
     if not settings.application_uri:

@@ -111,7 +111,7 @@ class System:
         async with self._checking:
             file = await self._asked(self._facts.site_file, {"path": "", "text": ""}, faults)
             findings = await self._asked(self._facts.check, [], faults)
-        failed = [{"severity": "error", "line": 0, "text": f"{one.of}: {one.text}"} for one in faults]
+        failed = [{"severity": "error", "line": 0, "message": f"{one.of}: {one.text}"} for one in faults]
         return _fresh(file | {"findings": failed + findings})
 
     async def _audit(self, request: Request) -> Response:

@@ -16,11 +16,12 @@ from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives.hashes import SHA256
 
 from bridge import __version__
-from bridge.base.errors import BridgeError, FileFaults
+from bridge.base.errors import BridgeError, Fault, FileFaults
 from bridge.config import Site
 from bridge.lint import Severity, lint
 from bridge.northbound.page.system import CertificateFacts, Unreadable
 from bridge.project import Project, load_project
+from bridge.text import as_json
 
 _LIBRARIES: Final = ("asyncua", "pymodbus", "eclipse-zenoh", "python-can", "canopen", "starlette", "uvicorn")
 _SECRETS: Final = (
@@ -82,15 +83,15 @@ class SystemOf:
             project = load_project(self._path)
             verdict = lint(project.site, project.families, project.path, project.downloads)
         except FileFaults as error:
-            return [{"severity": "error", "line": one.line, "text": str(one)} for one in error.faults]
+            return [_shown("error", one) for one in error.faults]
         except BridgeError as error:
-            return [{"severity": "error", "line": 0, "text": str(error)}]
+            return [{"severity": "error", "line": 0, "message": str(error)}]
         findings = [
             (severity, one.fault)
             for severity in (Severity.ERROR, Severity.WARNING)
             for one in verdict.of(severity)
         ]
-        return [{"severity": str(one), "line": fault.line, "text": str(fault)} for one, fault in findings]
+        return [_shown(str(one), fault) for one, fault in findings]
 
     def audit(self, lines: int) -> list[dict[str, Any]]:
         table = self._site.audit
@@ -100,6 +101,10 @@ class SystemOf:
         refused = path.with_name(f"{path.stem}-refused{path.suffix}")
         entries = [*_entries(path, lines), *_entries(refused, lines)]
         return sorted(entries, key=lambda entry: str(entry.get("t", "")), reverse=True)[:lines]
+
+
+def _shown(severity: str, fault: Fault) -> dict[str, Any]:
+    return {"severity": severity, "line": fault.line, "message": str(fault), "text": as_json(fault.text)}
 
 
 def _entries(path: Path, most: int) -> list[dict[str, Any]]:

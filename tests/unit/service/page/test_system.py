@@ -76,7 +76,8 @@ def test_the_site_file_is_checked_as_it_is_now(tmp_path: Path) -> None:
     (finding, *_) = facts.check()
     assert finding["severity"] == "error"
     assert finding["line"] > 0
-    assert "fu9" in finding["text"]
+    assert "fu9" in finding["message"]
+    assert finding["text"]["code"].startswith("file.")
     path.unlink()
     assert "cannot be read" in facts.site_file()["text"]
     assert facts.check()[0]["severity"] == "error"

@@ -1,7 +1,7 @@
 // The site file as it lies on the box, without its secrets, and what a check of it finds.
 
 import { html } from "../ui.js";
-import { many, t, translated } from "../texts.js";
+import { many, t, worded } from "../texts.js";
 import { Failure, useFetched } from "../fetched.js";
 import { Icon } from "../icons.js";
 
@@ -16,7 +16,7 @@ export function SiteFile() {
       <${Failure} told=${told} />
       ${file?.changed && html`<p class="is-warning"><${Icon} name="warning" /> ${t("system.changed")}</p>`}
       ${file && html`<ul class="findings">${file.findings.map((one) => html`<li class=${one.severity === "error" ? "is-alarm" : "is-warning"}>
-        <${Icon} name=${one.severity === "error" ? "alarm" : "warning"} /> <span>${translated(one.text)}</span></li>`)}</ul>
+        <${Icon} name=${one.severity === "error" ? "alarm" : "warning"} /> <span>${worded(one.text, one.message)}</span></li>`)}</ul>
         <details><summary>${t("system.text")}</summary>
           <pre class="file" tabindex="0"><code>${lines(file.text, file.findings)}</code></pre></details>`}
     </section>

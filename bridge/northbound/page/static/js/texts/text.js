@@ -27,11 +27,12 @@ function inQuotes(text) {
   return mark + text.replaceAll("\\", "\\\\").replaceAll(mark, `\\${mark}`).replaceAll("\n", "\\n") + mark;
 }
 
-/** `number` in a format of Python's: decimals (".1f"), six digits ("g"), hexadecimal ("04X"). */
+/** `number` in a format of Python's: decimals (".1f"), six digits or so many ("g", ".3g"), hexadecimal ("04X"). */
 export function formatted(number, format) {
   const [, decimals] = /^\.(\d+)f$/.exec(format) ?? [];
   if (decimals) return fixed(number, Number(decimals));
-  if (format === "g") return general(number);
+  const general = /^(?:\.(\d+))?g$/.exec(format);
+  if (general) return inDigits(number, Number(general[1] ?? 6));
   const [, width] = /^0?(\d*)X$/.exec(format) ?? [];
   if (width !== undefined) return number.toString(16).toUpperCase().padStart(Number(width), "0");
   return String(number);
@@ -46,9 +47,8 @@ function fixed(number, decimals) {
   return number.toFixed(decimals);
 }
 
-function general(number) {
-  const exponent = number === 0 ? 0 : Number(number.toExponential(5).split("e")[1]);
-  if (exponent >= -4 && exponent < 6) return String(Number(number.toPrecision(6)));
-  const [digits, power] = number.toExponential(5).split("e");
+function inDigits(number, most) {
+  const [digits, power] = number.toExponential(most - 1).split("e");
+  if (Number(power) >= -4 && Number(power) < most) return String(Number(number.toPrecision(most)));
   return `${Number(digits)}e${power[0]}${power.slice(1).padStart(2, "0")}`;
 }

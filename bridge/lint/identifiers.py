@@ -9,6 +9,7 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.lint.bus import BusView, NodeView
 from bridge.lint.report import LintReport
+from bridge.text import Text
 from bridge.tomlfile import Key
 
 _LSS: Final = (0x7E4, 0x7E5)
@@ -20,14 +21,18 @@ class _Use:
     site gives it this COB-ID, with ``key``."""
 
     cob_id: int
-    what: str
+    what: Text | str
     owner: str
+    """The node's name; empty for the bridge."""
     key: Key
     active: bool = True
     moved: bool = False
 
-    def __str__(self) -> str:
-        return f"{self.what} of {self.owner}"
+    @property
+    def text(self) -> Text:
+        if not self.owner:
+            return Text.of("use.of_bridge", what=self.what)
+        return Text.of("use.of_node", what=self.what, node=self.owner)
 
 
 def check_identifiers(bus: BusView, report: LintReport) -> None:
@@ -43,20 +48,25 @@ def check_identifiers(bus: BusView, report: LintReport) -> None:
     for pairs in collisions.values():
         pairs.sort(key=lambda pair: not (pair[0].active and pair[1].active))
         other, use = pairs[0]
-        more = f", and {len(pairs) - 1} more" if len(pairs) > 1 else ""
         key = other.key if other.moved and not use.moved else use.key
-        message = f"{use} has COB-ID {use.cob_id:X}h, which is {other}'s, too{more}"
+        said = _collision(use, other, len(pairs) - 1)
         if use.active and other.active:
-            report.error(key, message, "give one of the nodes another id or another cob_id")
+            report.error(key, said, Text.of("check.same_cob_id_advice"))
         else:
             off = use if not use.active else other
-            hint = f"it works as long as {off} is off; another node id is safer"
-            report.warning(key, message, hint)
+            report.warning(key, said, Text.of("check.same_cob_id_off_advice", use=off.text))
+
+
+def _collision(use: _Use, other: _Use, more: int) -> Text:
+    name, cob_id, whose = use.text, use.cob_id, other.text
+    if more:
+        return Text.of("check.same_cob_ids", use=name, cob_id=cob_id, other=whose, more=more)
+    return Text.of("check.same_cob_id", use=name, cob_id=cob_id, other=whose)
 
 
 def _uses(bus: BusView) -> Iterator[_Use]:
     table = bus.table
-    bridge = "the bridge"
+    bridge = ""
     yield _Use(cobid.NMT, "NMT", bridge, bus.key)
     yield _Use(cobid.SYNC, "SYNC", bridge, bus.key, active=bool(table.sync_period_ms))
     yield _Use(cobid.TIME, "TIME", bridge, bus.key, active=bool(table.time_period_s))
@@ -64,7 +74,7 @@ def _uses(bus: BusView) -> Iterator[_Use]:
         yield _Use(cob_id, "LSS", bridge, bus.key, active=False)
     yield _Use(
         cobid.ERROR_CONTROL + table.master_node_id,
-        "the heartbeat",
+        Text.of("use.heartbeat"),
         bridge,
         (*bus.key, "master_node_id"),
         active=bool(table.heartbeat_ms),
@@ -77,13 +87,15 @@ def _node_uses(node: NodeView) -> Iterator[_Use]:
     node_id, name, key = node.table.id, node.table.name, (*node.key, "id")
     if node.emcy_id is not None:
         yield _Use(node.emcy_id, "EMCY", name, key)
-    yield _Use(cobid.SDO_REQUEST + node_id, "SDO1 request", name, key)
-    yield _Use(cobid.SDO_REPLY + node_id, "SDO1 reply", name, key)
-    yield _Use(cobid.ERROR_CONTROL + node_id, "error control", name, key)
+    yield _Use(cobid.SDO_REQUEST + node_id, Text.of("use.sdo_request", number=1), name, key)
+    yield _Use(cobid.SDO_REPLY + node_id, Text.of("use.sdo_reply", number=1), name, key)
+    yield _Use(cobid.ERROR_CONTROL + node_id, Text.of("use.error_control"), name, key)
     for server in node.family.sdo:
         is_open = server.number in node.table.sdo_channels
-        yield _Use(server.request + node_id, f"SDO{server.number} request", name, key, active=is_open)
-        yield _Use(server.reply + node_id, f"SDO{server.number} reply", name, key, active=is_open)
+        request = Text.of("use.sdo_request", number=server.number)
+        reply = Text.of("use.sdo_reply", number=server.number)
+        yield _Use(server.request + node_id, request, name, key, active=is_open)
+        yield _Use(server.reply + node_id, reply, name, key, active=is_open)
     for pdo in node.pdos:
         moved = pdo.cob_id_key
         yield _Use(pdo.cob_id, pdo.name, name, moved or key, active=pdo.enabled, moved=moved is not None)

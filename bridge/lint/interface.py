@@ -6,6 +6,7 @@ from typing import Final
 
 from bridge.lint.bus import BusView
 from bridge.lint.report import LintReport
+from bridge.text import Text
 
 _BY_NETWORK: Final = frozenset({"udp_multicast", "socketcand"})
 """Of python-can. What they read is no CAN frame of 8 bytes at most, but what anybody sends."""
@@ -16,6 +17,6 @@ def check_interface(bus: BusView, report: LintReport) -> None:
     if bus.table.interface in _BY_NETWORK:
         report.warning(
             (*bus.key, "interface"),
-            "frames come over the network from whoever reaches it, into the process that moves drives",
-            "for simulations and tests; a CAN interface of this machine for real drives",
+            Text.of("check.by_network"),
+            Text.of("check.by_network_advice"),
         )

@@ -11,6 +11,7 @@ from bridge.can.wirebits import longest_bits
 from bridge.lint.bus import BusView, NodeView, PdoView
 from bridge.lint.report import LintReport
 from bridge.node.boot.error_control import heartbeat_period_ms
+from bridge.text import Text
 
 _SDO_BYTES: Final = 8
 _TIME_BYTES: Final = 6
@@ -124,20 +125,19 @@ def check_load(bus: BusView, report: LintReport) -> BusLoad:
     """Predict the load and judge it."""
     load = predict(bus)
     key = (*bus.key, "bitrate")
-    hint = "a longer rpdo_period_ms or sync_period_ms, a higher bit rate, or another bus"
+    advice = Text.of("check.load_advice")
     if load.load_percent > _FULL:
-        message = f"the predicted load is {load.load_percent:.0f} %: more than the bus can carry"
-        report.error(key, message, hint)
+        report.error(key, Text.of("check.load_full", load=load.load_percent), advice)
     elif load.load_percent > _WORTH_A_WARNING:
-        report.warning(key, f"the predicted load is {load.load_percent:.0f} %: frames will be late", hint)
+        report.warning(key, Text.of("check.load_high", load=load.load_percent), advice)
     elif load.most_percent > _FULL:
-        message = f"the predicted load is up to {load.most_percent:.0f} % while all actual values change"
-        report.warning(key, message, "a longer inhibit time of the TPDOs")
+        said = Text.of("check.load_most", load=load.most_percent)
+        report.warning(key, said, Text.of("check.load_most_advice"))
     if bus.sync_s and load.cycle_ms > load.sync_period_ms:
         report.error(
             (*bus.key, "sync_period_ms"),
-            f"one cycle takes {load.cycle_ms:.1f} ms on the wire: more than the SYNC period",
-            f"at least {math.ceil(load.cycle_ms)}",
+            Text.of("check.cycle_long", time=load.cycle_ms),
+            Text.of("check.at_least", least=math.ceil(load.cycle_ms)),
         )
     _check_window(bus, load, report)
     return load
@@ -153,12 +153,12 @@ def _check_window(bus: BusView, load: BusLoad, report: LintReport) -> None:
         return
     key = (*bus.key, "sync_window_us")
     if not synchronous:
-        report.warning(key, "has no effect: no TPDO of this bus is synchronous (transmission type 0…240)")
+        report.warning(key, Text.of("check.window_no_effect"))
         return
     needed_us = 1000 * load.cycle_ms + 1e6 * longest_bits(8) / bus.table.bitrate
     if needed_us > window_us:
         report.warning(
             key,
-            f"{window_us} µs is shorter than one cycle takes on the wire, {needed_us:.0f} µs",
-            f"at least {math.ceil(needed_us / 100) * 100}, or fewer synchronous PDOs",
+            Text.of("check.window_short", window=window_us, cycle=needed_us),
+            Text.of("check.window_advice", least=math.ceil(needed_us / 100) * 100),
         )

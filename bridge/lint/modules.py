@@ -8,6 +8,7 @@ from typing import Final
 from bridge.eds import Description
 from bridge.lint.bus import BusView
 from bridge.lint.report import LintReport
+from bridge.text import Text
 
 _SHOWN: Final = 3
 
@@ -22,6 +23,6 @@ def check_modules(bus: BusView, dictionaries: Mapping[str, Description], report:
         more = ", …" if len(known.modules) > _SHOWN else ""
         report.warning(
             (*node.key, "mapping"),
-            f"the file knows {len(known.modules)} modules, and none is named: what they bring is not served",
-            f"modules = [{listed}{more}], in the order in which they stand",
+            Text.of("check.modules_not_named", count=len(known.modules)),
+            Text.of("check.modules_advice", names=listed + more),
         )

@@ -15,6 +15,7 @@ from bridge.lint.wire import busy_bits, wire_of
 from bridge.mapping.fields import ObjectRef
 from bridge.mapping.own_places import offline
 from bridge.node.boot.device_watch import keeps_outputs, why_not_safe
+from bridge.text import Text
 
 _ASYNCHRONOUS = 255
 
@@ -40,18 +41,21 @@ def check_outputs(bus: BusView, report: LintReport) -> None:
             continue
         name, table = node.table.name, node.table.outputs
         if table.fieldbus_timeout_ms == 0:
-            message = f"is 0: the outputs of {name} stay as they are when their controller is silent"
-            report.warning((*node.key, "outputs", "fieldbus_timeout_ms"), message)
+            said = Text.of("check.outputs_unwatched", node=name)
+            report.warning((*node.key, "outputs", "fieldbus_timeout_ms"), said)
         if _words(node).all_hold:
             continue
         own = judged_outputs(bus, node)
         if own.verdict is not OwnVerdict.STOPS and not own.accepted:
-            stay = "stay" if own.verdict is OwnVerdict.RUNS_ON else "may stay"
+            stay = own.verdict is OwnVerdict.RUNS_ON
             report.warning(
                 node.key,
-                f"{name}: its outputs {stay} as they are when the bridge falls silent: {own.reason}",
-                'own_timeout_ms and enforce = true; or say why they may, accepts = { runs_on = "…" } of '
-                "[bus.node.outputs]",
+                Text.of(
+                    "check.outputs_stay" if stay else "check.outputs_may_stay",
+                    node=name,
+                    why=Text.plain(own.reason),
+                ),
+                Text.of("check.outputs_stay_advice"),
             )
 
 

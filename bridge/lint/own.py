@@ -15,6 +15,7 @@ from bridge.lint.report import LintReport
 from bridge.lint.wire import busy_bits, wire_of
 from bridge.mapping.model import OwnSupervision
 from bridge.mapping.own_places import channels_needed, offline, place_of, settable, wanted
+from bridge.text import Text
 from bridge.tomlfile import Key
 
 
@@ -104,28 +105,27 @@ def _check_times(bus: BusView, node: NodeView, report: LintReport) -> None:
     key, own_ms = _given(bus, node, entry)
     if not own_ms:
         return
-    place = place_of(node.family, entry)
-    name = f"the node's own time-out, {place.ref} = {own_ms:g} ms,"
-    if entry.watches == "heartbeat":
-        period_ms = float(bus.table.heartbeat_ms)
-        if not period_ms:
-            report.error(key, f"{name} waits for the bridge's heartbeat, and heartbeat_ms is 0")
-            return
-        every = "heartbeat periods"
-    else:
-        period_ms, every = 1000 * bus.table.rpdo_period_s, "RPDO periods"
-    if own_ms < 2 * period_ms:
+    place, deadman_ms = str(place_of(node.family, entry).ref), bus.table.deadman_ms
+    is_heartbeat = entry.watches == "heartbeat"
+    period_ms = float(bus.table.heartbeat_ms) if is_heartbeat else 1000 * bus.table.rpdo_period_s
+    if is_heartbeat and not period_ms:
+        report.error(key, Text.of("check.own_without_heartbeat", place=place, time=own_ms))
+    elif own_ms < 2 * period_ms:
         report.error(
             key,
-            f"{name} is less than two {every} of {period_ms:g} ms: one lost frame stops its drives",
-            f"at least {2 * period_ms:g} ms",
+            Text.of(
+                "check.own_below_heartbeat" if is_heartbeat else "check.own_below_rpdo",
+                place=place,
+                time=own_ms,
+                period=period_ms,
+            ),
+            Text.of("check.at_least_ms", least=2 * period_ms),
         )
-    elif own_ms < bus.table.deadman_ms:
+    elif own_ms < deadman_ms:
         report.warning(
             key,
-            f"{name} is shorter than deadman_ms = {bus.table.deadman_ms}: a pause that the bridge survives "
-            "would stop its drives",
-            f"at least {bus.table.deadman_ms} ms, or a shorter deadman_ms",
+            Text.of("check.own_below_deadman", place=place, time=own_ms, deadman=deadman_ms),
+            Text.of("check.own_deadman_advice", least=deadman_ms),
         )
 
 
@@ -156,17 +156,17 @@ def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
         return False
     key, own_ms = _given(bus, node, entry)
     if own_ms:
-        is_set = f"{setting.value}" if setting is not None else "not set, and none by factory setting"
-        message = f"the node's own time-out, {time.ref}, has no effect: its reaction {place.ref} is {is_set}"
-        report.warning(key, message, f"write {place.ref} too")
+        said = Text.of("check.own_reaction_not_set", place=str(time.ref), reaction=str(place.ref))
+        if setting is not None:
+            value = setting.value
+            said = Text.of("check.own_no_reaction", place=str(time.ref), reaction=str(place.ref), value=value)
+        report.warning(key, said, Text.of("check.own_reaction_advice", place=str(place.ref)))
         return True
     if setting is None and any(_runs_on(judged(bus, node, drive)) for drive in node.drives):
         report.warning(
             node.key,
-            f"{node.family.family.name} does nothing by itself when the bridge falls silent, unless "
-            f"{place.ref} has been set: with factory settings its drives run on",
-            f"own_timeout_ms and enforce = true, or a [[bus.node.configure]] for {place.ref}, and for "
-            f"{time.ref}, its time",
+            Text.of("check.own_does_nothing", family=node.family.family.name, place=str(place.ref)),
+            Text.of("check.own_does_nothing_advice", reaction=str(place.ref), time=str(time.ref)),
         )
         return True
     return False
@@ -181,25 +181,27 @@ def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
         if _runs_on(own):
             drives.setdefault((own.verdict, own.reason), []).append(drive.name)
     for (verdict, reason), names in drives.items():
-        runs_on = "runs on" if verdict is OwnVerdict.RUNS_ON else "may run on"
-        message = f"{', '.join(names)}: {runs_on} when the bridge falls silent: {reason}"
-        report.warning(node.key, message, _remedy(node, names))
+        runs_on = verdict is OwnVerdict.RUNS_ON
+        said = Text.of(
+            "check.runs_on" if runs_on else "check.may_run_on",
+            drives=", ".join(names),
+            why=Text.plain(reason),
+        )
+        report.warning(node.key, said, Text.of("check.runs_on_advice", what=_remedy(node, names)))
 
 
-def _remedy(node: NodeView, names: Sequence[str]) -> str:
+def _remedy(node: NodeView, names: Sequence[str]) -> Text:
     """What a site can do about these drives, which would run on."""
     family = node.family
     if settable(family) is not None:
-        what = "own_timeout_ms and enforce = true"
         slots = [family.slot_named(drive.table.slot) for drive in node.drives if drive.name in names]
         channels = channels_needed(family, node.table, slots)
         if channels:
-            what += f", and sdo_channels = {channels}, over which their own parameters are reached"
-    elif any(entry.watches == "guarding" for entry in family.own_supervision):
-        what = 'supervision = "guarding"'
-    else:
-        what = "a time-out in the drive itself"
-    return f'{what}; or say why it may run on, accepts = {{ runs_on = "…" }} of the drive'
+            return Text.of("check.enforce_by_channels", channels=str(channels))
+        return Text.of("check.enforce")
+    if any(entry.watches == "guarding" for entry in family.own_supervision):
+        return Text.of("check.guard")
+    return Text.of("check.time_in_drive")
 
 
 def _runs_on(own: OwnJudgement) -> bool:

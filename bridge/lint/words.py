@@ -12,6 +12,7 @@ from bridge.mapping.fields import MappedObject
 from bridge.mapping.model import Family, ObjectRef, Pdo, Slot
 from bridge.parameter.effect import Effect
 from bridge.parameter.profiles import effect_of
+from bridge.text import Text
 
 _PROFILE: Final = range(0x6000, 0x6800)
 _CIA_402: Final = 402
@@ -42,11 +43,16 @@ def _check_carried(node: NodeView, drive: DriveView, report: LintReport) -> None
         meant = {word for one in node.family.value if one.group == group for word in one.word_names}
         carried = {word for pdo in pdos_of for word in pdo.words or words}
         if missing := [word for word in words if word in meant - carried]:
-            verb = "is" if len(missing) == 1 else "are"
+            one = len(missing) == 1
             report.error(
                 (*node.key, "mapping"),
-                f"{', '.join(missing)} of {drive.name} {verb} carried by no {name.upper()}",
-                f"in {node.table.mapping}: name it in words of a [[slot.{name}]], or leave its values out",
+                Text.of(
+                    "check.word_not_carried" if one else "check.words_not_carried",
+                    words=", ".join(missing),
+                    drive=drive.name,
+                    pdo=name.upper(),
+                ),
+                Text.of("check.words_advice", mapping=node.table.mapping, kind=name),
             )
 
 
@@ -62,9 +68,8 @@ def _check_on(
     kind = "rpdo" if view.receives else "tpdo"
     report.error(
         (*drive.key, kind),
-        f"{view.name} is off in the device's description, and nothing switches it on: "
-        f"{drive.name} has no process data without it",
-        f"write = true in its [[slot.{kind}]] of the mapping file, or a table [bus.node.drive.{kind}]",
+        Text.of("check.off_in_device", pdo=view.name, drive=drive.name),
+        Text.of("check.off_in_device_advice", kind=kind),
     )
 
 
@@ -80,11 +85,15 @@ def _check_zeros(node: NodeView, drive: DriveView, slot: Slot, report: LintRepor
         is_mode = ref.index == _MODE
         if value == 0 and not is_mode:
             continue
-        why = "which is no mode of operation" if is_mode else "until somebody commands it"
         (report.error if is_mode else report.warning)(
             (*node.key, "mapping"),
-            f"RPDO{pdo.number} of {drive.name} sends {ref.index:04X}h:{ref.sub:02X} as 0, {why}",
-            f"in {node.table.mapping}: [process] rest = {{ {words[0]} = … }}",
+            Text.of(
+                "check.sends_no_mode" if is_mode else "check.sends_zero",
+                pdo=f"RPDO{pdo.number}",
+                drive=drive.name,
+                object=f"{ref.index:04X}h:{ref.sub:02X}",
+            ),
+            Text.of("check.sends_zero_advice", mapping=node.table.mapping, word=words[0]),
         )
 
 

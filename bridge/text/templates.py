@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from string import Formatter
 from typing import Final, NamedTuple
 
@@ -41,7 +41,7 @@ def parse(template: str) -> tuple[Part, ...]:
 @cache
 def source(language: str) -> bytes:
     """The file of templates, as it is served to browsers."""
-    return (files("bridge.text") / f"{language}.json").read_bytes()
+    return (Path(__file__).parent / f"{language}.json").read_bytes()
 
 
 @cache

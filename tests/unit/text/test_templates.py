@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+import sys
 from pathlib import Path
 from typing import Final
 
@@ -163,3 +164,14 @@ def test_a_list_has_each_of_its_texts_once(leaves: list[str]) -> None:
     affected = tuple(Text.plain(leaf) for leaf in leaves)
     shown = render(Text.of("meaning.unreadable", parameter="P", in_set=1, affected=affected))
     assert shown.partition("read: ")[2] == "; ".join(leaves)
+
+
+def test_templates_are_read_before_the_first_event() -> None:
+    """A trip is told in the round that stops the drive: it must not wait for a disk."""
+    script = (
+        "import bridge.command.messages.event\n"
+        "from bridge.text.templates import templates\n"
+        "print(templates.cache_info().currsize)"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout == "1\n"

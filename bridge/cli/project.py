@@ -101,7 +101,8 @@ def _as_json(project: Project, verdict: Verdict) -> dict[str, Any]:
 
 
 def _fault(fault: Fault, severity: Severity) -> dict[str, Any]:
-    return {"severity": severity.value, **asdict(fault)}
+    place = {"file": fault.file, "line": fault.line, "key": fault.key}
+    return {"severity": severity.value, **place, "message": fault.message, "hint": fault.hint}
 
 
 def hash_password() -> None:

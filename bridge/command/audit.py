@@ -222,10 +222,10 @@ class AuditTrail:
             new = rejection.values
             self._note(AuditEntry(now, who, rejection.target, rejection.action, ending, new=new, count=count))
 
-    def stop_ended(self, target: str, outcome: str, message: str, now: float) -> None:
+    def stop_ended(self, target: str, outcome: str, said: Text, now: float) -> None:
         """A stop that was forwarded has been followed or ignored."""
         if self._listener is not None:
-            ending = Ending(Code.OK if outcome == "followed" else outcome, message, forwarded=True)
+            ending = Ending(Code.OK if outcome == "followed" else outcome, said, forwarded=True)
             self._note_other(AuditEntry(now, _BRIDGE, target, "stop_ended", ending))
 
     def _held(self, request: Request) -> Values:

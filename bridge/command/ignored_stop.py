@@ -12,10 +12,10 @@ from bridge.command.messages.request import Action
 from bridge.command.node import Node
 from bridge.command.outputs import Outputs
 from bridge.command.stop_check.state import LastStop, Verdict
+from bridge.text import Text
 
 _WORST: Final = 1000
 """The highest severity there is (OPC UA Part 5 §6.4.2)."""
-_WORDS: Final = {Action.STOP_NODE: "NMT stop", Action.RESET: "NMT reset node"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Conclusion:
     """Consequences of a verdict: ``logged`` goes to the audit log, ``event`` to people (None: it is of no
     interest), and ``action`` is taken on the node in the bridge's own name."""
 
-    logged: str
+    logged: Text
     event: Event | None = None
     action: Action | None = None
 
@@ -32,42 +32,39 @@ def concluded(node: Node, one: Drive | Outputs, verdict: Verdict, now: float) ->
     """What follows from how the last stop of ``one`` has ended."""
     took_s = verdict.at - verdict.since
     if verdict.outcome is not LastStop.IGNORED:
-        logged = f"after {took_s:.3f} s"
+        logged = Text.of("stop.done_after", took_s=took_s)
         if verdict.before is not LastStop.IGNORED:
             return Conclusion(logged)
-        says = _heard(one) if isinstance(one, Drive) else "its outputs are as they are sent"
-        return Conclusion(logged, _event(one, 300, f"follows its stop after all: {says}", now))
+        says = _heard(one) if isinstance(one, Drive) else Text.of("stop.outputs_as_sent")
+        return Conclusion(logged, _event(one, 300, Text.of("stop.follows_after_all", says=says), now))
     if verdict.is_cut_off and isinstance(one, Drive):
         # What can be done has been done: its node has been told to stop, and takes no more words.
-        message = _cut_off(node, one, took_s)
-        return Conclusion(message, _event(one, _WORST, message, now))
+        said = _cut_off(node, one, took_s)
+        return Conclusion(said, _event(one, _WORST, said, now))
     action = _reaction(one, verdict)
-    of_one = _of_drive(one, verdict, took_s) if isinstance(one, Drive) else _of_outputs(one, verdict, took_s)
-    message = f"{of_one}; {_done(action, node, one)}"
-    return Conclusion(message, _event(one, _WORST, message, now), action)
+    what = _of_drive(one, verdict, took_s) if isinstance(one, Drive) else _of_outputs(one, verdict, took_s)
+    said = Text.of("stop.ignored_and_done", what=what, done=_done(action, node, one))
+    return Conclusion(said, _event(one, _WORST, said, now), action)
 
 
-def _event(one: Drive | Outputs, severity: int, message: str, now: float) -> Event:
-    return Event(now, Kind.WATCHDOG, one.name, severity, message)
+def _event(one: Drive | Outputs, severity: int, said: Text, now: float) -> Event:
+    return Event(now, Kind.WATCHDOG, one.name, severity, said)
 
 
-def _of_drive(drive: Drive, verdict: Verdict, took_s: float) -> str:
-    summed = verdict.summed
+def _of_drive(drive: Drive, verdict: Verdict, took_s: float) -> Text:
+    summed, says = verdict.summed, _heard(drive)
     if summed is not None and summed.stops > 1:
-        stops = f"{summed.stops} stops of together {summed.time_s:.2f} s"
-        what = f"ignores its stop: enabled and no slower in {stops}"
-    elif verdict.before is LastStop.FOLLOWED:
-        what = f"is enabled although nothing that enables was sent: {_sent(drive)} for {took_s:.2f} s"
-    else:
-        what = f"ignores its stop: {_sent(drive)} since {took_s:.2f} s"
-    return f"{what}, {_heard(drive)}"
-
-
-def _of_outputs(outputs: Outputs, verdict: Verdict, took_s: float) -> str:
-    why = outputs.stop_check.why
+        return Text.of("stop.deaf", stops=summed.stops, time_s=summed.time_s, says=says)
     if verdict.before is LastStop.FOLLOWED:
-        return f"has other outputs than it is sent: safe values are sent for {took_s:.2f} s, {why}"
-    return f"ignores its stop: safe values are sent since {took_s:.2f} s, {why}"
+        return Text.of("stop.enabled_by_nobody", sent=_sent(drive), took_s=took_s, says=says)
+    return Text.of("stop.ignored", sent=_sent(drive), took_s=took_s, says=says)
+
+
+def _of_outputs(outputs: Outputs, verdict: Verdict, took_s: float) -> Text:
+    why = Text.plain(outputs.stop_check.why)
+    if verdict.before is LastStop.FOLLOWED:
+        return Text.of("stop.outputs_differ", took_s=took_s, why=why)
+    return Text.of("stop.outputs_ignored", took_s=took_s, why=why)
 
 
 def _reaction(one: Drive | Outputs, verdict: Verdict) -> Action | None:
@@ -80,33 +77,41 @@ def _reaction(one: Drive | Outputs, verdict: Verdict) -> Action | None:
             return Action.STOP_NODE
 
 
-def _cut_off(node: Node, drive: Drive, took_s: float) -> str:
+def _cut_off(node: Node, drive: Drive, took_s: float) -> Text:
     """The bridge has stopped the drive's node, and the drive has said nothing else since."""
-    why = "an NMT stop does not stop it"
+    why = Text.of("stop.nmt_stop_does_not_stop_it")
     if node.family.family.stopped_by == "stop_node":
-        why = f"{node.name} has not said that it is stopped"
-    channel = drive.channel
-    said = f"{channel.drive_status_word:04X}h, {channel.state.label.replace('_', ' ')}"
+        why = Text.of("stop.node_has_not_said", node=node.name)
+    word, state = _status(drive)
+    return Text.of("stop.may_run_on", word=word, state=state, took_s=took_s, why=why)
+
+
+def _sent(drive: Drive) -> Text:
+    words, silent = drive.channel.output
     return (
-        f"may run on, and is not known to follow its stop: it said {said} before its node was taken out of "
-        f"operation {took_s:.2f} s ago, and nothing since; {why}: see to it at the drive"
+        Text.of("stop.nothing_is_sent") if silent else Text.of("stop.word_is_sent", word=f"{words[0]:04X}h")
     )
 
 
-def _sent(drive: Drive) -> str:
-    words, silent = drive.channel.output
-    return "nothing is sent" if silent else f"{words[0]:04X}h is sent"
+def _heard(drive: Drive) -> Text:
+    word, state = _status(drive)
+    return Text.of("stop.drive_says", word=word, state=state)
 
 
-def _heard(drive: Drive) -> str:
+def _status(drive: Drive) -> tuple[str, Text]:
+    """The drive's own status word, and the state that it tells."""
     channel = drive.channel
-    return f"the drive says {channel.drive_status_word:04X}h, {channel.state.label.replace('_', ' ')}"
+    return f"{channel.drive_status_word:04X}h", Text.word("drive_state", channel.state.label)
 
 
-def _done(action: Action | None, node: Node, one: Drive | Outputs) -> str:
+def _done(action: Action | None, node: Node, one: Drive | Outputs) -> Text:
     if action is None:
-        return "reported only (on_ignored_stop)"
+        return Text.of("stop.reported_only")
     others = ", ".join(other.slot.name for other in node.drives if other is not one)
-    also = f", which stops {others}, too" if others else ""
-    back = "" if action is Action.RESET else "; it stays stopped until an operator starts or resets it"
-    return f"{_WORDS[action]} of {node.name}{also}{back}"
+    if action is Action.RESET:
+        if others:
+            return Text.of("stop.nmt_reset_others", node=node.name, others=others)
+        return Text.of("stop.nmt_reset", node=node.name)
+    if others:
+        return Text.of("stop.nmt_stop_others", node=node.name, others=others)
+    return Text.of("stop.nmt_stop", node=node.name)

@@ -41,6 +41,21 @@ def test_every_link_leads_somewhere(page: Page) -> None:
 
 
 @pytest.mark.parametrize("page", LINKED, ids=repr)
+def test_every_file_of_the_program_that_a_page_names_is_there(page: Page) -> None:
+    """A test alone by its name, as it is called in the text beside its folder."""
+    named = set(
+        re.findall(r"\b(?:(?:bridge|tests|tools)/[a-z0-9_/]+|test_[a-z0-9_]+)\.py\b", "\n".join(page.prose))
+    )
+    assert {name for name in named if not _is_there(name)} == set()
+
+
+def _is_there(name: str) -> bool:
+    if "/" in name:
+        return (REPOSITORY / name).is_file()
+    return any((REPOSITORY / "tests").rglob(name))
+
+
+@pytest.mark.parametrize("page", LINKED, ids=repr)
 def test_every_picture_is_there_and_is_described(page: Page) -> None:
     for description, picture in re.findall(r"!\[([^\]]*)\]\(([^()\s]+)\)", "\n".join(page.prose)):
         assert (page.path.parent / picture).is_file(), f"{page}: there is no {picture}"

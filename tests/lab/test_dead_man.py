@@ -99,14 +99,15 @@ def test_a_stopped_controller_stops_its_drive_in_time(lab: Lab) -> None:
 
 @pytest.mark.parametrize("deadman_ms", [100, 400])
 def test_a_bridge_that_pauses_across_the_deadline_publishes_no_less(tmp_path: Path, deadman_ms: int) -> None:
-    """No margin for a busy machine, so one try of three may be held up by it."""
+    """No margin for a busy machine, so one try of three may be held up by it: a bridge that does not look for
+    a while takes a telegram to be as old as its last look, and stops the drive too early by that."""
     site = lab_site(tmp_path, timeout_ms=200, bus=f"deadman_ms = {deadman_ms}")
-    lateness: list[float] = []
+    tries: list[tuple[float, float]] = []
     with ExitStack() as stack:
         lab = Lab(tmp_path, stack, site)
         [published] = values(site, "conveyor/fu1/supervision/worst_case_stop_ms")
         assert isinstance(published, int)
-        while len(lateness) < 3 and min(lateness, default=1.0) > 0:
+        while len(tries) < 3 and not any(map(is_in_time, tries)):
             owner = lab.run_drive()
             owner.signal(signal.SIGSTOP)
             last = lab.last_telegram()
@@ -118,11 +119,16 @@ def test_a_bridge_that_pauses_across_the_deadline_publishes_no_less(tmp_path: Pa
             frames = lab.bus.of(RPDO1, last)
             stop = next(frame for frame in frames if not enabling(frame.word))
             final = max(frame.time for frame in frames if enabling(frame.word))
-            assert stop.time >= last + TIMEOUT_S, "not before its owner's time is up"
-            lateness.append(max(stop.time, final) - last - published / 1000)
+            early_s = last + TIMEOUT_S - stop.time
+            tries.append((early_s, max(stop.time, final) - last - published / 1000))
             owner.signal(signal.SIGKILL)
             owner.popen.wait()
-    assert min(lateness) <= 0
+    assert any(map(is_in_time, tries)), f"seconds early and late: {tries}"
+
+
+def is_in_time(early_and_late_s: tuple[float, float]) -> bool:
+    """Neither before the owner's time is up, nor later than is published."""
+    return max(early_and_late_s) <= 0
 
 
 def test_everything_comes_at_its_period_for_longer_than_a_burst(lab: Lab) -> None:

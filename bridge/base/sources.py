@@ -8,7 +8,8 @@ from ipaddress import IPv6Address, ip_address
 
 @lru_cache(maxsize=1024)
 def source_of(host: str) -> str:
-    """An IPv4 address, or an IPv6 network of 64 bits, because a single machine may use all its addresses."""
+    """An IPv4 address, or an IPv6 network of 64 bits, because a single machine may use all its addresses
+    (RFC 4291 §2.5.1)."""
     try:
         address = ip_address(host.partition("%")[0])
     except ValueError:

@@ -75,3 +75,7 @@ def _shown(fact: Fact, part: Part, language: str) -> str:
             return f"{fact:.0f}" if fact.is_integer() else repr(fact)
         case _:
             return format(fact, part.format)
+
+
+# Now, so that nothing that is to be told waits for a disk.
+templates("en")

@@ -8,10 +8,6 @@ from typing import Final
 
 from bridge.base.ratelimit import PerSecond
 from bridge.text import Text, render
-from bridge.text.templates import templates
-
-# Now, so that no event waits for a disk.
-templates("en")
 
 
 class Kind(StrEnum):

@@ -11,6 +11,7 @@ from bridge.command import Action, Code, Event, Identity, Outcome, Request, Role
 from bridge.command.link import NodeState
 from bridge.command.messages.request import Do
 from bridge.node.nmt_commands import NMT, CommandedNode, answer, carry_out, refusal
+from bridge.text import render
 from tests.support import sites
 
 OPERATOR = Identity(Source.OPCUA, "ann", Role.OPERATOR)
@@ -96,7 +97,8 @@ def test_a_bus_knows_nmt_alone() -> None:
 )
 def test_who_may_command_a_node(who: Identity, owner: Identity | None, why: str | None) -> None:
     request = Request(who, "conveyor", Do(Action.RESET))
-    assert refusal(request, cast("Any", [One(), One(owner)])) == why
+    found = refusal(request, cast("Any", [One(), One(owner)]))
+    assert (None if found is None else render(found)) == why
     node = One(owner)
     asked = Asked(Action.RESET, "conveyor", node, who=who)
     assert (asked.outcome.code is Code.OK) is (why is None)

@@ -9,6 +9,7 @@ from bridge.command.leg.effect import Heard, LetGo, StartEnded, Tell, Tripped
 from bridge.command.leg.state import Motion, Owner, Stage
 from bridge.command.leg.turn import Turn, at_rest, control_word
 from bridge.drive import DriveState
+from bridge.text import render
 from tests.support.leg import PLC, Leg, settings_of
 
 SHUT_DOWN, RUN, DISABLE = 0x047E, 0x047F, 0x0000
@@ -106,7 +107,7 @@ def test_who_leaves_stops_its_drive_and_takes_its_time_out_along() -> None:
     assert not turn.settings.words.enables(turn.word)
     (told,) = turn.effects
     assert isinstance(told, Tell)
-    assert told.message == "fieldbus_timeout_ms = 200 again, as in the site file"
+    assert render(told.said) == "fieldbus_timeout_ms = 200 again, as in the site file"
 
 
 def test_a_start_that_is_going_on_ends_when_its_owner_leaves() -> None:
@@ -115,9 +116,10 @@ def test_a_start_that_is_going_on_ends_when_its_owner_leaves() -> None:
     leg.asks(Start())
     assert leg.state.start is not None
     turn = turn_of(leg)
-    turn.leave("because")
+    turn.leave()
     ended = [effect for effect in turn.effects if isinstance(effect, StartEnded)]
-    assert [(one.outcome.code, one.outcome.message) for one in ended] == [(Code.CANCELLED, "because")]
+    said = [(one.outcome.code, one.outcome.message) for one in ended]
+    assert said == [(Code.CANCELLED, "control of the drive has changed")]
     assert turn.start is None
 
 
@@ -136,7 +138,9 @@ def test_a_lease_that_has_run_out_is_told_and_left() -> None:
     turn.owner = Owner(PLC, lease_until=100.1)
     turn.judge()
     assert turn.owner.identity is None
-    assert [one.message for one in turn.effects if isinstance(one, Tell)] == [f"the lease of {PLC} ran out"]
+    assert [render(one.said) for one in turn.effects if isinstance(one, Tell)] == [
+        f"the lease of {PLC} ran out"
+    ]
 
 
 def test_an_acknowledge_leaves_the_trip_behind_the_interlock() -> None:
@@ -175,7 +179,7 @@ def test_why_an_enabling_word_is_held_back(change: dict[str, object], why: str) 
     leg = Leg(settings_of("nord/sk-tu4-cao"))
     turn = turn_of(leg)
     turn.way = turn.way._replace(**change)
-    assert turn.why_blocked == why
+    assert render(turn.why_blocked) == why
     assert turn.may_enable is (not change)
 
 

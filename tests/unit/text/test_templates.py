@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 from hypothesis import given
@@ -18,20 +18,21 @@ from bridge.text.templates import Part, parse, source, templates
 SCRIPTS: Final = Path("bridge/northbound/page/static/js/texts")
 _RENDER: Final = """
 import { readFileSync } from "node:fs";
-import { formatted, rendered } from "./text.js";
-const { texts, numbers, templates } = JSON.parse(readFileSync(0));
+import { formatted, isKnown, rendered } from "./text.js";
+const { texts, asked, numbers, templates } = JSON.parse(readFileSync(0));
 console.log(JSON.stringify({
   texts: texts.map((text) => rendered(text, templates)),
+  known: asked.map((text) => isKnown(text, templates)),
   numbers: numbers.map(([number, format]) => formatted(number, format)),
 }));
 """
 
 
-def by_the_page(asked: dict[str, object]) -> dict[str, list[str]]:
+def by_the_page(asked: dict[str, object]) -> dict[str, list[Any]]:
     run = subprocess.run(
         ["node", "--input-type=module", "--eval", _RENDER],
         cwd=SCRIPTS,
-        input=json.dumps({"texts": [], "numbers": [], "templates": {}} | asked),
+        input=json.dumps({"texts": [], "asked": [], "numbers": [], "templates": {}} | asked),
         capture_output=True,
         text=True,
         timeout=30,
@@ -175,3 +176,19 @@ def test_templates_are_read_before_the_first_event() -> None:
     )
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert run.stdout == "1\n"
+
+
+def test_the_page_knows_what_it_has_no_template_for() -> None:
+    """A tab may be older than the bridge that it shows: it shows such a text in English."""
+    vendor = {"code": "vendor", "facts": {"now": 2}}
+    newer = {"code": "newer", "facts": {}}
+    asked = [
+        vendor,
+        newer,
+        {"code": "plain", "facts": {"text": "x"}},
+        {"code": "vendor", "facts": {"now": newer}},
+        {"code": "vendor", "facts": {"now": [vendor, newer]}},
+        {"code": "vendor", "facts": {"now": [vendor, vendor]}},
+    ]
+    told = by_the_page({"asked": asked, "templates": {"vendor": "Hersteller {now}"}})["known"]
+    assert told == [True, False, True, False, False, True]

@@ -4,7 +4,7 @@ import { computed, effect, signal } from "./ui.js";
 import { kept } from "./store.js";
 import { en } from "./texts/en.js";
 import { de } from "./texts/de.js";
-import { rendered } from "./texts/text.js";
+import { isKnown, rendered } from "./texts/text.js";
 
 const TEXTS = { en, de };
 const browsers = navigator.language.toLowerCase().startsWith("de") ? ["de", "en"] : ["en", "de"];
@@ -49,7 +49,7 @@ export function worded(text, english) {
   if (language.value === "en") return english;
   if (!text) return translated(english);
   const known = templates.value[language.value];
-  if (known) return rendered(text, known, translated);
+  if (known) return isKnown(text, known) ? rendered(text, known, translated) : translated(english);
   load(language.value, "texts", templates);
   return english;
 }
@@ -81,9 +81,13 @@ async function load(wanted, what, into) {
   const address = `api/${what}/${wanted}`;
   if (loading.has(address)) return;
   loading.add(address);
-  const answer = await fetch(address);
-  if (answer.ok) into.value = { ...into.value, [wanted]: await answer.json() };
-  else loading.delete(address);
+  try {
+    const answer = await fetch(address);
+    if (answer.ok) into.value = { ...into.value, [wanted]: await answer.json() };
+    else loading.delete(address);
+  } catch {
+    setTimeout(() => loading.delete(address), 10000);
+  }
 }
 
 /** The text for a number of things: `key.one` or `key.other`. */

@@ -14,6 +14,13 @@ export function rendered(text, templates, plain = (sentence) => sentence) {
   });
 }
 
+/** Whether `text` and the texts among its facts have templates: a tab may be older than the bridge that it shows. */
+export function isKnown(text, templates) {
+  if (text.code !== "plain" && !(text.code in templates)) return false;
+  const texts = Object.values(text.facts).flat().filter((fact) => typeof fact === "object");
+  return texts.every((one) => isKnown(one, templates));
+}
+
 function shown(fact, quoted, format, words) {
   if (Array.isArray(fact)) return fact.map(words).join(format || JOINED_BY);
   if (typeof fact === "object") return words(fact);

@@ -57,7 +57,9 @@ def test_listening_beyond_loopback_needs_more(tmp_path: Path, place: str) -> Non
 
 @pytest.mark.parametrize("place", LOCAL)
 def test_loopback_and_certificates_need_no_more(tmp_path: Path, place: str) -> None:
-    load_site(site(tmp_path, place))
+    loaded = load_site(site(tmp_path, place))
+    assert loaded.zenoh is not None
+    assert place in loaded.zenoh.listen
 
 
 def test_controllers_are_users_who_have_to_prove_it(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import pytest
 from asyncua import ua
@@ -13,38 +12,13 @@ from hypothesis import strategies as st
 from bridge.uaserver.filters import ChangeFilter
 from bridge.uaserver.items import Settings, ValueItem
 from bridge.uaserver.library import ServiceError
-from bridge.uaserver.publishing import PublishQueue, PublishRequest
+from bridge.uaserver.publishing import PublishRequest
 from bridge.uaserver.reading import window
 from bridge.uaserver.subscription import RETRANSMISSIONS, Subscription, Terms, terms
+from tests.support.opcua_sessions import Session
 
 Codes, Mode = ua.StatusCodes, ua.MonitoringMode
 TARGET = ua.ReadValueId(AttributeId=ua.AttributeIds.Value)
-
-
-@dataclass
-class User:
-    name: str
-    has_rights: bool = True
-
-    @property
-    def is_anonymous(self) -> bool:
-        return self.name == "anonymous"
-
-    def is_same(self, other: object) -> bool:
-        return self == other
-
-
-@dataclass
-class Session:
-    session_id: ua.NodeId = field(default_factory=lambda: ua.NodeId(7))
-    address: str = "10.0.0.1"
-    identity: User = field(default_factory=lambda: User("anna"))
-    channel_certificate: bytes | None = None
-    publishing: PublishQueue = field(default_factory=PublishQueue)
-    is_gone: bool = False
-
-    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
-        return value
 
 
 class Rig:

@@ -2,44 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import pytest
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
 from bridge.uaserver.library import ServiceError
-from bridge.uaserver.publishing import PublishQueue
 from bridge.uaserver.shares import MOST_SUBSCRIPTIONS
 from bridge.uaserver.subscriptions import Subscriptions
+from tests.support.opcua_sessions import Session, User
 
 Codes, Mode = ua.StatusCodes, ua.MonitoringMode
-
-
-@dataclass
-class User:
-    name: str
-    has_rights: bool = True
-
-    @property
-    def is_anonymous(self) -> bool:
-        return self.name == "anonymous"
-
-    def is_same(self, other: object) -> bool:
-        return self == other
-
-
-@dataclass
-class Session:
-    session_id: ua.NodeId = field(default_factory=lambda: ua.NodeId(7))
-    address: str = "10.0.0.1"
-    identity: User = field(default_factory=lambda: User("anna"))
-    channel_certificate: bytes | None = None
-    publishing: PublishQueue = field(default_factory=PublishQueue)
-    is_gone: bool = False
-
-    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
-        return value
 
 
 async def test_who_was_left_behind_makes_room_and_nobody_else() -> None:

@@ -117,7 +117,9 @@ async def test_who_has_gone_needs_no_goodbye(error: Exception) -> None:
     socket = Socket()
 
     async def gone(code: int, reason: str) -> None:
+        socket.closed.append((code, reason))
         raise error
 
     socket.close = gone  # type: ignore[method-assign]
     await close(cast("WebSocket", socket), 4401)
+    assert [code for code, _ in socket.closed] == [4401], "it was tried, once"

@@ -1,0 +1,35 @@
+"""Sessions of an OPC UA server as its subscriptions see them: no server, no clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from asyncua import ua
+
+from bridge.uaserver.publishing import PublishQueue
+
+
+@dataclass
+class User:
+    name: str
+    has_rights: bool = True
+
+    @property
+    def is_anonymous(self) -> bool:
+        return self.name == "anonymous"
+
+    def is_same(self, other: object) -> bool:
+        return self == other
+
+
+@dataclass
+class Session:
+    session_id: ua.NodeId = field(default_factory=lambda: ua.NodeId(7))
+    address: str = "10.0.0.1"
+    identity: User = field(default_factory=lambda: User("anna"))
+    channel_certificate: bytes | None = None
+    publishing: PublishQueue = field(default_factory=PublishQueue)
+    is_gone: bool = False
+
+    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
+        return value

@@ -63,8 +63,8 @@ def _place(place: Place, news: judge.News) -> str:
 
 
 def _outcome(outcome: LastStop, finding: judge.Finding) -> str:
-    after, says = judge.OUTCOME_TABLE[outcome, finding]
-    shown = "; ".join(says) or judge.Deed.NOTHING.value
+    after, deeds = judge.OUTCOME_TABLE[outcome, finding]
+    shown = "; ".join(deeds) or judge.PlaceDeed.NOTHING.value
     return shown if after is outcome else f"→ **{after.label}**: {shown}"
 
 

@@ -51,12 +51,12 @@ class Fault:
 
     @property
     def message(self) -> str:
-        """What is wrong, in English."""
+        """The fault in English."""
         return render(self.said)
 
     @property
     def hint(self) -> str:
-        """What would be right, in English."""
+        """The advice in English."""
         return render(self.advice)
 
     @property

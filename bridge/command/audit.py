@@ -80,7 +80,7 @@ class Ending(NamedTuple):
 
     @property
     def message(self) -> str:
-        """What is said, in English."""
+        """The message in English."""
         return render(self.said)
 
 

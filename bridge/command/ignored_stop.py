@@ -29,7 +29,7 @@ class Conclusion:
 
 
 def concluded(node: Node, one: Drive | Outputs, verdict: Verdict, now: float) -> Conclusion:
-    """What follows from how the last stop of ``one`` has ended."""
+    """Consequences of how the last stop of ``one`` has ended."""
     took_s = verdict.at - verdict.since
     if verdict.outcome is not LastStop.IGNORED:
         logged = Text.of("stop.done_after", took_s=took_s)

@@ -267,7 +267,7 @@ class Outputs(Commanded):
         return _DEADLINES * max(deadlines, default=0.0) + way_s + _TAKEN_S
 
     def on_answer(self, question: Question, answer: Answer, now: float) -> None:
-        """What came of a question of ``stop_check``."""
+        """The answer to a question of ``stop_check``."""
         self.stop_check.on_answer(question, answer, now)
         self._judged(now)
 

@@ -1,4 +1,4 @@
-"""What the bridge says to people: a code with facts, and its words in each language."""
+"""Texts for people: a code with facts, and its words in each language."""
 
 from bridge.text.templates import LANGUAGES, render
 from bridge.text.text import Fact, Text, as_json

@@ -40,12 +40,12 @@ class Event:
 
     @property
     def message(self) -> str:
-        """What is said, in English."""
+        """The message in English."""
         return render(self.said)
 
     @property
     def cause(self) -> str:
-        """What has brought it about, in English."""
+        """The cause in English; empty where none is known."""
         return render(self.because)
 
     @property

@@ -162,7 +162,7 @@ class Outcome:
 
     @property
     def message(self) -> str:
-        """What is said, in English."""
+        """The message in English."""
         return render(self.said)
 
 
@@ -170,7 +170,7 @@ DONE = Outcome(Code.OK)
 
 
 def refused(action: Action, who: str, why: Text | str) -> Text:
-    """What is told of a request that is refused."""
+    """The event about a request that is refused."""
     return Text.of("request.refused", action=Text.word("action", action), who=who, why=Text.plain(why))
 
 

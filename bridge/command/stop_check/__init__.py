@@ -1,2 +1,1 @@
-"""Whether what is commanded does what its last stop asked: the judge of a drive, and that of the
-outputs of a node. Sans-IO."""
+"""Judges of the last stop: of one drive, and of the outputs of a node. Sans-IO."""

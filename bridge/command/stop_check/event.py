@@ -14,7 +14,7 @@ class Sends(NamedTuple):
 
 
 class HandedOver(NamedTuple):
-    """What was to be sent has been handed to the bus by ``now``."""
+    """The stop that was to be sent has been handed to the bus by ``now``."""
 
     now: float
     bounds: Bounds

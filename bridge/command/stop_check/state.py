@@ -116,7 +116,7 @@ class StopState(NamedTuple):
     is_cut_off: bool = False
     """The bridge has taken the node out of operation, and the drive was not known to stop before."""
     sent: Sent = Sent.OFF
-    """What is to be on the bus."""
+    """Meaning of the word that is to be on the bus."""
     on_bus: Sent = Sent.OFF
     """The last stop that was handed over."""
     bounds: Bounds = Bounds(inf, inf)
@@ -158,7 +158,7 @@ class StopState(NamedTuple):
 
     @property
     def awaits_sending(self) -> bool:
-        """What is to be sent has changed, and has not been handed to the bus yet."""
+        """Another stop is to be sent, and has not been handed to the bus yet."""
         return self.place in _AWAITS_SENDING
 
     @property

@@ -27,7 +27,7 @@ from bridge.command.stop_check.event import (
 )
 from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopState, Verdict
 from bridge.command.stop_check.sums import StopTime, Unfollowed
-from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Deed, Finding, News, Say
+from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Finding, News, OutcomeDeed, PlaceDeed
 
 _LOOK_AGAIN_S: Final = 1.0
 """How often a drive that is no longer heard is looked at."""
@@ -111,7 +111,7 @@ def _node_stopped(state: StopState, event: NodeStopped) -> StopState:
 
 def _happens(state: StopState, news: News, now: float = inf, bounds: Bounds | None = None) -> StopState:
     place, deed = PLACE_TABLE[state.place, news]
-    before, state = state, _DEEDS[deed](state, now, bounds or state.bounds)._replace(place=place)
+    before, state = state, _PLACE_DEEDS[deed](state, now, bounds or state.bounds)._replace(place=place)
     begins = state.is_on_bus and not before.obeys(now) and state.obeys(now)
     return _found(state, Finding.BEGINS_TO_FOLLOW, now) if begins else state
 
@@ -200,16 +200,16 @@ def _summing(state: StopState) -> StopState:
     return state._replace(sums=state.sums.begin(on_from, state.since + state.bounds.seen_s))
 
 
-_DEEDS: Final[Mapping[Deed, Callable[[StopState, float, Bounds], StopState]]] = {
-    Deed.NOTHING: _nothing,
-    Deed.FORGIVE: _forgive,
-    Deed.BEGIN: _begin,
-    Deed.BEGIN_ANEW: _begin_anew,
-    Deed.BOUND: _bound,
-    Deed.CHANGE_BOUND: _change_bound,
-    Deed.FORGET: _forget,
-    Deed.LAST_REPORT: _last_report,
-    Deed.BOUND_ANEW: _bound_anew,
+_PLACE_DEEDS: Final[Mapping[PlaceDeed, Callable[[StopState, float, Bounds], StopState]]] = {
+    PlaceDeed.NOTHING: _nothing,
+    PlaceDeed.FORGIVE: _forgive,
+    PlaceDeed.BEGIN: _begin,
+    PlaceDeed.BEGIN_ANEW: _begin_anew,
+    PlaceDeed.BOUND: _bound,
+    PlaceDeed.CHANGE_BOUND: _change_bound,
+    PlaceDeed.FORGET: _forget,
+    PlaceDeed.LAST_REPORT: _last_report,
+    PlaceDeed.BOUND_ANEW: _bound_anew,
 }
 
 
@@ -257,9 +257,9 @@ def _judged(state: StopState, at: float) -> StopState:
 
 
 def _found(state: StopState, finding: Finding, at: float, summed: StopTime | None = None) -> StopState:
-    outcome, says = OUTCOME_TABLE[state.last_stop, finding]
-    for say in says:
-        state = _SAYS[say](state, at, outcome, summed)
+    outcome, deeds = OUTCOME_TABLE[state.last_stop, finding]
+    for deed in deeds:
+        state = _OUTCOME_DEEDS[deed](state, at, outcome, summed)
     return state
 
 
@@ -295,13 +295,14 @@ def _tell(state: StopState, at: float, outcome: LastStop, summed: StopTime | Non
     return state._replace(last_stop=outcome, follows=follows, follows_since=inf, untold=untold)
 
 
-_SAYS: Final[Mapping[Say, Callable[[StopState, float, LastStop, StopTime | None], StopState]]] = {
-    Say.COUNT: _count,
-    Say.COUNT_NO_MORE: _count_no_more,
-    Say.REST: _rest,
-    Say.GRANT_RAMP: _grant_ramp,
-    Say.GRANT_SHORT: _grant_short,
-    Say.TELL: _tell,
+_Change = Callable[[StopState, float, LastStop, StopTime | None], StopState]
+_OUTCOME_DEEDS: Final[Mapping[OutcomeDeed, _Change]] = {
+    OutcomeDeed.COUNT: _count,
+    OutcomeDeed.COUNT_NO_MORE: _count_no_more,
+    OutcomeDeed.REST: _rest,
+    OutcomeDeed.GRANT_RAMP: _grant_ramp,
+    OutcomeDeed.GRANT_SHORT: _grant_short,
+    OutcomeDeed.TELL: _tell,
 }
 
 

@@ -33,8 +33,8 @@ class News(StrEnum):
     PAUSE = "first telegram after a pause longer than the deadline"
 
 
-class Deed(StrEnum):
-    """What is done to the state beside the step to the next place."""
+class PlaceDeed(StrEnum):
+    """Change of the state beside the step to the next place."""
 
     __hash__ = str.__hash__
 
@@ -50,7 +50,7 @@ class Deed(StrEnum):
 
 
 class Finding(StrEnum):
-    """What a telegram, or time without one, says of a stop that is on the bus."""
+    """Meaning of a telegram, or of time without one, for a stop that is on the bus."""
 
     __hash__ = str.__hash__
 
@@ -64,8 +64,8 @@ class Finding(StrEnum):
     CALM = "drive has done what the stop asks for the short bound"
 
 
-class Say(StrEnum):
-    """What is noted or told; several in this order."""
+class OutcomeDeed(StrEnum):
+    """Change of the state beside the next outcome; several in this order."""
 
     __hash__ = str.__hash__
 
@@ -77,60 +77,60 @@ class Say(StrEnum):
     TELL = "tell"
 
 
-PlaceCell = tuple[Place, Deed]
-OutcomeCell = tuple[LastStop, tuple[Say, ...]]
+PlaceCell = tuple[Place, PlaceDeed]
+OutcomeCell = tuple[LastStop, tuple[OutcomeDeed, ...]]
 
 _STOPPED: Final = (_P.AWAY, _P.TO_SEND, _P.ON_BUS, _P.CHANGING)
 _JUDGED: Final = (_P.ON_BUS, _P.CHANGING)
 
-_PLACES: Final[Mapping[News, Mapping[Iterable[Place], tuple[Place | None, Deed]]]] = {
-    News.ENABLES: {_STOPPED: (_P.ENABLED, Deed.FORGIVE)},
-    News.STOPS: {(_P.ENABLED,): (_P.TO_SEND, Deed.BEGIN)},
-    News.STOPS_AWAY: {(_P.ENABLED,): (_P.AWAY, Deed.BEGIN)},
-    News.STOPS_OTHERWISE: {(_P.ON_BUS,): (_P.CHANGING, Deed.NOTHING)},
-    News.STOPS_OTHERWISE_AWAY: {(_P.CHANGING,): (_P.ON_BUS, Deed.NOTHING)},
+_PLACES: Final[Mapping[News, Mapping[Iterable[Place], tuple[Place | None, PlaceDeed]]]] = {
+    News.ENABLES: {_STOPPED: (_P.ENABLED, PlaceDeed.FORGIVE)},
+    News.STOPS: {(_P.ENABLED,): (_P.TO_SEND, PlaceDeed.BEGIN)},
+    News.STOPS_AWAY: {(_P.ENABLED,): (_P.AWAY, PlaceDeed.BEGIN)},
+    News.STOPS_OTHERWISE: {(_P.ON_BUS,): (_P.CHANGING, PlaceDeed.NOTHING)},
+    News.STOPS_OTHERWISE_AWAY: {(_P.CHANGING,): (_P.ON_BUS, PlaceDeed.NOTHING)},
     News.HANDED_OVER: {
-        (_P.TO_SEND,): (_P.ON_BUS, Deed.BOUND),
-        (_P.CHANGING,): (_P.ON_BUS, Deed.CHANGE_BOUND),
+        (_P.TO_SEND,): (_P.ON_BUS, PlaceDeed.BOUND),
+        (_P.CHANGING,): (_P.ON_BUS, PlaceDeed.CHANGE_BOUND),
     },
     News.GONE: {
-        (_P.TO_SEND,): (_P.AWAY, Deed.NOTHING),
-        _JUDGED: (_P.AWAY, Deed.FORGET),
+        (_P.TO_SEND,): (_P.AWAY, PlaceDeed.NOTHING),
+        _JUDGED: (_P.AWAY, PlaceDeed.FORGET),
     },
     News.BACK: {
-        (_P.ENABLED,): (None, Deed.FORGET),
-        (_P.AWAY, *_JUDGED): (_P.TO_SEND, Deed.BEGIN_ANEW),
+        (_P.ENABLED,): (None, PlaceDeed.FORGET),
+        (_P.AWAY, *_JUDGED): (_P.TO_SEND, PlaceDeed.BEGIN_ANEW),
     },
-    News.CUT_OFF: {(_P.ON_BUS,): (None, Deed.LAST_REPORT)},
-    News.RESTARTED: {_JUDGED: (_P.AWAY, Deed.FORGET)},
-    News.PAUSE: {_JUDGED: (None, Deed.BOUND_ANEW)},
+    News.CUT_OFF: {(_P.ON_BUS,): (None, PlaceDeed.LAST_REPORT)},
+    News.RESTARTED: {_JUDGED: (_P.AWAY, PlaceDeed.FORGET)},
+    News.PAUSE: {_JUDGED: (None, PlaceDeed.BOUND_ANEW)},
 }
 
 _OUTCOMES: Final[Mapping[Finding, Mapping[LastStop, OutcomeCell]]] = {
     Finding.FOLLOWS: {
-        _L.FORWARDED: (_L.FOLLOWED, (Say.REST, Say.TELL)),
-        _L.FOLLOWED: (_L.FOLLOWED, (Say.REST,)),
-        _L.IGNORED: (_L.IGNORED, (Say.REST,)),
+        _L.FORWARDED: (_L.FOLLOWED, (OutcomeDeed.REST, OutcomeDeed.TELL)),
+        _L.FOLLOWED: (_L.FOLLOWED, (OutcomeDeed.REST,)),
+        _L.IGNORED: (_L.IGNORED, (OutcomeDeed.REST,)),
     },
-    Finding.BEGINS_TO_FOLLOW: {_L.IGNORED: (_L.IGNORED, (Say.COUNT,))},
-    Finding.PUSHED: {_L.FOLLOWED: (_L.FOLLOWED, (Say.GRANT_RAMP,))},
-    Finding.ENABLED_AGAIN: {_L.FOLLOWED: (_L.FOLLOWED, (Say.GRANT_SHORT,))},
-    Finding.RUNS_ON: {_L.IGNORED: (_L.IGNORED, (Say.COUNT_NO_MORE,))},
+    Finding.BEGINS_TO_FOLLOW: {_L.IGNORED: (_L.IGNORED, (OutcomeDeed.COUNT,))},
+    Finding.PUSHED: {_L.FOLLOWED: (_L.FOLLOWED, (OutcomeDeed.GRANT_RAMP,))},
+    Finding.ENABLED_AGAIN: {_L.FOLLOWED: (_L.FOLLOWED, (OutcomeDeed.GRANT_SHORT,))},
+    Finding.RUNS_ON: {_L.IGNORED: (_L.IGNORED, (OutcomeDeed.COUNT_NO_MORE,))},
     Finding.RUNS_ON_LATE: {
-        _L.FORWARDED: (_L.IGNORED, (Say.TELL,)),
-        _L.FOLLOWED: (_L.IGNORED, (Say.TELL,)),
-        _L.IGNORED: (_L.IGNORED, (Say.COUNT_NO_MORE,)),
+        _L.FORWARDED: (_L.IGNORED, (OutcomeDeed.TELL,)),
+        _L.FOLLOWED: (_L.IGNORED, (OutcomeDeed.TELL,)),
+        _L.IGNORED: (_L.IGNORED, (OutcomeDeed.COUNT_NO_MORE,)),
     },
     Finding.SUMMED: {
-        _L.FORWARDED: (_L.IGNORED, (Say.TELL,)),
-        _L.FOLLOWED: (_L.IGNORED, (Say.TELL,)),
+        _L.FORWARDED: (_L.IGNORED, (OutcomeDeed.TELL,)),
+        _L.FOLLOWED: (_L.IGNORED, (OutcomeDeed.TELL,)),
     },
-    Finding.CALM: {_L.IGNORED: (_L.FOLLOWED, (Say.TELL,))},
+    Finding.CALM: {_L.IGNORED: (_L.FOLLOWED, (OutcomeDeed.TELL,))},
 }
 
 
 def _places() -> dict[tuple[Place, News], PlaceCell]:
-    table = {(place, news): (place, Deed.NOTHING) for place in Place for news in News}
+    table = {(place, news): (place, PlaceDeed.NOTHING) for place in Place for news in News}
     for news, row in _PLACES.items():
         for places, (after, deed) in row.items():
             for place in places:

@@ -13,7 +13,7 @@ import pytest
 
 from bridge.command.stop_check import step as judge
 from bridge.command.stop_check.state import LastStop, Place
-from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Deed, Finding, News
+from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Finding, News, PlaceDeed
 from tests.support import stop_rules
 from tests.support.stop_profiles import ON_CHANGE, PROFILES
 from tests.support.stop_space import RecordedTable, StopSpace
@@ -48,26 +48,30 @@ def test_every_cell_that_does_something_is_reached_and_nothing_is_found() -> Non
     places, outcomes = RecordedTable(judge.PLACE_TABLE), RecordedTable(judge.OUTCOME_TABLE)
     with patch.object(judge, _PLACES, places), patch.object(judge, _OUTCOMES, outcomes):
         assert not _is_found()
-    assert {cell for cell in PLACE_TABLE if PLACE_TABLE[cell] != (cell[0], Deed.NOTHING)} <= places.reached
+    assert {
+        cell for cell in PLACE_TABLE if PLACE_TABLE[cell] != (cell[0], PlaceDeed.NOTHING)
+    } <= places.reached
     assert {cell for cell in OUTCOME_TABLE if OUTCOME_TABLE[cell] != (cell[0], ())} <= outcomes.reached
 
 
 def _wrong_places() -> Iterator[Any]:
     for (place, news), (after, deed) in PLACE_TABLE.items():
-        if deed is not Deed.NOTHING:
-            yield pytest.param(_PLACES, (place, news), (after, Deed.NOTHING), id=f"{place}, {news}: deed")
+        if deed is not PlaceDeed.NOTHING:
+            yield pytest.param(
+                _PLACES, (place, news), (after, PlaceDeed.NOTHING), id=f"{place}, {news}: deed"
+            )
         if after is not place:
             yield pytest.param(_PLACES, (place, news), (place, deed), id=f"{place}, {news}: place")
 
 
 def _wrong_outcomes() -> Iterator[Any]:
-    for (outcome, finding), (after, says) in OUTCOME_TABLE.items():
+    for (outcome, finding), (after, deeds) in OUTCOME_TABLE.items():
         cell, label = (outcome, finding), f"{outcome.label}, {finding}"
-        for left_out in range(len(says)):
-            others = says[:left_out] + says[left_out + 1 :]
-            yield pytest.param(_OUTCOMES, cell, (after, others), id=f"{label}: {says[left_out]}")
+        for left_out in range(len(deeds)):
+            others = deeds[:left_out] + deeds[left_out + 1 :]
+            yield pytest.param(_OUTCOMES, cell, (after, others), id=f"{label}: {deeds[left_out]}")
         if after is not outcome:
-            yield pytest.param(_OUTCOMES, cell, (outcome, says), id=f"{label}: outcome")
+            yield pytest.param(_OUTCOMES, cell, (outcome, deeds), id=f"{label}: outcome")
 
 
 @pytest.mark.parametrize(("table", "cell", "wrong"), [*_wrong_places(), *_wrong_outcomes()])

@@ -18,6 +18,7 @@ from bridge.command import (
     WriteParameter,
 )
 from bridge.command.audit import AuditEntry, Ending
+from bridge.text import Text
 from tests.support.rig import ENABLE, OPERATOR, OTHER_PLC, PLC, READY, SHUT_DOWN
 from tests.unit.command.test_audit import FU1, SITE, Hall
 from tests.unit.command.test_plant import Hall as RunningHall
@@ -112,7 +113,7 @@ def test_the_end_of_a_stop_has_a_line_of_the_bridges_own() -> None:
     hall.at(hall.now)
     assert [entry.action for entry in entries] == ["stop", "stop_ended"]
     bridge = Identity(Source.NONE, "drivebridge", Role.ENGINEER)
-    ending = Ending(Code.OK, "after 0.062 s", forwarded=True)
+    ending = Ending(Code.OK, Text.of("stop.done_after", took_s=0.0625), forwarded=True)
     assert entries[1] == AuditEntry(100.0625, bridge, FU1, "stop_ended", ending, count=1)
 
 

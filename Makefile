@@ -132,12 +132,13 @@ bench: compiled packages ## measure everything in half an hour, write docs/expla
 
 # Half of the drives on each of two machines. PROOF=n: how many times each fault is injected.
 PROOF ?= 12
+PROOF_PAGES = docs/explanation/proof.md docs/reference/proof-figures.md
 
-proof: compiled packages ## inject every fault 12 times, write docs/explanation/proof.md (an hour)
-	@$(ON_VCAN) tests/proof/run-proof -j $(FEW_JOBS) -n $(PROOF) -o build/proof.json docs/explanation/proof.md
+proof: compiled packages ## inject every fault 12 times, write the pages of the proof (an hour)
+	@$(ON_VCAN) tests/proof/run-proof -j $(FEW_JOBS) -n $(PROOF) -o build/proof.json $(PROOF_PAGES)
 
 proof-mutants: compiled packages ## seed faults in the chain, which the proof has to find (half an hour)
-	@$(ON_VCAN) tests/proof/run-proof -m -j $(FEW_JOBS) -o build/mutants.json docs/explanation/proof.md
+	@$(ON_VCAN) tests/proof/run-proof -m -j $(FEW_JOBS) -o build/mutants.json $(PROOF_PAGES)
 
 mutants: compiled ## change the code and see whether unit tests notice: hours, or ARGS='bridge/canopen/sdo.py'
 	@$(IN) -m tools.mutants --jobs $(FEW_JOBS) $(ARGS)

@@ -1,10 +1,10 @@
 """The fault injection: ``make proof``.
 
     python -m tests.proof run --cycles N --out RESULT.json [--faults NAME,NAME]
-    python -m tests.proof report --least N --page PAGE.md --out RESULT.json PART.json ...
+    python -m tests.proof report --least N --page PAGE.md --figures FIGURES.md --out RESULT.json PART.json ...
     python -m tests.proof hunt --share FOLDER --out RESULT.json [--mutants NAME,NAME]
     python -m tests.proof survivors PART.json ...
-    python -m tests.proof kills --page PAGE.md --out RESULT.json PART.json ...
+    python -m tests.proof kills --page PAGE.md --figures FIGURES.md --out RESULT.json PART.json ...
 
 ``hunt``, ``survivors`` and ``kills`` are those of ``make proof-mutants``. ``run`` and ``hunt`` are for a
 machine with vcan0, vcan1 and a mount namespace of its own (``tests/lab/vcan-run -n 2 -- unshare --mount
@@ -230,7 +230,8 @@ def main() -> int:
     fourth = commands.add_parser("kills")
     fifth = commands.add_parser("survivors")
     for command in (other, fourth):
-        command.add_argument("--page", type=Path, required=True)
+        command.add_argument("--page", type=Path, required=True, help="gets the summary between its marks")
+        command.add_argument("--figures", type=Path, required=True, help="gets the tables between its marks")
     for command in (other, fourth, fifth):
         command.add_argument("parts", type=Path, nargs="+")
     for command in (one, other, third, fourth):
@@ -244,13 +245,13 @@ def main() -> int:
     if asked.command == "kills":
         found = kill_table.merge([report.load(part) for part in asked.parts])
         asked.out.write_text(json.dumps(found, indent=1), encoding="utf-8")
-        report.put_between(asked.page, kill_table.BEGIN, kill_table.END, kill_table.markdown(found))
+        kill_table.put_into(asked.page, asked.figures, found)
         return _tell(kill_table.failures(found))
     if asked.command == "run":
         return run(asked)
     result = report.merge([report.load(part) for part in asked.parts])
     asked.out.write_text(json.dumps(result, indent=1), encoding="utf-8")
-    report.put_into(asked.page, result)
+    report.put_into(asked.page, asked.figures, result)
     return _verdict(result, asked.least)
 
 

@@ -1,9 +1,12 @@
-"""The table of the seeded faults: which was found, by what, and how soon."""
+"""The results of the seeded faults: how many were found, and a table of which by what and how soon."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final
+
+from tests.proof.report import put_between
 
 BEGIN: Final = "<!-- made by `make proof-mutants`: do not edit -->"
 END: Final = "<!-- end of what `make proof-mutants` makes -->"
@@ -25,20 +28,31 @@ def merge(parts: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return merged
 
 
+def _conditions(result: dict[str, Any]) -> str:
+    found = sum(bool(kill["judgement"]) for kill in result["kills"])
+    return (
+        f"{result['date']}, {result['machine']}; {result['machines']} at a time, "
+        f"{result['seconds'] / 60:.0f} min. {found} of {len(result['mutants'])} were found, and "
+        f"{len(result['false_alarms'])} faults in the program as it is."
+    )
+
+
+def summary(result: dict[str, Any]) -> str:
+    """The generated part of the page of the proof, markers included."""
+    return "\n".join([BEGIN, "", _conditions(result), "", END])
+
+
 def markdown(result: dict[str, Any]) -> str:
-    kills = result["kills"]
-    found = sum(bool(kill["judgement"]) for kill in kills)
+    """The generated part of the page of the figures, markers included: a row for each seeded fault."""
     rows = [
         f"| {kill['mutant']} | {kill['breaks']} | {kill['fault'] or '**survived**'} "
         f"| {kill['judgement'].replace('|', '/')} | {kill['seconds']:.0f} |"
-        for kill in kills
+        for kill in result["kills"]
     ]
     lines = [
         BEGIN,
         "",
-        f"{result['date']}, {result['machine']}; {result['machines']} at a time, "
-        f"{result['seconds'] / 60:.0f} min. {found} of {len(result['mutants'])} were found, and "
-        f"{len(result['false_alarms'])} faults in the program as it is.",
+        _conditions(result),
         "",
         "| seeded fault | what it breaks | found by | judgement | s |",
         "|---|---|---|---|--:|",
@@ -47,6 +61,11 @@ def markdown(result: dict[str, Any]) -> str:
         END,
     ]
     return "\n".join(lines)
+
+
+def put_into(page: Path, figures: Path, result: dict[str, Any]) -> None:
+    put_between(page, BEGIN, END, summary(result))
+    put_between(figures, BEGIN, END, markdown(result))
 
 
 def survivors(result: dict[str, Any]) -> list[str]:

@@ -1,4 +1,7 @@
-"""The table of the proof: fault × family × protocol, as JSON and as a part of a Markdown page."""
+"""The results of the proof: fault × family × protocol as JSON and as tables in two Markdown pages.
+
+The page of the proof has one row for each kind of fault, the page of the figures one for each fault, family
+and protocol."""
 
 from __future__ import annotations
 
@@ -11,6 +14,63 @@ from typing import Any, Final
 
 BEGIN: Final = "<!-- made by `make proof`: do not edit -->"
 END: Final = "<!-- end of what `make proof` makes -->"
+
+KINDS: Final = {
+    "controller": (
+        "owner stopped",
+        "owner killed",
+        "owner stopped beside strangers",
+        "owner's telegrams are not valid",
+        "client writes ahead and hangs",
+        "drive released",
+    ),
+    "network and machine": (
+        "network cut",
+        "half-open connection",
+        "disk full",
+        "clock stepped by an hour",
+    ),
+    "front": (
+        "OPC UA front stopped",
+        "OPC UA front killed",
+        "zenoh front stopped",
+        "zenoh front killed",
+        "front killed, starts fail",
+    ),
+    "bus process": (
+        "bus process paused",
+        "bus process paused with a frame of a second bridge waiting",
+        "bus process stopped as it sends",
+        "bus process stopped",
+        "bus process killed",
+        "event loop blocked for 1 s",
+        "pause of the bridge across the deadline",
+        "SIGHUP to the bus process",
+        "SIGTERM to the bus process",
+    ),
+    "bus": ("interface down", "interface down for 50 ms", "bus-off"),
+    "node and drive": (
+        "node silent",
+        "node rebooting",
+        "deaf drive",
+        "deaf drive whose owner jogs",
+        "boot-up fails after a restart",
+    ),
+    "third parties": (
+        "intruder on an RPDO",
+        "intruder that is a master",
+        "second bridge",
+        "second connection of the owner's address",
+        "what moves a drive as a parameter",
+    ),
+    "stop and acknowledge": (
+        "stop asked for in a silence",
+        "stop of outputs that their silent owner's time-out holds",
+        "acknowledge after somebody's stop",
+        "acknowledge after somebody's stop of outputs",
+    ),
+}
+"""What fails, with the names of its faults: the rows of the summary."""
 
 _MOST_PER_MEASUREMENT: Final = 0.01
 _MOST_AT_LEAST: Final = 3
@@ -43,6 +103,11 @@ class Cell:
             return ["–", "–", "–"]
         bound = f"{max(bounds):.0f}" if bounds else "–"
         return [str(round(statistics.median(values))), str(round(max(values))), bound]
+
+    def worst_and_bound(self, what: str) -> tuple[float, float] | None:
+        """Worst time and bound in ms of ``bus`` or ``drive``; None where it has none."""
+        values, bounds = self._values(f"{what}_ms"), self._values(f"{what}_bound_ms")
+        return (max(values), max(bounds)) if values and bounds else None
 
     def count(self, verdict: str) -> int:
         return sum(record["verdict"] == verdict for record in self.records)
@@ -124,6 +189,15 @@ _HEAD: Final = (
     "bound",
     "",
 )
+_SUMMARY_HEAD: Final = (
+    "what fails",
+    "faults",
+    "measurements",
+    "failed",
+    "void",
+    "stop on the bus, ms",
+    "drive stopped, ms",
+)
 _DEMAND_HEAD: Final = (
     "fault",
     "family",
@@ -145,8 +219,52 @@ def _table(head: Sequence[str], numbers: slice, rows: Iterable[Sequence[str]]) -
     return [lines[0], "|" + "|".join(rules) + "|", *lines[1:]]
 
 
+def _conditions(result: dict[str, Any]) -> str:
+    return (
+        f"{result['date']}, {result['machine']}; {result['cycles']} cycles, "
+        f"{result['seconds'] / 60:.0f} min, of all plants together. Times in ms."
+    )
+
+
+def _closest(found: Iterable[Cell], what: str) -> str:
+    """The worst time that comes closest to its bound, with that bound."""
+    pairs = [pair for cell in found if (pair := cell.worst_and_bound(what))]
+    if not pairs:
+        return "–"
+    worst, bound = max(pairs, key=lambda pair: pair[0] / pair[1])
+    return f"{worst:.0f} of {bound:.0f}"
+
+
+def summary(result: dict[str, Any]) -> str:
+    """The generated part of the page of the proof, markers included: a row for each kind of fault."""
+    found = cells(result["samples"])
+    rows: list[list[str]] = []
+    for kind, names in KINDS.items():
+        of_kind = [cell for cell in found if cell.fault in names]
+        if not of_kind:
+            continue
+        measured = sum(len(cell.records) for cell in of_kind)
+        failed, void = sum(cell.count("failed") for cell in of_kind), sum(len(cell.void) for cell in of_kind)
+        faults = len({cell.fault for cell in of_kind})
+        numbers = [str(faults), str(measured), f"**{failed}**" if failed else "0", str(void)]
+        timed = [cell for cell in of_kind if not cell.demand]
+        rows.append([kind, *numbers, _closest(of_kind, "bus"), _closest(timed, "drive")])
+    judged = sum(len(cell.records) for cell in found if cell.demand)
+    lines = [
+        BEGIN,
+        "",
+        _conditions(result) + f" {judged} measurements were judged by yes or no.",
+        "",
+        *_table(_SUMMARY_HEAD, slice(1, 7), rows),
+        "",
+        END,
+    ]
+    return "\n".join(lines)
+
+
 def markdown(result: dict[str, Any]) -> str:
-    """The generated part of docs/explanation/proof.md, markers included."""
+    """The generated part of the page of the figures, markers included: a row for each fault, family and
+    protocol."""
     found = cells(result["samples"])
     demands = [cell.demand_row() for cell in found if cell.demand]
     failed = sum(sample["verdict"] == "failed" for sample in result["samples"])
@@ -154,8 +272,7 @@ def markdown(result: dict[str, Any]) -> str:
     lines = [
         BEGIN,
         "",
-        f"{result['date']}, {result['machine']}; {result['cycles']} cycles, "
-        f"{result['seconds'] / 60:.0f} min, of all plants together. Times in ms.",
+        _conditions(result),
         "",
         f"{len(result['samples']) - void} measurements: {failed} failed. Void, and made again: {void}, in "
         "which a bound was exceeded by no more than the machine stood still, or bridge and drives waited for "
@@ -185,8 +302,9 @@ def markdown(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def put_into(page: Path, result: dict[str, Any]) -> None:
-    put_between(page, BEGIN, END, markdown(result))
+def put_into(page: Path, figures: Path, result: dict[str, Any]) -> None:
+    put_between(page, BEGIN, END, summary(result))
+    put_between(figures, BEGIN, END, markdown(result))
 
 
 def put_between(page: Path, begin: str, end: str, made: str) -> None:

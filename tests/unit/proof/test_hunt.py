@@ -11,7 +11,7 @@ import pytest
 from tests.proof import hunt
 from tests.proof.faults import FAULTS
 from tests.proof.hunt import Share, order
-from tests.proof.kills import BEGIN, END, failures, markdown, merge, survivors
+from tests.proof.kills import BEGIN, END, failures, markdown, merge, put_into, survivors
 from tests.proof.measure import Sample
 from tests.proof.rig import NotStopped, Rig, Stuck
 
@@ -51,6 +51,16 @@ def test_each_mutant_has_a_row_in_the_order_of_the_table() -> None:
     assert text.startswith(BEGIN)
     assert text.endswith(END)
     assert failures(both) == []
+
+
+def test_the_page_has_the_count_and_the_figures_the_table(tmp_path: Path) -> None:
+    page, figures = tmp_path / "proof.md", tmp_path / "proof-figures.md"
+    for path in (page, figures):
+        path.write_text(f"before\n{BEGIN}\n{END}\nafter\n", encoding="utf-8")
+    put_into(page, figures, result(kill("one"), kill("two")))
+    assert "2 of 2 were found" in page.read_text(encoding="utf-8")
+    assert "| one |" not in page.read_text(encoding="utf-8")
+    assert "| one | much |" in figures.read_text(encoding="utf-8")
 
 
 def test_a_survivor_and_one_that_nobody_tried_fail_it() -> None:

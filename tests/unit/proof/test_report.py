@@ -1,13 +1,20 @@
-"""The table of the fault injection: nothing that failed or is missing looks like a success."""
+"""The tables of the fault injection: nothing that failed or is missing looks like a success."""
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.proof.report import BEGIN, END, cells, failures, markdown, merge, put_into
+from tests.proof import kills
+from tests.proof.faults import FAULTS
+from tests.proof.report import BEGIN, END, KINDS, cells, failures, markdown, merge, put_into, summary
+from tests.support.process import REPOSITORY
+
+PAGE = REPOSITORY / "docs" / "explanation" / "proof.md"
+FIGURES = REPOSITORY / "docs" / "reference" / "proof-figures.md"
 
 
 def record(**change: Any) -> dict[str, Any]:
@@ -114,22 +121,59 @@ def test_errors_of_any_machine_fail_the_proof() -> None:
     assert failures(both, 2) == ["bus-off: not stopped"]
 
 
-def test_the_page_keeps_what_is_not_between_the_marks(tmp_path: Path) -> None:
-    page = tmp_path / "proof.md"
-    page.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n", encoding="utf-8")
-    put_into(page, result(record()))
-    text = page.read_text(encoding="utf-8")
-    assert text.startswith("before\n")
-    assert text.endswith(f"{END}\nafter\n")
-    assert "old" not in text
-    assert "| owner killed | NORD SK TU4-CAO | modbus |" in text
+def test_the_pages_keep_what_is_not_between_the_marks(tmp_path: Path) -> None:
+    page, figures = tmp_path / "proof.md", tmp_path / "proof-figures.md"
+    for path in (page, figures):
+        path.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n", encoding="utf-8")
+    put_into(page, figures, result(record()))
+    texts = [path.read_text(encoding="utf-8") for path in (page, figures)]
+    for text in texts:
+        assert text.startswith("before\n")
+        assert text.endswith(f"{END}\nafter\n")
+        assert "old" not in text
+    assert "| controller | 1 | 1 | 0 | 0 | 500 of 570 | 600 of 720 |" in texts[0]
+    assert "| owner killed | NORD SK TU4-CAO | modbus |" in texts[1]
 
 
 def test_a_page_without_marks_is_an_error(tmp_path: Path) -> None:
     page = tmp_path / "proof.md"
     page.write_text("nothing\n", encoding="utf-8")
     with pytest.raises(ValueError, match="has no markers"):
-        put_into(page, result(record()))
+        put_into(page, page, result(record()))
+
+
+def test_every_fault_has_one_kind() -> None:
+    named = [name for names in KINDS.values() for name in names]
+    assert sorted(named) == sorted(fault.name for fault in FAULTS)
+
+
+def test_the_summary_shows_for_each_kind_what_came_closest_to_its_bound() -> None:
+    quick = record(family="CiA 402", bus_ms=90.0, bus_bound_ms=100.0, drive_ms=100.0, drive_bound_ms=200.0)
+    text = summary(result(record(), quick, record(fault="bus-off", drive_ms=None)))
+    assert "| controller | 1 | 2 | 0 | 0 | 90 of 100 | 600 of 720 |" in text
+    assert "| bus | 1 | 1 | 0 | 0 | 500 of 570 | – |" in text
+    assert "| front |" not in text
+
+
+def test_the_summary_counts_what_failed_and_what_is_void() -> None:
+    late = record(bus_ms=580.0, over_ms=10.0, verdict="void")
+    text = summary(result(record(), record(verdict="failed"), late))
+    assert "| controller | 1 | 2 | **1** | 1 | 580 of 570 | 600 of 720 |" in text
+
+
+@pytest.mark.parametrize(("path", "made"), [(PAGE, summary), (FIGURES, markdown)], ids=["page", "figures"])
+def test_the_pages_in_the_documentation_are_as_the_program_writes_them(path: Path, made: Any) -> None:
+    text = path.read_text(encoding="utf-8")
+    for begin, end in ((BEGIN, END), (kills.BEGIN, kills.END)):
+        assert text.count(begin) == text.count(end) == 1
+    lines = made(result(record(), yes())).splitlines()
+    heads = [line for line, below in itertools.pairwise(lines) if below.startswith("|---")]
+    assert heads
+    assert [head for head in heads if f"\n{head}\n" not in text] == []
+
+
+def test_the_page_of_the_proof_is_two_pages_long() -> None:
+    assert len(PAGE.read_text(encoding="utf-8").split()) <= 950
 
 
 def yes(**change: Any) -> dict[str, Any]:

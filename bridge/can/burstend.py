@@ -39,7 +39,7 @@ class Burst(NamedTuple):
 
 
 class Sequence(NamedTuple):
-    """What the broadcast manager is told: it sends ``frames`` in turn, ``total`` of them in all. The first
+    """Content of one broadcast manager job: ``frames`` are sent in turn, ``total`` of them in all. The first
     ``head`` may enable the drive, where others follow them; 0 where all are the same."""
 
     frames: tuple[Frame, ...]

@@ -1,4 +1,4 @@
-"""What an error frame of SocketCAN says (<linux/can/error.h>). Sans-IO.
+"""Decoder of SocketCAN's error frames (<linux/can/error.h>). Sans-IO.
 
 An error frame is not on the wire: the driver makes it from what the controller reports.
 """
@@ -86,7 +86,8 @@ class ControllerState(IntEnum):
 
 
 class ErrorNews(NamedTuple):
-    """What changes: the state (None: as it was) and both error counters (None: not told)."""
+    """Changes reported by an error frame: the state (None: unchanged) and both error counters (None: not
+    reported)."""
 
     state: ControllerState | None
     counters: tuple[int, int] | None

@@ -1,4 +1,4 @@
-"""Why an interface cannot be used, in a sentence that says what helps."""
+"""Reasons why an interface cannot be used, each with a remedy."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class TooSlow(OSError):
 
 
 def explain(error: OSError, channel: str) -> str:
-    """What helps against ``error`` on ``channel``."""
+    """Sentence on ``error`` of ``channel`` with its remedy."""
     if isinstance(error, WrongBitrate | TooSlow):
         return error.strerror or str(error)
     match error.errno:

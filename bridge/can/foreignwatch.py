@@ -1,7 +1,7 @@
-"""What others send on identifiers that are ours alone, on a socket of its own.
+"""Frames of others on the bridge's own identifiers, received by a socket of its own.
 
-All our own frames come back there, so it wakes nobody: it is looked at a hundred times a second, and five
-times as often while somebody is there.
+All our own frames come back there, so it wakes nobody: it is polled a hundred times a second, and five times
+as often while somebody is there.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class ForeignWatch:
         return _LOOK_AGAIN_S if self._looked_at < self._found_at + _ALERT_S else LOOK_S
 
     def take(self, now: float, *, at_once: bool = False) -> list[Frame]:
-        """What has come from others since the last look, if it is time for one or ``at_once``."""
+        """Frames of others since the last poll, if one is due or ``at_once``."""
         frames: list[Frame] = []
         is_due = at_once or now >= self._looked_at + self._pause_s
         if self._receiver is None or not is_due:

@@ -1,4 +1,4 @@
-"""What the master needs from a CAN bus, whatever hardware is behind it."""
+"""CAN bus as the master needs it, whatever hardware is behind it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class BusStatus:
 
     state: ControllerState = ControllerState.OK
     outages: int = 0
-    """How often everything that was to be sent has been dropped: bus-off, error-passive, down."""
+    """Number of times that everything to be sent has been dropped: bus-off, error-passive, down."""
     tx_errors: int = 0
     rx_errors: int = 0
     frames_lost: int = 0
@@ -28,7 +28,8 @@ class BusStatus:
     """All bits that have passed on the bus, everybody's, as far as the bus can know."""
     error_frames: int = 0
     bursts_refused: str = ""
-    """Why the kernel takes no bursts at present, so that a timer of ours sends them; empty where it does."""
+    """Reason why the kernel takes no bursts at present, so that a timer of ours sends them; empty where it
+    does."""
     _last_error: tuple[int, bytes] | str = ""
 
     def note_error(self, error: tuple[int, bytes] | str) -> None:
@@ -71,9 +72,9 @@ class Bus(Protocol):
         ...
 
     def take_foreign(self, now: float, *, at_once: bool = False) -> list[Frame]:
-        """What others have sent on the watched identifiers, oldest first. A frame of our own is never among
-        them; one of another's that is like ours may be missing, and one that has just come may be given by a
-        later call, unless ``at_once``."""
+        """Frames of others on the watched identifiers, oldest first. A frame of our own is never among them;
+        one of another's that is like ours may be missing, and one that has just come may be given by a later
+        call, unless ``at_once``."""
         ...
 
     def drain(self, now: float) -> list[Frame]:

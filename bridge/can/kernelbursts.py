@@ -32,7 +32,7 @@ class Manager(Protocol):
 
 @dataclass(slots=True)
 class _Wish:
-    """What the kernel is to send. Without frames the burst is to end."""
+    """Burst that the kernel is to send. Without frames the burst is to end."""
 
     burst: Burst
     at_once: bool
@@ -41,7 +41,7 @@ class _Wish:
 
 @dataclass(slots=True)
 class _Job:
-    """What the kernel has taken; it surely runs until ``until``."""
+    """Burst that the kernel has taken; it surely runs until ``until``."""
 
     wish: _Wish
     until: float
@@ -69,11 +69,11 @@ class KernelBursts:
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
         self.refusal = ""
-        """Why the bursts have been given up; empty while the kernel takes them."""
+        """Reason why the bursts have been given up; empty while the kernel takes them."""
         self._manager: Manager | None = None
         self._jobs: dict[int, _Job] = {}
         self._held: set[int] = set()
-        """What the kernel has, whether it still runs or not."""
+        """Identifiers of the bursts that the kernel holds, whether they still run or not."""
         self._wishes: dict[int, _Wish] = {}
         self._retry_at: float | None = None
         self._soft = SoftBursts()

@@ -33,14 +33,14 @@ class Listener(Protocol):
     lost: int
     """Frames that came and were not taken in time, so far."""
     failure: str
-    """Why nothing comes any more; empty while something may."""
+    """Reason why nothing comes any more; empty while something may."""
 
     def open(self) -> None:
         """Raises OSError."""
         ...
 
     def take(self) -> list[Frame]:
-        """What has come since, in the order of the wire."""
+        """Frames received since the last call, in the order of the wire."""
         ...
 
     def close(self) -> None:
@@ -49,7 +49,7 @@ class Listener(Protocol):
 
 
 class _Gathering:
-    """What both kinds share: frames in a queue that is read as the socket has some."""
+    """Base of both kinds: frames in a queue that is read as the socket has some."""
 
     def __init__(self) -> None:
         self.lost = 0
@@ -163,5 +163,5 @@ class TapListener(_Gathering):
 
 
 def listener_of(interface: str, channel: str, tap: Path) -> Listener:
-    """How to listen to a bus of a site file; ``tap`` is where its process would pass frames on."""
+    """Listener of a bus of a site file; ``tap`` is the socket where its process would pass frames on."""
     return SocketCanListener(channel) if interface == "socketcan" else TapListener(tap)

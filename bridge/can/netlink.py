@@ -1,4 +1,4 @@
-"""What the kernel knows about a network interface, asked by rtnetlink (<linux/rtnetlink.h>).
+"""State of a network interface, requested from the kernel by rtnetlink (<linux/rtnetlink.h>).
 
 One message answers everything: whether it is up, its bit rate, the controller's state and error
 counters (<linux/can/netlink.h>), and how many frames have passed. So no `ip` has to be installed.

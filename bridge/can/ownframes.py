@@ -26,7 +26,8 @@ _MOST_PAST: Final = 256
 
 
 class _Count:
-    """How many frames of ours may come: ``left`` now, ``rate`` a second more, and those sent beside that.
+    """Number of our own frames that may come: ``left`` now, ``rate`` a second more, and those sent beside
+    that.
 
     What was sent within ``LINGER_S`` may come at once, after the bus was busy, also at a rate that is over.
     """
@@ -83,7 +84,7 @@ class _Count:
 
 @dataclass(slots=True)
 class _Stream:
-    """What we send on one identifier."""
+    """Frames that we send on one identifier."""
 
     current: frozenset[bytes] = frozenset()
     frames: tuple[Frame, ...] = ()
@@ -128,7 +129,7 @@ class OwnFrames:
         stream.retire((frame.data,), now)
 
     def silenced(self, can_id: int, now: float) -> None:
-        """What is repeated on this identifier has been ended."""
+        """Note that the burst on this identifier has been ended."""
         stream = self._streams.get(can_id)
         if stream is not None:
             stream.retire(stream.current, now)

@@ -25,7 +25,7 @@ _HEAD_BYTES: Final = struct.calcsize("@Nii")
 _CONTROL: Final = struct.Struct(f"@{_HEAD_BYTES}xll{_HEAD_BYTES}xI0N")
 _MSG_DONTWAIT: Final = 0x40
 _MSG_DONTROUTE: Final = 0x04
-"""What the kernel sets in frames that came from a socket of this host (raw_rcv in net/can/raw.c)."""
+"""Flag of the kernel for frames that came from a socket of this host (raw_rcv in net/can/raw.c)."""
 BATCH: Final = 64
 """Frames per call at most."""
 
@@ -33,7 +33,7 @@ _FULL: Final = 8
 
 
 class Stamps(NamedTuple):
-    """How time stamps become monotonic seconds: what is added to the wall clock, and the limits."""
+    """Conversion of time stamps to monotonic seconds: the offset from the wall clock, and the limits."""
 
     wall_offset: float
     earliest: float

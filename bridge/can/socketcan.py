@@ -280,7 +280,7 @@ class SocketCanBus:
             self._break_down(error, self._last_drain)
 
     def _send_bursts(self, now: float) -> None:
-        """What the kernel does not send for us, and again what it has refused."""
+        """Send what the kernel does not repeat for us, and again what it has refused."""
         try:
             frames = self._bursts.on_time(now)
         except OSError as error:
@@ -327,7 +327,7 @@ class SocketCanBus:
                 self._status.note_error(explain(error, self._channel))
 
     def _see(self, link: Link, now: float) -> None:
-        """What has passed since the last look, and what the controller says about itself."""
+        """Count the frames since the last poll, and take over the controller's state."""
         frames, data_bytes = link.frames - self._passed[0], link.data_bytes - self._passed[1]
         self._passed = link.frames, link.data_bytes
         if frames >= 0 and data_bytes >= 0:  # else the interface has been made anew

@@ -79,7 +79,7 @@ class SoftBursts:
         return self._next if self._jobs else None
 
     def due(self, now: float) -> list[Frame]:
-        """What is to be sent by ``now``. Periods that were missed are missed: no bunch is sent."""
+        """Frames to be sent by ``now``. Periods that were missed are left out: no bunch is sent."""
         if now < self._next:
             return []
         frames: list[Frame] = []

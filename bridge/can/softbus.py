@@ -1,4 +1,4 @@
-"""What buses without the kernel's broadcast manager share, such as bursts by our own timer."""
+"""Base of the buses without the kernel's broadcast manager, with bursts by our own timer."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class SoftBus(ABC):
             self._overheard = None
 
     def take_overheard(self) -> list[Frame]:
-        """What has passed since, ours and everybody's, with its time."""
+        """Frames since the last call, ours and everybody's, with their times."""
         frames: list[Frame] = []
         while self._overheard:
             frames.append(self._overheard.popleft())

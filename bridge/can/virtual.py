@@ -14,7 +14,7 @@ _MOST_WAITING = 1 << 16
 
 
 class VirtualWire:
-    """What the ends are attached to. Faults are set on it: ``loss`` (0 … 1), ``delay_s``, ``cut``."""
+    """Medium to which the ends are attached. Faults are set on it: ``loss`` (0 … 1), ``delay_s``, ``cut``."""
 
     def __init__(self, seed: int = 0) -> None:
         self.loss = 0.0

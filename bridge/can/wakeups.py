@@ -10,7 +10,7 @@ from typing import Final
 _CROWD_S: Final = 0.0006
 """Frames that come faster than this are fetched together."""
 _HOLD_S: Final = 0.0005
-"""How long the first of them waits; the event loop makes a whole millisecond of it."""
+"""Time for which the first of them waits; the event loop makes a whole millisecond of it."""
 
 
 class Wakeups:

@@ -1,4 +1,4 @@
-"""How many bits a frame takes on the wire (ISO 11898-1), stuff bits included. Sans-IO.
+"""Number of bits that a frame takes on the wire (ISO 11898-1), stuff bits included. Sans-IO.
 
 The exact number needs the frame's CRC and costs some 10 µs, so only one frame in ``_SAMPLE`` is
 measured; for the others the share of stuff bits found there is assumed.

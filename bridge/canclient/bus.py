@@ -47,7 +47,7 @@ _NMT: Final = {
 }
 _NO_NODE: Final = 107
 _ABORTS: Final = {102: 0x0800_0022, 103: abort.TIMED_OUT, 600: abort.OUT_OF_MEMORY}
-"""What the gateway says itself, as an SDO server says it."""
+"""SDO abort codes for the gateway's own error codes."""
 
 
 class _NoNode(Exception):
@@ -222,7 +222,7 @@ class DrivebridgeBus(can.BusABC):
 
 
 def _why_not_sent(msg: can.Message) -> str:
-    """Whose it is, and what does it instead."""
+    """Reason why ``msg`` is not sent: whose frame it is, and what to use instead."""
     can_id, is_remote = msg.arbitration_id, msg.is_remote_frame
     if can_id == cobid.SYNC:
         instead = "SYNC is the bridge's: sync_period_ms of the bus in the site file"

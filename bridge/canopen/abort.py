@@ -19,7 +19,7 @@ BUSY: Final = 0x060A_0023
 GENERAL: Final = 0x0800_0000
 
 TRANSIENT: Final = frozenset((TOGGLE, TIMED_OUT, BLOCK_SIZE, SEQUENCE, CRC, LENGTH_TOO_HIGH, LENGTH_TOO_LOW))
-"""What a lost or a foreign frame can cause: the same transfer may succeed when it is repeated."""
+"""Abort codes that a lost or a foreign frame can cause: the same transfer may succeed when it is repeated."""
 
 LENGTHS: Final = frozenset((0x0607_0010, LENGTH_TOO_HIGH, LENGTH_TOO_LOW))
 """The length of the data is not that of the object."""

@@ -168,8 +168,8 @@ class SdoChannel:
             job.done(SdoError(job.index, job.sub, abort.TIMED_OUT, by_server=False))
 
     def take_learned(self) -> str:
-        """Why the server is not asked for block transfer any more, once, when that was found out; else
-        empty."""
+        """Reason why the server is not asked for block transfer any more, given once when that was found out;
+        else empty."""
         if self._told_of_block or not self._block.why_not:
             return ""
         self._told_of_block = True

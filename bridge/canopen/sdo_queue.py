@@ -15,12 +15,12 @@ MOST_WAITING: Final = 64
 
 
 class Priority(IntEnum):
-    """Which transfer comes first if several wait for one channel."""
+    """Order of transfers that wait for one channel."""
 
     COMMAND = 0
     BOOT = 1
     MEANING = 2
-    """What decides how process data are to be read."""
+    """Objects that decide how process data are to be read."""
     POLL = 3
 
 

@@ -66,6 +66,6 @@ def tpdo_deadline_s(
 
 
 def burst_length(period_s: float, deadman_ms: int) -> int:
-    """How many frames with this period the kernel may send without us: never for longer than the dead-man
-    time."""
+    """Number of frames with this period that the kernel may send without us: never for longer than the
+    dead-man time."""
     return max(1, int(deadman_ms / 1000 / period_s + 1e-9))

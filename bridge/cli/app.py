@@ -37,7 +37,7 @@ _COMMANDS: Final = {
     "lss": "lss.app",
     "export": "export.app",
 }
-"""Where in ``bridge.cli`` each command, or group of commands, is."""
+"""Function in ``bridge.cli`` of each command, or group of commands."""
 _HIDDEN: Final = ("demo-controller",)
 
 

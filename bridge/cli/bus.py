@@ -1,4 +1,4 @@
-"""What the commands on a bus share: the choice of the bus, and running an errand on it."""
+"""Common part of the commands on a bus: the choice of the bus, and running an errand on it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SEND_WITHIN_S = 0.1
 
 @dataclass(frozen=True, slots=True)
 class BusChoice:
-    """What was said of the bus that a command works on."""
+    """Options that choose the bus on which a command works."""
 
     bus: BusName = None
     interface: Annotated[str | None, typer.Option(help="without SITE: socketcan, or one of python-can's")] = (
@@ -81,8 +81,8 @@ class Line:
     """State folder of the site."""
 
     def sdo_policy(self, node_id: int) -> tuple[float, int]:
-        """How long to wait for an answer of this node in seconds, and how often to ask again: as the site
-        has it, 0.5 s and never for a node that it does not have."""
+        """Time-out of an SDO answer of this node in seconds, and number of repetitions: as the site has it,
+        0.5 s and 0 for a node that it does not have."""
         for node in self.table.node:
             if node.id == node_id:
                 return node.sdo_timeout_ms / 1000, node.sdo_retries

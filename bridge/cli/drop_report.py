@@ -17,7 +17,7 @@ from bridge.errands.drop_test import DropOutcome, DropTest
 
 @dataclass(frozen=True, slots=True)
 class Occasion:
-    """Who, when, where. ``consent`` is how the operator agreed."""
+    """Operator, time and place of a test. ``consent`` is how the operator agreed."""
 
     operator: str
     host: str

@@ -89,8 +89,8 @@ def find_node(project: Project, name: str) -> tuple[BusTable, NodeTable]:
 
 
 def agree(node: NodeTable, *, at_the_machine: bool, first: str = "", is_device: bool = False) -> str:
-    """How the operator agreed. ``first`` says what is done before the test. Raises ``BadParameter`` or
-    ``OperationFailed`` if nobody agreed."""
+    """Form in which the operator agreed. ``first`` says what is done before the test. Raises ``BadParameter``
+    or ``OperationFailed`` if nobody agreed."""
     if at_the_machine:
         return "agreed by --yes-i-am-at-the-machine"
     if not sys.stdin.isatty():
@@ -155,7 +155,7 @@ def perform(project: Project, bus: BusTable, node: NodeTable) -> tuple[Plant, Dr
 
 
 def _count(file: LedgerFile, plant: Plant) -> None:
-    """What the boot-up writes to EEPROMs is counted where the service counts it."""
+    """Count the boot-up's EEPROM writes where the service counts its own."""
     try:
         file.add(plant.eeprom_writes, clock.epoch_ns(0.0) / 1e9, clock.now())
     except OSError as error:

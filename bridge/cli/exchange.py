@@ -150,7 +150,7 @@ def _places(project: Project, site: Path, node: NodeTable, files: Sequence[Path]
 
 
 def _old(places: Sequence[_Place]) -> dict[str, int]:
-    """What the files say that the old device was."""
+    """Identity of the old device by the files."""
     for place in places:
         if place.content.identity:
             return dict(place.content.identity)

@@ -1,4 +1,4 @@
-"""What is kept of an exchange until it is done, and its report."""
+"""State of an exchange, kept until it is done, and its report."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Exchange:
     warnings: list[str] = field(default_factory=list[str])
 
     def keep(self, drive: str, facts: Mapping[str, Any]) -> None:
-        """What was done to a drive, after what was done to it before."""
+        """Add what was done to a drive to what was done to it before."""
         before = self.drives.get(drive, {}).get("written", [])
         self.drives[drive] = {**facts, "written": [*before, *facts["written"]]}
         self.is_unsaved |= bool(facts["written"])

@@ -21,7 +21,8 @@ _KEPT_S: Final = 30 * 86_400.0
 
 
 class _Server(msgspec.Struct):
-    """Why it is not asked for block transfer, and when that was found out, in seconds since 1970."""
+    """Reason why a server is not asked for block transfer, and when that was found out, in seconds since
+    1970."""
 
     why_no_block: str
     since: float
@@ -42,7 +43,7 @@ class KnownServers:
         self._bus = line.table.name if line.is_of_site else f"{line.table.interface} {line.table.channel}"
 
     def known(self) -> Mapping[int, str]:
-        """Why a server is not asked for block transfer, by the COB-ID of its requests."""
+        """Reason why a server is not asked for block transfer, by the COB-ID of its requests."""
         servers = self._read().servers.get(self._bus, {})
         return {
             request_id: one.why_no_block

@@ -1,4 +1,4 @@
-"""Where the log goes: to standard error, with systemd's priorities where systemd reads it."""
+"""Set-up of the log: to standard error, with systemd's priorities where systemd reads it."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ app = typer.Typer(help="Give devices node ids and bit rates (CiA 305).", no_args
 
 _T = TypeVar("_T")
 _QUESTIONS = 134
-"""How many questions a fastscan takes that finds a device."""
+"""Number of questions of a fastscan that finds a device."""
 _NUMBER = re.compile(r"(?:0x)?([0-9a-f]{1,8})h?", re.IGNORECASE)
 
 Site = Annotated[Path | None, typer.Argument(metavar="[SITE]")]

@@ -32,7 +32,7 @@ _WATCHES = {
 
 
 _Answers = tuple[dict[str, OwnJudgement], dict[str, str]]
-"""What was read, by drive; why a node could not be asked, by node."""
+"""Judgements by drive, and reasons why a node could not be asked by node."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +186,7 @@ def _tell(one: Audited) -> None:
 
 
 def _remedy(drives: list[Audited]) -> Iterator[str]:
-    """What to write for these drives of one node."""
+    """Lines of the site file to write for these drives of one node."""
     node = drives[0].node
     names = {one.case.drive for one in drives}
     slots = [drive.slot for drive in node.drives if drive.name in names]
@@ -228,7 +228,7 @@ def _configure(want: OwnWant) -> Iterator[str]:
 
 
 def audit_facts(one: Audited) -> dict[str, Any]:
-    """What ``--json`` says of one drive."""
+    """JSON object of one drive for ``--json``."""
     own = one.own
     family = next(
         (drive.family for drive in one.node.drives if drive.name == one.case.drive), one.node.family

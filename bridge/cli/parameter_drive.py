@@ -1,4 +1,4 @@
-"""What the commands on parameters share: the choice of the drive, and running a procedure on its bus."""
+"""Common part of the commands on parameters: the choice of the drive, and running a procedure on its bus."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``scan --write`` writes: a site file, and mappings made of EDS files."""
+"""Output of ``scan --write``: a site file, and mappings made of EDS files."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def write_site(
 
 
 def _name(site: Path, file: _File, derived: Derived) -> str:
-    """What the site file calls the mapping. A device that is no drive has its file itself, where that lies
+    """Name of the mapping in the site file. A device that is no drive has its file itself, where that lies
     with the site; a drive has a mapping file, because its words want to be looked through."""
     folder, described = site.resolve().parent, file.path.resolve()
     if derived.is_drive or not described.is_relative_to(folder):
@@ -85,7 +85,7 @@ def _name(site: Path, file: _File, derived: Derived) -> str:
 
 
 def _files(folder: Path) -> Iterator[_File]:
-    """What can be read in ``folder``; what cannot is somebody else's."""
+    """Readable device files in ``folder``; all others are somebody else's."""
     for path in sorted(folder.rglob("*")):
         if path.suffix.lower() in _SUFFIXES:
             try:

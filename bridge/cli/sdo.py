@@ -115,8 +115,8 @@ def write(
 
 
 def why_forced(line: Line, node_id: int, address: ObjectRef) -> str:
-    """Why this object of a node is written with ``--force`` only. Without a site there is no bridge that
-    supervises the node."""
+    """Reason why this object of a node is written with ``--force`` only. Without a site there is no bridge
+    that supervises the node."""
     node = next((node for node in line.table.node if node.id == node_id), None)
     if node is None:
         return ""
@@ -179,7 +179,7 @@ def for_people(value: int | float | str | bool | None, data: bytes) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """Which SDO server of which node, with which time-out."""
+    """SDO server of a node, with its time-out."""
 
     node_id: int
     server: SdoServer | None

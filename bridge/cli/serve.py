@@ -47,7 +47,7 @@ _DEMO_MOVES = (
     ("lift/drive", "velocity", 2400.0),
     ("fan/drive", "velocity", 900.0),
 )
-"""What the demo's own controller moves: drive, setpoint, and how far, in the setpoint's unit."""
+"""Movements of the demo's own controller: drive, setpoint, and its greatest value, in the setpoint's unit."""
 
 
 def run(

@@ -81,7 +81,7 @@ def _bases(family: Family, folders: Sequence[Path]) -> list[str]:
 
 
 def habits_of(words: Sequence[str], site: Site) -> Habits:
-    """What ``NODE=HABIT`` says. Raises ``BadParameter`` for a node that the site does not have,
+    """Habits by node from ``NODE=HABIT``. Raises ``BadParameter`` for a node that the site does not have,
     ``FileFaults`` and ``OperationFailed`` for a habit that cannot be read."""
     names = {node.name for bus in site.bus for node in bus.node}
     found: dict[str, list[Rule]] = {}

@@ -107,7 +107,7 @@ def _buses(site: Site, path: Path, channels: list[str], own_timeout_ms: int | No
 
 
 def _numbers(site: Site, given: str | None, buses: list[WatchedBus]) -> Numbers | None:
-    """Where the numbers of telegrams are asked for; None where the site has no Modbus server."""
+    """Source of the telegrams' numbers; None where the site has no Modbus server."""
     listen = given or (site.modbus.listen if site.modbus else None)
     if listen is None:
         _log.warning("the site serves no Modbus: a silent controller is not judged, only what is on the bus")

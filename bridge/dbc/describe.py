@@ -66,7 +66,7 @@ def _pdos(drive: DriveView, slot: Slot) -> Iterator[tuple[PdoView, Pdo]]:
 
 
 def _asked(drive: DriveView, view: PdoView, first: int) -> PdoTable | None:
-    """What the site file says of this PDO; a table without a number is for the drive's first."""
+    """Table of this PDO in the site file; a table without a number is for the drive's first."""
     tables = drive.table.rpdo if view.receives else drive.table.tpdo
     return pdo_table(tables, view.number, first)
 

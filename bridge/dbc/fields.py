@@ -1,4 +1,4 @@
-"""Where the words of a drive stand in a PDO."""
+"""Places of a drive's words in a PDO."""
 
 from __future__ import annotations
 

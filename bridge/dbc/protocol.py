@@ -1,4 +1,4 @@
-"""What CANopen itself sends: NMT, SYNC, heartbeats, emergency messages (CiA 301 §7.2)."""
+"""Messages of CANopen itself: NMT, SYNC, heartbeats, emergency messages (CiA 301 §7.2)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _HEARTBEAT_STATES: Final = {0: "boot-up"} | {
 
 
 def bus_messages(bus: BusTable) -> Iterator[Message]:
-    """What the bridge sends to all."""
+    """Messages that the bridge sends to all."""
     receivers = tuple(node.name for node in bus.node)
     commands = {command.value: command.name.lower().replace("_", " ") for command in NmtCommand}
     yield Message(
@@ -49,7 +49,8 @@ def bus_messages(bus: BusTable) -> Iterator[Message]:
 
 
 def node_messages(node: NodeTable, family: Family, emcy_id: int | None) -> Iterator[Message]:
-    """What a node sends beside its PDOs. ``emcy_id`` is None where it sends no emergency messages."""
+    """Messages that a node sends beside its PDOs. ``emcy_id`` is None where it sends no emergency
+    messages."""
     guarded = node.supervision == "guarding"
     period_ms = heartbeat_period_ms(node.supervision_ms)
     cycle_ms = {"heartbeat": period_ms, "guarding": node.supervision_ms}.get(node.supervision, 0)

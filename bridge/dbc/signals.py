@@ -48,7 +48,7 @@ class PdoSignals:
         return [*found, *self._others()]
 
     def values(self) -> list[Signal]:
-        """What the words mean."""
+        """Signals of the values that the words carry."""
         found: list[Signal] = []
         for codec in self._codecs:
             if not codec.model.bits and codec.model.bit is None:

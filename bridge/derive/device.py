@@ -68,7 +68,7 @@ def device_lines(description: Description, source: str, read_only: str = "") -> 
 
 
 def _eeprom_lines(description: Description) -> Iterator[str]:
-    """How its parameters are saved, where it saves them on command (CiA 301 §7.5.2.13)."""
+    """Lines on saving its parameters, where it saves them on command (CiA 301 §7.5.2.13)."""
     entry = description.entry(0x1010, 1)
     if entry is None or not entry.access.writable:
         return
@@ -91,7 +91,8 @@ def _signal_lines(description: Description, name: str, entry: Entry, kind: str) 
 
 
 def _error_lines(description: Description, entry: Entry) -> Iterator[str]:
-    """Where the device keeps what the output becomes when it leaves Operational, as far as it has that."""
+    """Lines with the objects that say what the output becomes when it leaves Operational, as far as the
+    device has them."""
     indices = _ERROR_OBJECTS.get(entry.index) if _profile(description) == _PROFILE_IO else None
     keys = ("error_mode", "error_value")
     for key, index in zip(keys, indices or (), strict=False):
@@ -100,8 +101,8 @@ def _error_lines(description: Description, entry: Entry) -> Iterator[str]:
 
 
 def _signals(description: Description, *, receives: bool) -> Iterator[tuple[str, tuple[Entry, str, str]]]:
-    """What the RPDOs or the TPDOs carry, in their order, and what modules bring for them: name, and entry,
-    type and title."""
+    """Signals in the RPDOs or the TPDOs, in their order, and those that modules bring: name, and entry, type
+    and title."""
     found: dict[tuple[int, int], Entry] = {}
     for pdo in pdos(description):
         for one in pdo.mapped if pdo.receives == receives else ():

@@ -186,7 +186,7 @@ def _identity(description: Description) -> Iterator[str]:
 
 
 def _start(description: Description, mode: Mode) -> str | None:
-    """What the boot-up writes, where it is not what the base has it write."""
+    """Boot-up write of the mode of operation in place of the base's; None where the base's fits."""
     has_mode = _is_writable(description, MODE, 0)
     has_period = all(_is_writable(description, _INTERPOLATION, sub) for sub in (1, 2))
     if has_mode and (has_period or mode.number not in _CYCLIC):
@@ -258,7 +258,7 @@ def _pdos(drive: Axis) -> Iterator[str]:
 
 
 def _mode_word(drives: Sequence[Axis]) -> Iterator[str]:
-    """Where the word of the mode is called otherwise than in the base."""
+    """Lines of the value ``mode``, with the word that carries it."""
     ref = f"{MODE_DISPLAY:04X}:"
     named = (
         (name, one)
@@ -276,7 +276,7 @@ def _mode_word(drives: Sequence[Axis]) -> Iterator[str]:
 
 
 def _rest(rpdo: Sequence[PdoLayout]) -> Iterator[str]:
-    """What RPDOs send in words that nobody commands."""
+    """Values that RPDOs send in words that nobody commands."""
     words = {
         word: one.rest >> 16 * n & 0xFFFF
         for pdo in rpdo

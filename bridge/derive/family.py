@@ -105,8 +105,8 @@ def _is_half_a_drive(description: Description) -> bool:
 
 
 def _why_read_only(description: Description) -> str:
-    """Why nothing is written into a device that is no drive; empty where it is one of its own kind. What may
-    be a drive moves by objects that nobody knows, without a control word that would stop it."""
+    """Reason why nothing is written into a device that is no drive; empty where it is one of its own kind.
+    What may be a drive moves by objects that nobody knows, without a control word that would stop it."""
     profile = _profile(description)
     if profile in (0, PROFILE_402):
         seems_drive = profile == PROFILE_402 or _has(description, STATUS_WORD)
@@ -126,7 +126,7 @@ def _has(description: Description, word: int) -> bool:
 
 
 def _why_not(description: Description) -> str:
-    """What is there instead of a drive, and what would be one."""
+    """Reason why the device is no drive, with the object and line that tell."""
     device_type = description.entry(0x1000)
     profile = _profile(description)
     if device_type and profile and profile != PROFILE_402:

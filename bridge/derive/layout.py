@@ -44,8 +44,8 @@ class Layout:
 
 
 class Axes:
-    """What the axes of a device have in common: the names of further words, of which the same object of each
-    axis has the same, and the COB-IDs that no PDO of the device has."""
+    """Common part of the axes of a device: the names of further words, of which the same object of each axis
+    has the same, and the COB-IDs that no PDO of the device has."""
 
     def __init__(self, description: Description) -> None:
         self.further = FurtherWords()
@@ -63,8 +63,8 @@ class Axes:
 
 
 def layout_of(description: Description, mode: Mode, axes: Axes | None = None) -> Layout:
-    """How the device can be driven in ``mode``. Of one with several ``axes`` the description is that of one
-    axis, and the PDOs are named in any case. Raises ``NoLayout``."""
+    """Layout of the PDOs by which the device is driven in ``mode``. Of one with several ``axes`` the
+    description is that of one axis, and the PDOs are named in any case. Raises ``NoLayout``."""
     commands = _words(mode.commanded, "control_word", "setpoint")
     told = _words(mode.told, "status_word", "value")
     tells_mode = bits_of(description, MODE_DISPLAY) == 8
@@ -226,7 +226,7 @@ def _own(
 
 
 def _why_none(of_direction: Sequence[PdoSummary], want: tuple[int, int], *, receives: bool) -> str:
-    """Why no PDO brings or tells an object, with what is wrong with the one that has it."""
+    """Reason why no PDO carries an object, with what is wrong with the one that has it."""
     kind = "RPDO" if receives else "TPDO"
     why = f"no {kind} of the device carries {want[0]:04X}h, and none can be made to"
     for one in (one for one in of_direction if _carries(one, want)):

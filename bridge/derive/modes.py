@@ -1,4 +1,4 @@
-"""Which modes of CiA 402 a device has, as far as its description tells."""
+"""Modes of CiA 402 that a device has, as far as its description tells."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class Mode:
 
     @property
     def commanded(self) -> tuple[tuple[int, int], ...]:
-        """What the RPDO carries: objects with their lengths."""
+        """Objects in the RPDO, with their lengths."""
         setpoint = () if self.setpoint is None else ((self.setpoint, self.bits),)
         return ((CONTROL_WORD, 16), *setpoint)
 
     @property
     def told(self) -> tuple[tuple[int, int], ...]:
-        """What the TPDO carries, the mode of operation aside."""
+        """Objects in the TPDO, the mode of operation aside, with their lengths."""
         return ((STATUS_WORD, 16), (self.actual, self.bits))
 
 

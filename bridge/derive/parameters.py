@@ -38,7 +38,7 @@ MANUFACTURER: Final = range(0x2000, 0x6000)
 PROFILE: Final = profile_of(1)
 FURTHER_AXES: Final = range(PROFILE.stop, STANDARDISED.stop)
 _OF_BASE: Final = frozenset((0x6040, 0x6042, 0x6071, 0x607A, *range(0x60B0, 0x60B3), 0x60FF))
-"""What commands a drive and is no parameter of the base."""
+"""Objects that command a drive and are no parameters of the base."""
 
 
 def parameter_name(index: int, sub: int, *, has_subs: bool) -> str:
@@ -109,9 +109,9 @@ def _changes(entry: Entry, kind: TypeName, known: Parameter) -> Iterator[str]:
 
 
 def _protection(entry: Entry, profile: int | None) -> Iterator[str]:
-    """What can be mapped into an RPDO is made to command the device: of the maker's objects nobody says how,
-    and those of a drive's profile begin no movement while it is disabled. What the profile itself says of an
-    object is known without the file."""
+    """Protection of an entry. An object that can be mapped into an RPDO is made to command the device: of the
+    maker's objects nobody says how, and those of a drive's profile begin no movement while it is disabled.
+    What the profile itself says of an object is known without the file."""
     if effect_of(entry.index, profile) or not (entry.pdo_mappable and entry.access.writable):
         return
     is_drives = profile == PROFILE_402 and entry.index in PROFILE

@@ -1,4 +1,4 @@
-"""What the words of a PDO of a drive are called, what they carry, and what is sent in them at rest."""
+"""Words of a PDO of a drive: names, contents, and the values that are sent in them at rest."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class PdoLayout:
     turn_on: bool = False
     """The device has it off, or with another mapping: the boot-up writes it."""
     further: tuple[Further, ...] = ()
-    """What it carries beside what the mode needs."""
+    """Objects that it carries beside those that the mode needs."""
     signed: tuple[str, ...] = ()
     """Objects of one byte with a sign."""
     times: tuple[str, ...] = ()
@@ -107,8 +107,9 @@ class FurtherWords:
 
 
 def _times(description: Description, pdo: PdoSummary) -> Iterator[str]:
-    """How one that is switched on is sent, as far as it can be set: with each change, and a TPDO every
-    100 ms, as those of the base. A PDO that is off has often a type that waits for SYNC or for a request."""
+    """Transmission settings of a PDO that is switched on, as far as they can be set: with each change, and a
+    TPDO every 100 ms, as those of the base. A PDO that is off has often a type that waits for SYNC or for a
+    request."""
     index = (0x1400 if pdo.receives else 0x1800) + pdo.number - 1
     subs = ((2, "transmission_type = 255"),)
     if not pdo.receives:
@@ -169,9 +170,9 @@ class WordNames:
         return entry
 
     def _rest(self, pdo: PdoSummary, one: MappedObject) -> int:
-        """What a PDO carries while nobody commands it, as an integer without sign. Raises ``NoLayout`` where
-        nobody says a right value for it: 0 is not right for a torque limit, and as a mode of operation it is
-        none."""
+        """Value that a PDO carries while nobody commands it, as an integer without sign. Raises ``NoLayout``
+        where nobody says a right value for it: 0 is not right for a torque limit, and as a mode of operation
+        it is none."""
         entry = self._entry(pdo, one)
         if not pdo.receives:
             return 0

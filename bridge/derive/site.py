@@ -30,7 +30,7 @@ class ProposedNode:
 
 @dataclass(frozen=True, slots=True)
 class ProposedBus:
-    """Where the nodes were found."""
+    """Bus on which the nodes were found."""
 
     interface: str
     channel: str | None

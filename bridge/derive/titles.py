@@ -1,4 +1,4 @@
-"""What an object of a device description is called."""
+"""Titles of the objects of a device description."""
 
 from __future__ import annotations
 

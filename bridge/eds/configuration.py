@@ -17,16 +17,17 @@ _COB_IDS: Final = (
     (range(0x1400, 0x1600), (1,)),
     (range(0x1800, 0x1A00), (1,)),
 )
-"""Where a node has identifiers that may be made of its number: of SDO and PDOs (CiA 301 §7.5.2.33 … 37)."""
+"""Objects with identifiers that may be made of the node id: those of SDO and PDOs (CiA 301 §7.5.2.33 …
+37)."""
 _NODE_BITS: Final = 0x7F
 
 
 def configuration(
     description: Description, node_id: int | None = None, report: Report | None = None
 ) -> tuple[Download, ...]:
-    """What has to be written to a node with factory settings, in this order: application objects, then
-    communication objects; sub 0 of a mapping last. Only entries that can be written, have a ParameterValue
-    and differ from their default. The boot-up switches PDOs off before and on after it (CiA 301 §7.5.2.36).
+    """Downloads to a node with factory settings, in this order: application objects, then communication
+    objects; sub 0 of a mapping last. Only entries that can be written, have a ParameterValue and differ from
+    their default. The boot-up switches PDOs off before and on after it (CiA 301 §7.5.2.36).
 
     ``node_id`` replaces $NODEID; by default it is that of the file. What cannot be encoded is reported, and
     so is an identifier of another node that the file was made for. What is its default stays the default.

@@ -1,4 +1,4 @@
-"""Where a device description contradicts itself: each value is readable, and they cannot all be right."""
+"""Contradictions in a device description: each value is readable, and they cannot all be right."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _NODE_IDS: Final = (1, 127)
 
 
 def contradictions(description: Description) -> list[Finding]:
-    """What speaks against what, with the line of the one that names the other."""
+    """Contradictions, each with the line of the value that names the other."""
     found: list[Finding] = []
     for one in description.objects:
         for entry in one.entries:
@@ -79,7 +79,7 @@ def _node_ids(entry: Entry) -> Iterator[str]:
 
 
 def _mapping(description: Description, one: Object, receives: bool) -> Iterator[Finding]:
-    """What a PDO maps by default, and whether that is there and fits."""
+    """Findings on the default mapping of a PDO: whether its objects are there and fit."""
     count = description.number(one.index, 0)
     if not count or count in _MPDO:
         return
@@ -101,7 +101,7 @@ def _mapping(description: Description, one: Object, receives: bool) -> Iterator[
 
 
 def _mapped(description: Description, word: int, receives: bool) -> str:
-    """Why an object cannot be mapped like this; empty where it can."""
+    """Reason why an object cannot be mapped like this; empty where it can."""
     index, sub, bits = word >> 16, word >> 8 & 0xFF, word & 0xFF
     if index <= _LAST_TYPE:
         return ""

@@ -96,7 +96,7 @@ class _EdsReader:
                 self._tables[int(match[1], 16), match[2]] = section
 
     def lost(self, all_lines: Sequence[str]) -> str:
-        """What shows that a file whose last line has no end went on; empty where nothing does: editors leave
+        """Evidence that a file whose last line has no end went on; empty where there is none: editors leave
         that end out."""
         last = stripped(all_lines[-1])
         if last.startswith("[") and "]" not in last:

@@ -65,7 +65,7 @@ class Fields:
         return self._read(found, name, lambda: value(found.text, data_type))
 
     def _read(self, found: Text, name: str, read: Callable[[], tuple[T, str]]) -> T | None:
-        """What ``read`` gives, with a warning of its note; None where it raises BadValue."""
+        """Result of ``read``, with a warning of its note; None where it raises BadValue."""
         try:
             one, note = read()
         except BadValue as error:

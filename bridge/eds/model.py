@@ -249,7 +249,7 @@ class Report:
         self._add(Finding(line, Severity.ERROR, text))
 
     def breaks_off(self, line: int, text: str) -> None:
-        """What follows ``line`` has been lost."""
+        """Report that the file has been lost from behind ``line`` on."""
         self.broken_off_at = line
         self.error(line, text)
 

@@ -71,7 +71,7 @@ class Modules:
                     self._info[number] = section
         self.known = tuple(self._module(number) for number in sorted(self._info))
         self.line = min((section.line for section in self._info.values()), default=0)
-        """Where the file begins with them."""
+        """First line of the modules in the file."""
         self.brought: set[int] = set()
         """Objects that are there by what is plugged in alone."""
 
@@ -186,7 +186,7 @@ class Modules:
 
 
 class _End:
-    """Where the elements of an object that modules share end. ``first`` is the highest sub-index before."""
+    """End of the elements of an object that modules share. ``first`` is the highest sub-index before."""
 
     def __init__(self, index: int, first: int) -> None:
         self.first = first

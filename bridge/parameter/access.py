@@ -1,4 +1,4 @@
-"""How one drive's parameters are read and written: the policy, as procedures without a bus.
+"""Policy for reading and writing one drive's parameters, as procedures without a bus.
 
 A procedure yields the transfers it needs and is sent what each brought and when; whoever runs it
 carries them out on the SDO channel of the drive (``node.parameters``, or the command line).
@@ -31,7 +31,7 @@ MISSING: Final = (abort.NO_OBJECT, abort.NO_SUB)
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What a drive holds, and when it was asked, in monotonic seconds."""
+    """Value that a drive holds, and when it was asked, in monotonic seconds."""
 
     entry: Entry
     value: Value
@@ -88,7 +88,7 @@ class DriveParameters:
         self._cache.clear()
 
     def cached(self, entry: Entry) -> Reading | None:
-        """What was last read."""
+        """Reading that was taken last."""
         held = self._cache.get(entry.address)
         return Reading(entry, decode(entry, held[0]), held[1]) if held else None
 
@@ -122,7 +122,7 @@ class DriveParameters:
     def compare(
         self, entry: Entry, value: Value, now: float
     ) -> Generator[Transfer, tuple[bytes, float], tuple[Reading, bool]]:
-        """What the drive holds, and whether that is ``value``. Raises ``ParameterError`` also where it
+        """Reading of the drive, and whether it equals ``value``. Raises ``ParameterError`` also where it
         cannot hold ``value``."""
         held, time = yield from self._fetch(entry, now, FRESH_S)
         same = matches(entry, held, encode_value(entry, value, held))
@@ -217,7 +217,7 @@ class DriveParameters:
 
     @property
     def saving(self) -> Entry | None:
-        """What is written when the parameters are saved; None where the family has no such command."""
+        """Entry to be written when the parameters are saved; None where the family has no such command."""
         eeprom = self._eeprom
         if eeprom is None or not eeprom.can_save:
             return None
@@ -255,7 +255,7 @@ class DriveParameters:
         return self._count(key, entry.name, now)
 
     def writes(self, entry: Entry) -> int:
-        """How often this parameter was written to the EEPROM, as far as is known."""
+        """Number of known EEPROM writes of this parameter."""
         owner = self._node_name if _is_of_node(entry) else self.name
         return self._ledger.writes((owner, str(entry.address)))
 
@@ -318,6 +318,6 @@ def _is_of_node(entry: Entry) -> bool:
 
 
 def _held(entry: Entry, data: bytes, written: Value) -> Value:
-    """What ``data`` says; of an object that no file describes with the sign that was written."""
+    """Value in ``data``; of an object that no file describes with the sign that was written."""
     negative = entry.definition is None and not isinstance(written, str) and written < 0
     return written if negative else decode(entry, data)

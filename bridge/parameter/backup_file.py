@@ -23,30 +23,30 @@ IDENTITY: Final = ("vendor", "product", "revision", "serial")
 
 @dataclass(frozen=True, slots=True)
 class BackupFile:
-    """What a file holds. ``mapping`` is the family, such as nord/sk-tu4-cao; ``drive`` where the values
-    come from, ``saved`` when, both for people."""
+    """Content of a file. ``mapping`` is the family, such as nord/sk-tu4-cao; ``drive`` where the values come
+    from, ``saved`` when, both for people."""
 
     mapping: str
     drive: str
     saved: str
     values: Mapping[str, Value]
     comments: Mapping[str, str]
-    """What a value means, by its name; not read back."""
+    """Meaning of a value, by its name; not read back."""
     missing: Sequence[str] = ()
     identity: Mapping[str, int] = field(default_factory=dict[str, int])
-    """What the node says in 1018h, as far as it does, by ``IDENTITY``."""
+    """Identity of the node (1018h), as far as it has one, by ``IDENTITY``."""
     objects: Mapping[str, Value] = field(default_factory=dict[str, Value])
-    """What the mapping file does not list, as the drive sends it."""
+    """Values that the mapping file does not list, as the drive sends them, by name."""
     unreadable: Mapping[str, str] = field(default_factory=dict[str, str])
-    """Why something was not read, by its name; not read back."""
+    """Reason why something was not read, by its name; not read back."""
     left_out: Mapping[str, str] = field(default_factory=dict[str, str])
-    """Why no set holds it, by its name: a restore would move something. Not read back."""
+    """Reason why no set holds it, by its name: a restore would move something. Not read back."""
     lines: Mapping[str, int] = field(default_factory=dict[str, int])
-    """Where the file has ``mapping``, a part of its identity or a value, by its name."""
+    """Lines of ``mapping``, the parts of the identity and the values in the file, by name."""
 
     @property
     def all(self) -> dict[str, Value]:
-        """What it has of the drive, listed or not."""
+        """Values of the drive, listed or not."""
         return {**self.values, **self.objects}
 
     def text(self) -> str:

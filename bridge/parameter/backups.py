@@ -35,7 +35,7 @@ _SUBS: Final = 0xFF
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """What a drive holds, and what the set has for it."""
+    """Value that a drive holds beside the set's value for it."""
 
     entry: Entry
     in_drive: Value
@@ -55,9 +55,9 @@ class Backup:
     indices_done: int = 0
     """Of ``Names.settings``."""
     silent: set[str] = field(default_factory=set[str])
-    """What the drive has not answered for once."""
+    """Names for which the drive once did not answer."""
     answers: int = 0
-    """How often the drive has answered, if only with a refusal."""
+    """Number of answers of the drive, refusals included."""
 
 
 @dataclass(slots=True)
@@ -86,8 +86,8 @@ Steps = Generator[Transfer, tuple[bytes, float], None]
 
 
 def settings(names: Names, *, on_first: bool = True) -> list[Entry]:
-    """What belongs into a set, in the order of the mapping file; the node's own parameters are in the set
-    of the drive on its first SDO channel."""
+    """Entries that belong into a set, in the order of the mapping file; the node's own parameters are in the
+    set of the drive on its first SDO channel."""
     return [one for one in _set(names, on_first) if not names.protection.why_no_setting(one)]
 
 
@@ -135,7 +135,7 @@ def misfits(names: Names, values: Mapping[str, Value]) -> Iterator[tuple[str, Pa
 
 
 def _fitting(names: Names, name: str, seen: dict[ObjectRef, str]) -> Entry:
-    """What ``name`` means in a set that already has ``seen``. Raises ``ParameterError``."""
+    """Entry that ``name`` means in a set that already has ``seen``. Raises ``ParameterError``."""
     entry = names.resolve(name)
     other = seen.setdefault(entry.address, name)
     if other != name:
@@ -252,8 +252,8 @@ def _scan_object(
 
 
 def identify(into: dict[str, int]) -> Steps:
-    """What the node says that it is (1018h). Raises ``ParameterError`` where it does not answer, and where it
-    says something else than ``into`` has."""
+    """Read the node's identity (1018h). Raises ``ParameterError`` where it does not answer, and where it says
+    something else than ``into`` has."""
     found: dict[str, int] = {}
     for sub, name in enumerate(IDENTITY, 1):
         try:
@@ -269,7 +269,7 @@ def identify(into: dict[str, int]) -> Steps:
 
 
 def why_another(of_file: Mapping[str, int], of_node: Mapping[str, int]) -> tuple[str, str] | None:
-    """What of its identity says that a set is not of a drive of this kind, and the reason; None where it is,
+    """Part of its identity by which a set is not of a drive of this kind, and the reason; None where it is,
     or where the set does not say."""
     for name in ("vendor", "product"):
         if name in of_file and of_file[name] != of_node.get(name):
@@ -279,8 +279,8 @@ def why_another(of_file: Mapping[str, int], of_node: Mapping[str, int]) -> tuple
 
 
 def _refusal(entry: Entry, error: ParameterError, into: Backup) -> str:
-    """Why a value was not read, in words. Raises ``error`` again where the drive has not answered at all, but
-    for what it was silent about before: whoever begins again has seen that it answers."""
+    """Reason why a value was not read, in words. Raises ``error`` again where the drive has not answered at
+    all, but for what it was silent about before: whoever begins again has seen that it answers."""
     if error.why is Why.NO_ANSWER:
         if entry.name not in into.silent:
             into.silent.add(entry.name)

@@ -1,4 +1,4 @@
-"""Why a parameter was not read or not written."""
+"""Reasons why a parameter was not read or not written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a device description says of a drive's settings: which there are, and the factory's values."""
+"""Settings of a drive by its device description: which there are, and the factory's values."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class Saved:
-    """What is kept of one object: writes so far, and when the last were, in seconds since 1970 UTC."""
+    """Record of one object: writes so far, and when the last were, in seconds since 1970 UTC."""
 
     writes: int
     last: tuple[float, ...] = ()

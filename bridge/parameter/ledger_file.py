@@ -1,4 +1,4 @@
-"""Where the EEPROM guard's counts are kept: ``eeprom.json`` in the site's ``state_dir``.
+"""File of the EEPROM guard's counts: ``eeprom.json`` in the site's ``state_dir``.
 
 The service and the command line count in the same file: each adds what it has written under a lock, and
 takes over the others' counts. The file is replaced, never half written.
@@ -39,7 +39,7 @@ class LedgerFile:
     def __init__(self, state_dir: Path) -> None:
         self.path = state_dir / NAME
         self.damaged = ""
-        """Where a file was put aside that could not be read, or empty."""
+        """Path to which a file was put aside that could not be read, or empty."""
 
     def add(self, ledger: Ledger, epoch_s: float, now: float) -> None:
         """Keep what ``ledger`` has counted, and give it what others have; also the first reading.
@@ -56,7 +56,7 @@ class LedgerFile:
         ledger.restore(totals, epoch_s, now)
 
     def totals(self) -> dict[Key, int]:
-        """How often each was written, as the file says now; empty where there is none that can be read."""
+        """Writes of each object by the file as it is now; empty where there is none that can be read."""
         try:
             kept = msgspec.json.decode(self.path.read_bytes(), type=_File)
         except (OSError, msgspec.MsgspecError, UnicodeDecodeError):

@@ -22,7 +22,7 @@ _OBJECT: Final = re.compile(r"(?:0x)?([0-9a-f]{4})h?:(?:0x)?([0-9a-f]{1,2})h?", 
 _SPELLINGS: Final = (
     "{name}[{element}].{set}", "{name}[{element}]", "{name}.{set}", "{name}/{element}", "{name}.{element}",
 )  # fmt: skip
-"""How vendors write elements and sets; the one that the family's own pattern reads is used."""
+"""Spellings of elements and sets by the vendors; the one that the family's own pattern reads is used."""
 _PUNCTUATION: Final = re.compile(r"[^0-9A-Za-z]+$")
 _NEAREST: Final = 3
 _MOST_SUB: Final = 0xFF
@@ -110,7 +110,8 @@ class Names:
         return Entry(name if leads_back else str(address), address)
 
     def _vendors(self, address: ObjectRef) -> str:
-        """How the vendor writes ``address``, in the shape of the family's example; empty if it does not."""
+        """Spelling of ``address`` by the vendor, in the shape of the family's example; empty if there is
+        none."""
         rule = self._rule
         shape = re.match(r"([A-Z])(\d+)", rule.example) if rule else None
         if rule is None or shape is None or rule.hexadecimal or not rule.number_step:
@@ -155,7 +156,8 @@ class Names:
         return f"; {'; '.join([*parts, 'an object such as 1018:01 is taken too'])}"
 
     def set_hint(self, name: str) -> str:
-        """How a parameter that the file does not list is written where each parameter set has its own."""
+        """Hint on how to write a parameter that the file does not list, where each parameter set has its
+        own."""
         if self._rule is None or not self._rule.set_step or self._pattern is None:
             return ""
         example = f"{name}.1"
@@ -227,7 +229,7 @@ class AxisNames:
         self._made: dict[int, Names] = {}
 
     def of(self, axis: int = 1) -> Names:
-        """What is no axis has the names of the first."""
+        """Names of an axis. What is no axis has the names of the first."""
         if axis not in self._made:
             self._made[axis] = Names(self._family.of_axis(axis))
         return self._made[axis]
@@ -238,5 +240,6 @@ def _number(text: str | None) -> int | None:
 
 
 def _as_read(parameter: Parameter) -> Parameter:
-    """What is not to be read as a scale holds something else than the unit says."""
+    """Parameter without its unit where it is not to be read as a scale: then it holds something else than the
+    unit says."""
     return parameter if parameter.read else parameter.model_copy(update={"factor": 1.0, "unit": ""})

@@ -1,4 +1,4 @@
-"""What the objects of the device profiles do, by index: for every node, whether or not a file lists them.
+"""Effects of the objects of the device profiles, by index: for every node, whether or not a file lists them.
 
 CiA 301 §7.4.1 divides 6000h … 9FFFh into eight logical devices of 800h indices; each object of the first is
 there again in the others, and CiA 404 has them once for each data type in the same way.
@@ -71,7 +71,7 @@ _ORDER: Final = tuple(Effect)
 
 
 def effect_of(index: int, profile: int | None) -> Effect | None:
-    """What a write of this object does by the device profile: None where the profile does not say. Without a
+    """Effect of a write of this object by the device profile: None where the profile does not say. Without a
     profile, and with one that is not among ``PROFILES``, the first effect counts that it has in any."""
     if index in NETWORK_VARIABLES:
         return Effect.COMMANDS

@@ -1,4 +1,5 @@
-"""What may not be written as a parameter, under whatever name: judged by the objects that a write touches.
+"""Protection of objects that may not be written as a parameter, under whatever name: judged by the objects
+that a write touches.
 
 Every write of a client and of the command line goes through ``DriveParameters``, which asks ``Protection``
 with a ``Gate``. A maker's parameter may be another name of a communication object, or determine one in
@@ -31,7 +32,7 @@ Asks = Callable[[Iterable[Entry]], Generator[Transfer, tuple[bytes, float], None
 
 @dataclass(frozen=True, slots=True)
 class Gate:
-    """Who writes, and what is known of what the node moves.
+    """Rights of the writer, and what is known of what the node moves.
 
     ``is_moving`` is asked before a write is queued and again when its turn has come: whoever owns the drive
     may enable it in between. ``asks`` comes right before the write, and raises ``ParameterError`` where there
@@ -44,7 +45,7 @@ class Gate:
 
 
 class Protection:
-    """What writing the objects of one family does. ``listed`` has its definitions, with the index of each
+    """Effects of writing the objects of one family. ``listed`` has its definitions, with the index of each
     one's object."""
 
     def __init__(self, family: Family, listed: Iterable[tuple[int, Parameter]]) -> None:
@@ -86,7 +87,7 @@ class Protection:
         return tuple(dict.fromkeys(ref for alias in exact or beside for ref in alias.objects))
 
     def effect(self, address: ObjectRef) -> Effect:
-        """What a write of an object does. What stands beside a protected parameter under the same index is
+        """Effect of a write of an object. What stands beside a protected parameter under the same index is
         protected like it."""
         index = address.index
         if (
@@ -106,7 +107,7 @@ class Protection:
         return found
 
     def level(self, address: ObjectRef) -> str:
-        """Who may write an object and when, as clients are told (``Effect.level``)."""
+        """Level needed to write an object, as clients are told (``Effect.level``)."""
         return self.effect(address).level
 
     def may_set(self, address: ObjectRef, *, is_engineer: bool) -> bool:
@@ -120,7 +121,7 @@ class Protection:
         )
 
     def why_not(self, entry: Entry, gate: Gate) -> str:
-        """Why this is not written by whom the gate lets in; empty where it is."""
+        """Reason why this is not written by whom the gate lets in; empty where it is."""
         effect = self.effect(entry.address)
         match judge(effect, is_engineer=gate.is_engineer, is_moving=gate.is_moving()):
             case Verdict.WRITTEN:
@@ -135,7 +136,7 @@ class Protection:
                 return f"{entry.name} is not written while the drive is enabled: stop and disable it first"
 
     def why_never(self, entry: Entry) -> str:
-        """Why nobody writes it as a parameter; empty where somebody may."""
+        """Reason why nobody writes it as a parameter; empty where somebody may."""
         address, effect = entry.address, self.effect(entry.address)
         if self._read_only:
             return f"{entry.name} is not written, the device is only read: {self._read_only}"
@@ -159,16 +160,16 @@ class Protection:
         return f"{entry.name} commands the drive: its controller alone does, by process data"
 
     def why_no_setting(self, entry: Entry) -> str:
-        """Why no parameter set holds it: a restore would move something. Empty where one may. What an RPDO
-        can carry to a drive moves nothing while that is disabled, and a set is restored only then."""
+        """Reason why no parameter set holds it: a restore would move something. Empty where one may. What an
+        RPDO can carry to a drive moves nothing while that is disabled, and a set is restored only then."""
         effect = self.effect(entry.address)
         if effect is Effect.MAY_MOVE and self._is_device:
             return f"{entry.name} may move something: no parameter set holds it"
         return self.why_never(entry)
 
     def why_forced(self, entry: Entry) -> str:
-        """Why the command line, which knows no roles, writes it with ``--force`` only, if at all. What may
-        move a drive does so only while that is enabled, and then it is not written."""
+        """Reason why the command line, which knows no roles, writes it with ``--force`` only, if at all. What
+        may move a drive does so only while that is enabled, and then it is not written."""
         effect = self.effect(entry.address)
         if effect is Effect.MAY_MOVE and not self._is_device:
             return ""

@@ -12,8 +12,8 @@ from bridge.parameter.names import Names
 
 
 def read_set(file: Path, names: Names, mapping: str, drive: str, node_id: int) -> BackupFile:
-    """What ``file`` has for ``drive``, whose family is ``mapping``. Raises ``FileFaults`` with all that does
-    not fit."""
+    """Content of ``file`` for ``drive``, whose family is ``mapping``. Raises ``FileFaults`` with all that
+    does not fit."""
     if file.suffix.lower() in DESCRIPTIONS:
         objects = factory(file, names, node_id)
         if not objects:

@@ -1,4 +1,4 @@
-"""What is read of a node, or written, for a parameter."""
+"""SDO transfers of a node for a parameter."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def simulate_description(
 
 
 def values_of(family: Family, parameters: Mapping[str, float]) -> dict[At, int]:
-    """What the objects hold of parameters in engineering units, of all axes or, as ``axis2/6083``, of one.
+    """Values of objects for parameters in engineering units, of all axes or, as ``axis2/6083``, of one.
     Raises ``OperationFailed`` where that cannot be."""
     return {at: value for name, given in parameters.items() for at, value in _value(family, name, given)}
 

@@ -41,13 +41,13 @@ class Times:
     pause_s: float = 8.0
     retry_s: float = 1.0
     away_s: float = 60.0
-    """How long a drive is left to others that somebody else has stopped."""
+    """Time in seconds for which a drive that somebody else has stopped is left to others."""
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """What to move: ``drive_key`` is ``<prefix>/<site>/<drive>``, ``value`` its setpoint (``frequency``),
-    ``most`` the highest value, in the setpoint's unit."""
+    """Movement of one drive: ``drive_key`` is ``<prefix>/<site>/<drive>``, ``value`` its setpoint
+    (``frequency``), ``most`` the highest value, in the setpoint's unit."""
 
     drive_key: str
     value: str

@@ -32,7 +32,7 @@ class Simulation:
         """When each node is due; one that is missing here is due now. Asking all of them for every frame of a
         busy bus would cost more than simulating them."""
         self._heard: dict[SimulatedDevice, frozenset[int]] = {}
-        """What ``_hearers`` was made of."""
+        """Identifiers heard by each device, from which ``_hearers`` was made."""
         self._hearers: dict[int, list[SimulatedDevice]] = {}
         """By identifier."""
 
@@ -60,8 +60,8 @@ class Simulation:
                 self._timer.cancel()
 
     def catch_up(self, now: float) -> None:
-        """Where this process was held up, what was due meanwhile is played now: a master in it must not take
-        its own pause for the nodes' silence."""
+        """Play now what was due while this process was held up: a master in it must not take its own pause
+        for the nodes' silence."""
         if self._due_at is not None and self._due_at < now - _LATE_S:
             self._pump(now)
 

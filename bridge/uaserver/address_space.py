@@ -1,4 +1,4 @@
-"""What asyncua's address space needs to be told to hold nodes that are made when somebody looks at them."""
+"""Address space of asyncua that holds nodes which are made when somebody looks at them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from asyncua.server.address_space import AttributeValue, NodeData
 from bridge.uaserver.library import AttributeIds, ua
 
 Callbacks = dict[int, Callable[..., Any]]
-"""Whom to tell of a change, by handle."""
+"""Callbacks for a change, by handle."""
 
 
 def is_empty(held: AttributeValue) -> bool:

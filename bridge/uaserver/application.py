@@ -64,7 +64,7 @@ U = TypeVar("U", bound=UserIdentity)
 
 
 class ServedApplication(Protocol[U]):
-    """Whom a server serves. Its users are those that ``identify`` gives."""
+    """Application that a server serves. Its users are those that ``identify`` gives."""
 
     async def identify(self, login: LoginAttempt) -> U:
         """Raises ServiceError for who is not let in."""

@@ -49,14 +49,14 @@ _FIELDS: Final = {
     ua.BrowseResultMask.DisplayName: ("DisplayName", ua.LocalizedText()),
     ua.BrowseResultMask.TypeDefinition: ("TypeDefinition", ua.ExpandedNodeId()),
 }
-"""What a field holds that is not in the mask."""
+"""Value of a field that is not in the mask."""
 
 _ALL_FIELDS: Final = int(ua.BrowseResultMask.All)
 
 
 @dataclass(frozen=True, slots=True)
 class _Rest:
-    """What of a browse is still to be told, so many at a time."""
+    """References of a browse that are still to be sent, at most ``most`` in an answer."""
 
     references: Sequence[ua.ReferenceDescription]
     most: int

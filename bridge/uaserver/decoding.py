@@ -40,7 +40,7 @@ _Decode = Callable[[Any], Any]
 
 @dataclass(slots=True)
 class _Budget:
-    """What may still be decoded."""
+    """Number of array elements that may still be decoded."""
 
     left: int
 
@@ -85,7 +85,7 @@ def is_malformed(error: BaseException) -> bool:
 
 
 def place(error: BaseException) -> str:
-    """Where ``error`` was raised."""
+    """Place in the source where ``error`` was raised."""
     frames = traceback.extract_tb(error.__traceback__)
     return f"at {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
 

@@ -20,12 +20,12 @@ from bridge.uaserver.library import ServiceError, StatusCodes, ua
 _TURN_BYTES: Final = 16 * 1024
 """That are encoded before others have their turn; a few milliseconds."""
 _EACH_BYTES: Final = 32
-"""What one value or result counts besides its bytes: small ones take their time, too."""
+"""Bytes that one value or result counts besides its own: small ones take their time, too."""
 _LENGTH: Final = struct.Struct("<i")
 
 
 class Results:
-    """What a service has found so far, each encoded as it is added."""
+    """Results of a service so far, each encoded as it is added."""
 
     def __init__(self, most_bytes: int) -> None:
         self.count = 0

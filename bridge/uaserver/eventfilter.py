@@ -1,4 +1,4 @@
-"""Which events a client wants to hear, and which fields of them: EventFilter (OPC 10000-4 §7.22.3)."""
+"""EventFilter: the events that a client wants, and their fields (OPC 10000-4 §7.22.3)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class EventFilter:
 
     @property
     def weight(self) -> int:
-        """How long it takes to judge and to tell an event, in tens of fields and operands."""
+        """Cost of judging and reporting an event, in tens of fields and operands."""
         return 1 + (len(self.names) + self.where.operands) // 10
 
     def passes(self, event: Occurrence) -> bool:

@@ -1,4 +1,4 @@
-"""Which changes of a value a client wants reported: DataChangeFilter (OPC 10000-4 §7.22.2)."""
+"""DataChangeFilter: the changes of a value that a client wants reported (OPC 10000-4 §7.22.2)."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _is_number(space: AddressSpace, node: NodeData) -> bool:
 
 
 def _span(space: AddressSpace, node: NodeData) -> float | None:
-    """How far the node's EURange reaches."""
+    """Width of the node's EURange; None where it has none."""
     for found in related(space, node.nodeid, ObjectIds.HasProperty):
         if get(found, "BrowseName") == ua.QualifiedName("EURange", 0):
             limits = space.read_attribute_value(get(found, "NodeId"), AttributeIds.Value).Value

@@ -86,7 +86,7 @@ class EventTypes:
         return isinstance(kind, ua.NodeId) and wanted in self._above.get(kind, ())
 
     def fault(self, operand: object) -> int:
-        """What is wrong with an operand that names a field; Good for nothing."""
+        """Status code of an operand that names a field; Good where nothing is wrong."""
         type_id: ua.NodeId = get(operand, "TypeDefinitionId")
         names: list[ua.QualifiedName] = get(operand, "BrowsePath") or []
         attribute: int = get(operand, "AttributeId")

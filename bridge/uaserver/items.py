@@ -43,7 +43,7 @@ Monitoring = ua.MonitoringMode
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What a client has asked for, as it is really used. ``queue_size`` is at least 1."""
+    """Settings of a monitored item as revised. ``queue_size`` is at least 1."""
 
     client_handle: int
     sampling_ms: float

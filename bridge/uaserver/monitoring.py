@@ -237,7 +237,7 @@ def _item(subscription: Subscription, number: int) -> Item:
 
 
 def code_of(act: Callable[[int], None], number: int) -> ua.StatusCode:
-    """What became of one of the operations of a request."""
+    """Status code of one of the operations of a request."""
     try:
         act(number)
     except ServiceError as error:

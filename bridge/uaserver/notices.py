@@ -1,4 +1,4 @@
-"""What strangers do wrong on OPC UA, in the log."""
+"""Log lines on the faults of OPC UA clients."""
 
 from __future__ import annotations
 

@@ -38,7 +38,8 @@ def can_have(whole: ua.Variant | None) -> bool:
 
 
 def part(ranges: Ranges, whole: ua.Variant | None) -> ua.Variant | None:
-    """What of ``whole`` lies within; None where nothing does. The upper bounds may lie beyond the end."""
+    """Part of ``whole`` that lies within; None where nothing does. The upper bounds may lie beyond the
+    end."""
     if not ranges:
         return whole
     taken = None if whole is None else _taken(whole.Value, ranges)

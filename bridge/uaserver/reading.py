@@ -1,4 +1,4 @@
-"""What a client wants to see of an attribute: which part of the value, and which of its times."""
+"""Part of an attribute that a client reads: range of the value, and time stamps."""
 
 from __future__ import annotations
 

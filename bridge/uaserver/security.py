@@ -30,7 +30,7 @@ class Trust(Protocol):
     """Client certificates that are trusted."""
 
     def refusal(self, certificate: x509.Certificate) -> str | None:
-        """Why this certificate is not trusted, or None if it is."""
+        """Reason why this certificate is not trusted, or None if it is."""
         ...
 
 
@@ -113,7 +113,8 @@ _OAEP: Final = {
     "http://www.w3.org/2001/04/xmlenc#rsa-oaep": SHA1,
     "http://opcfoundation.org/UA/security/rsa-oaep-sha2-256": SHA256,
 }
-"""How a password may be encrypted. RSA 1.5 is not among them: its padding tells on the key's owner."""
+"""Algorithms by which a password may be encrypted. RSA 1.5 is not among them: its padding tells on the key's
+owner."""
 
 _LENGTH: Final = struct.Struct("<I")
 

@@ -1,4 +1,4 @@
-"""What the server says of itself in namespace 0, where asyncua leaves it empty or says what is not so.
+"""Self-description of the server in namespace 0, where asyncua leaves it empty or wrong.
 
 Nothing is Good and null: what is not known is BadNotSupported as a value, and no other attribute is there
 without one (BadAttributeIdInvalid).

@@ -1,4 +1,4 @@
-"""Which services of OPC 10000-4 are carried out, and what the others are answered.
+"""Services of OPC 10000-4 that are carried out, and the answers to all others.
 
 The processor asks this table before it looks into a request, and ``docs/reference/opcua.md`` shows it.
 """

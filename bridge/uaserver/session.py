@@ -74,13 +74,13 @@ class Session(InternalSession):
         self.holder: object | None = None
         """The processor of the connection that it is activated on."""
         self.answer: Results | None = None
-        """What is being encoded for it."""
+        """Answer that is being encoded for it."""
         self.most_bytes = 0
         """Of an answer, as its client takes it on that connection."""
         self.left_at = 0.0
         """When it lost its last connection; monotonic."""
         self.admitted: UserIdentity | None = None
-        """Who ``activate_session`` is for; set by the processor once the login has been checked."""
+        """User for whom ``activate_session`` is; set by the processor once the login has been checked."""
 
     @property
     def is_gone(self) -> bool:

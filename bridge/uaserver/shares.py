@@ -1,4 +1,4 @@
-"""What one client may have of the sessions, subscriptions and monitored items that all share."""
+"""Quotas of one client in the sessions, subscriptions and monitored items that all share."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_ITEMS_OF_ADDRESS: Final = 50_000
 MOST_ON_ONE: Final = 1_000
 """Of one address on one attribute: each is told of every change of it."""
 MOST_LISTENERS: Final = 1_000
-"""What the items for events of all clients weigh: each is asked about every event."""
+"""Limit of the weight of all clients' items for events: each is asked about every event."""
 MOST_LISTENERS_OF_ADDRESS: Final = 500
 
 
@@ -63,7 +63,7 @@ async def make_room(
 
 
 def room_for_items(address: str, subscriptions: Iterable[Subscription]) -> int:
-    """How many monitored items a session of this address may have in addition to what all have."""
+    """Number of monitored items that a session of this address may have in addition to what all have."""
     items: Counter[str] = Counter()
     for one in subscriptions:
         items[source_of(one.owner.address)] += len(one.items)
@@ -71,7 +71,7 @@ def room_for_items(address: str, subscriptions: Iterable[Subscription]) -> int:
 
 
 class Listening:
-    """What the items for events weigh, by whom they are counted for."""
+    """Weight of the items for events, by whom they are counted for."""
 
     def __init__(self) -> None:
         self._weights: Counter[str] = Counter()

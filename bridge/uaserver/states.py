@@ -1,4 +1,4 @@
-"""What a request is answered in each state of the session that it is for (OPC 10000-4 §5.6 and §7.38).
+"""Answers to a request in each state of the session that it is for (OPC 10000-4 §5.6 and §7.38).
 
 Clients go by these codes: on BadSessionIdInvalid they make a new session, on BadSessionNotActivated they
 activate the one that they have. ``docs/reference/opcua.md`` shows the table.

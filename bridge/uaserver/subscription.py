@@ -35,7 +35,7 @@ _LAST_SEQUENCE: Final = 0xFFFF_FFFF
 
 @dataclass(frozen=True, slots=True)
 class Terms:
-    """What a subscription runs on, as revised. ``lifetime`` and ``keep_alive`` count intervals."""
+    """Parameters of a subscription as revised. ``lifetime`` and ``keep_alive`` count intervals."""
 
     interval_ms: float
     lifetime: int

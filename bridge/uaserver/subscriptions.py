@@ -86,7 +86,7 @@ class Subscriptions:
         return results
 
     def drop_left_behind(self) -> None:
-        """Where there are as many as there may be, the oldest one that nobody has come for goes."""
+        """Delete the oldest subscription without a session, where there are as many as there may be."""
         if len(self.subscriptions) >= MOST_SUBSCRIPTIONS and (oldest := next(self._left_behind(), None)):
             self._close(oldest)
 
@@ -150,8 +150,8 @@ class Subscriptions:
             return room_for_items(owner.address, self.subscriptions.values())
 
         def make_room() -> bool:
-            """What has been left behind ends before anything is refused: that of this address, or where all
-            together have too much, of any."""
+            """Delete a subscription without a session before anything is refused: one of this address, or
+            where all together have too much, of any."""
             left = list(self._left_behind())
             ending = [found for found in left if source_of(found.owner.address) == source]
             if not ending and self._is_full:

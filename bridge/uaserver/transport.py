@@ -77,7 +77,7 @@ _MALFORMED: Final = (
     RecursionError,
     struct.error,
 )
-"""What asyncua's decoders raise for bytes that are not OPC UA."""
+"""Exceptions of asyncua's decoders for bytes that are not OPC UA."""
 
 
 class Processor(UaProcessor):

@@ -80,7 +80,8 @@ _OPERATORS: Final[Mapping[ua.FilterOperator, tuple[int, int, Callable[..., bool 
     Operator.And: (2, 2, _and),
     Operator.Or: (2, 2, _or),
 }
-"""How many operands at least and at most, and what becomes of them. OfType is made for each filter."""
+"""Least and greatest number of operands of each operator, and its evaluation. OfType is made for each
+filter."""
 
 
 @dataclass(frozen=True, slots=True)

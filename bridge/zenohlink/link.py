@@ -66,7 +66,7 @@ class ZenohLink:
         )
         self._publishers = Publishers(encoding)
         self.is_publishing = False
-        """What was given to ``publish`` last is not sent yet."""
+        """True while what was given to ``publish`` last is not sent yet."""
 
     @property
     def errors(self) -> int:

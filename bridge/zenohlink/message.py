@@ -1,4 +1,4 @@
-"""What is sent and received through a link, in our own types."""
+"""Messages that are sent and received through a link, in our own types."""
 
 from __future__ import annotations
 

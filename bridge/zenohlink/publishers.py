@@ -1,4 +1,4 @@
-"""What is published again and again: values on many keys, and whether anybody reads them."""
+"""Cyclic publications: values on many keys, and whether anybody reads them."""
 
 # pyright: reportUnknownMemberType=false
 # zenoh's stubs leave out the return types of what returns nothing.

@@ -22,7 +22,7 @@ _MOST_PENDING: Final = 500
 silent connections lock everybody out. Each uses a file descriptor of the bus process, which often has no more
 than 1024."""
 _STALLED_US: Final = 500_000
-"""How long a query or reply waits for a peer that does not read; then the connection is closed."""
+"""Time for which a query or reply waits for a peer that does not read; then the connection is closed."""
 _STALLED_AMONG_OTHERS_US: Final = 100_000
 """The same where others must not be delayed: inside zenoh they sometimes are."""
 

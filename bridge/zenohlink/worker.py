@@ -31,9 +31,10 @@ _log = logging.getLogger(__name__)
 Arguments = TypeVarTuple("Arguments")
 
 _LANES_END_S: Final = 1.0
-"""How long the lanes of a closed session may take to end."""
+"""Time within which the lanes of a closed session have to end."""
 _LOOK_S: Final = 0.5
-"""How often to look for connections that have not become a session: less than the time they have for that."""
+"""Interval at which to look for connections that have not become a session: less than the time they have for
+that."""
 
 _LIMIT: Final = 1000
 """Queries and samples of one share that may wait for the loop; further ones are refused."""
@@ -42,7 +43,8 @@ _MOST_SHARES: Final = 64
 _AT_ONCE: Final = 32
 """Calls made before the loop gets its turn for other work."""
 ZENOH_ERRORS: Final = (zenoh.ZError, RuntimeError, ValueError, TypeError, AttributeError)
-"""What zenoh's calls raise: ZError for failures, the others for objects that have been closed meanwhile."""
+"""Exceptions of zenoh's calls: ZError for failures, the others for objects that have been closed
+meanwhile."""
 
 
 class Declared(Protocol):

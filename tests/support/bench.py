@@ -149,7 +149,7 @@ class Bench:
         return ClockBus(self._from_master)
 
     def clock(self) -> float:
-        """What the master looks at."""
+        """Time by which the master goes."""
         return self.now
 
     def power_on(self) -> None:

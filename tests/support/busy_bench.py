@@ -15,7 +15,7 @@ _bits = cache(exact_bits)
 
 
 class _WiredBus(ClockBus):
-    """What the master sends waits for its turn, and for no longer than it may."""
+    """Bus on which the master's frames wait for their turn, and for no longer than they may."""
 
     def __init__(self, bench: BusyBench) -> None:
         super().__init__(lambda frame: None)

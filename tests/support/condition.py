@@ -51,7 +51,7 @@ class Watched:
         self.image.set(self.image.index[name], value, self.now_ms / 1000, quality, reason)
 
     def beat(self) -> list[dict[str, Any]]:
-        """What is wrong, as the point tells it."""
+        """Troubles, as the point tells them."""
         self.troubles.beat(self.now_ms, self.now_ms)
         return json.loads(troubles_json(self.troubles.shown))
 

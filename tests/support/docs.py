@@ -37,7 +37,7 @@ class Block:
     notes: tuple[str, ...] = ()
 
     def note(self, name: str) -> str | None:
-        """What follows ``name`` in a comment above the block, or None where there is no such comment."""
+        """Text behind ``name`` in a comment above the block, or None where there is no such comment."""
         for note in self.notes:
             if note == name or note.startswith((f"{name}:", f"{name} ")):
                 return note[len(name) :].strip(": ")
@@ -180,7 +180,7 @@ def commands(block: Block) -> Iterator[Command]:
 
 
 def output_pattern(expected: str) -> re.Pattern[str]:
-    """What matches an output (as ``squeezed`` gives it) that is as expected."""
+    """Pattern of the outputs (as ``squeezed`` gives them) that are as expected."""
     parts: list[str] = []
     for line in squeezed(expected).splitlines():
         if line == "…":

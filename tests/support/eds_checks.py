@@ -1,4 +1,4 @@
-"""What every EDS file of ours has to stand: another tool opens it, the simulated node has what it says."""
+"""Checks of every EDS file of ours: another tool opens it, the simulated node has what it says."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def entries(description: Description) -> list[Entry]:
 
 
 def open_with_canopen(file: Path, description: Description, node_id: int) -> canopen.ObjectDictionary:
-    """What canopen reads from the file, after it was compared with what we read."""
+    """Object dictionary that canopen reads from the file, after it was compared with what we read."""
     other = canopen.import_od(str(file), node_id)
     for one in description.objects:
         for entry in one.entries:
@@ -29,7 +29,7 @@ def open_with_canopen(file: Path, description: Description, node_id: int) -> can
 
 
 def compare_types_and_access(listed: Iterable[Entry], find: Find, *, static: bool = False) -> int:
-    """How many numbers were compared. ``static``: what is mapped is fixed, nothing is said to be mappable."""
+    """Number of compared entries. ``static``: what is mapped is fixed, nothing is said to be mappable."""
     checked = 0
     for entry in listed:
         node = find(entry.index, entry.sub)
@@ -47,7 +47,7 @@ def compare_types_and_access(listed: Iterable[Entry], find: Find, *, static: boo
 
 
 def compare_defaults(listed: Iterable[Entry], find: Find, node_id: int) -> int:
-    """How many defaults were compared with what a fresh node answers."""
+    """Number of defaults that were compared with the answers of a fresh node."""
     checked = 0
     for entry in listed:
         if entry.default:

@@ -223,7 +223,7 @@ def setpoint_of(family: Family) -> tuple[str, float] | None:
 
 
 def speed_of(family: Family) -> dict[str, float]:
-    """How fast a drive is to go to its position, where that is a value of its own."""
+    """Speed at which a drive goes to its position, where that is a value of its own."""
     setpoint = setpoint_of(family)
     names = {value.name for value in family.values_of(family.slot[0]) if value.group == "command"}
     speeds = {"velocity": 9000.0, "frequency": 25.0} if setpoint and setpoint[0] == "position" else {}

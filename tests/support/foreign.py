@@ -28,8 +28,8 @@ _MOST_SHOWN = 3
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """How far a file came; ``problem`` is empty where it came all the way. ``findings`` are what could not be
-    read of it."""
+    """Stage that a file reached; ``problem`` is empty where it is the last. ``findings`` are what could not
+    be read of it."""
 
     name: str
     step: str
@@ -44,7 +44,7 @@ class Result:
 
 
 def served(folder: Path, name: str, content: bytes) -> Result:
-    """What becomes of a file: of a drive with CiA 402, or of a device that is no drive."""
+    """Result of serving a file: of a drive with CiA 402, or of a device that is no drive."""
     folder.mkdir(parents=True)
     file = folder / "device"
     file.write_bytes(content)
@@ -87,8 +87,8 @@ def _not_served(bench: DerivedBench) -> Iterator[str]:
 
 
 def simulated(description: Description) -> list[str]:
-    """How the simulated node differs from its description: it boots, is started, and is asked for every
-    object that can be read."""
+    """Differences between the simulated node and its description: it boots, is started, and is asked for
+    every object that can be read."""
     node = GenericNode(NODE_ID, plan_of_description(description, NODE_ID))
     node.start(0.0)
     booted = [frame.can_id for frame in node.take_frames()]

@@ -137,6 +137,6 @@ class JudgedPlant:
 
     @property
     def endings(self) -> list[tuple[str, str]]:
-        """How stops have ended by the audit log."""
+        """Endings of stops by the audit log."""
         ended = [entry for entry in self.entries if entry.action == "stop_ended"]
         return [(entry.ending.code, entry.ending.message) for entry in ended]

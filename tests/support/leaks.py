@@ -1,4 +1,4 @@
-"""What a test leaves behind fails it: tasks, threads, child processes and sockets.
+"""Leftovers that fail a test: tasks, threads, child processes and sockets.
 
 Two fixtures that every test has, one of them for its module: what the module's own fixtures hold is there
 before each of its tests, and has to be gone after the last.
@@ -21,7 +21,7 @@ from typing import Any, Final
 import pytest
 
 PATIENCE_S: Final = 3.0
-"""What was told to end may take a moment."""
+"""Time in seconds within which that ends which was told to."""
 _WORKERS: Final = ("thread asyncio_", "thread password_")
 """Threads that a loop or a server starts when it first needs them, and ends with itself: that of a module may
 have them after one of its tests."""
@@ -34,7 +34,8 @@ STARTERS: Final[set[int]] = set()
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What this process holds now. Sockets are told apart by their inode, and have their file descriptor."""
+    """Resources that this process holds now. Sockets are told apart by their inode, and have their file
+    descriptor."""
 
     threads: frozenset[threading.Thread]
     children: frozenset[int]
@@ -47,7 +48,7 @@ class Held:
         return cls(frozenset(alive), frozenset(_children()), _sockets())
 
     def since(self, before: Held) -> list[str]:
-        """What has come, in words."""
+        """Resources that are new since ``before``, in words."""
         threads = [f"thread {one.name}" for one in self.threads - before.threads]
         children = [f"process {_command(pid)}" for pid in self.children - before.children]
         opened = self.sockets.keys() - before.sockets.keys()

@@ -1,4 +1,4 @@
-"""What each deed of the leg's table has to bring about: that the table says what is done."""
+"""Effects that each deed of the leg's table has to have: that the table says what is done."""
 
 from __future__ import annotations
 

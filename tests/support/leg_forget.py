@@ -1,4 +1,5 @@
-"""What an explored state need not remember: two that differ in nothing else have the same future.
+"""Parts of an explored state that need not be remembered: two states that differ in nothing else have the
+same future.
 
 Which parts those are depends on the family's words and on the events of the profile. ``test_leg_space`` shows
 that nothing comes of them.

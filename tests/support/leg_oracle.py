@@ -1,4 +1,4 @@
-"""What must hold of the controller leg of one drive after each step, whatever has happened."""
+"""Oracle of the controller leg of one drive: what must hold after each step, whatever has happened."""
 
 from __future__ import annotations
 
@@ -143,7 +143,8 @@ class Oracle(Model):
         return tuple(number >> 16 * place & 0xFFFF for place in range(size)) == sent[1 : 1 + size]
 
     def check_kernel(self, until: float | None, then: tuple[int, ...], *, silent: bool) -> None:
-        """What enables is on the bus until ``until``, whoever is alive then, and then ``then``."""
+        """Check that enabling frames are on the bus until ``until``, whoever is alive then, and then
+        ``then``."""
         rules = self.rules
         ends = [self.lease_until] if self.lease_until is not None else []
         if (

@@ -54,7 +54,7 @@ class OutputSpace:
         )
         self.channel.on_node(NodeState.OPERATIONAL, NOW)
         self.safe = tuple(0 if value == "hold" else int(value) for value in on_expiry)
-        """What they get after somebody's Stop."""
+        """Values of the outputs after somebody's Stop."""
         self.expiry = on_expiry
         stop: dict[str, Value] = dict(zip(_NAMES, self.safe, strict=True))
         active: dict[str, Value] = dict.fromkeys(_NAMES, ON)
@@ -122,7 +122,7 @@ class OutputSpace:
     # the walk
 
     def explore(self) -> int:
-        """How many states there are; fails with the shortest sequence that breaks a rule."""
+        """Number of states; fails with the shortest sequence that breaks a rule."""
         first = self._state(False)
         states, ways = [first], {first: ""}
         for state in states:

@@ -384,7 +384,7 @@ _SETTINGS: Final[dict[str, Profile]] = {
     },
     "nobody": {"names": _BASE | _NOBODY, "control": "none"},
 }
-"""What else the site file can say, in NORD's words."""
+"""Profiles of further settings of the site file, in NORD's words."""
 ROWS: Final[dict[str, dict[str, Profile]]] = {
     **{words.mapping: family_profiles(words) for words in FAMILIES},
     "nord/sk-tu4-cao, other settings": _SETTINGS,

@@ -1,4 +1,4 @@
-"""What is recorded of a leg while it is explored."""
+"""Record of a leg while it is explored."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What clients may ask of the leg while it is explored."""
+"""Requests of clients to the leg while it is explored."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.support.leg_time import NOW
 from tests.support.leg_words import LegWords
 
 _LATE_S: Final = 1.0
-"""What has waited for so long is no telegram any more."""
+"""Waiting time in seconds after which a telegram does not count any more."""
 
 
 class _One(Identity):

@@ -1,4 +1,4 @@
-"""What the controller leg has to do: the rules that ``leg_oracle`` holds it to.
+"""Rules of the controller leg, to which ``leg_oracle`` holds it.
 
 Nothing here is taken from ``bridge.command``, and nothing is known of how the leg does it: a rule sees what
 was asked and by whom, how that was answered, what the drive says, and what is on the bus. The rules of
@@ -15,7 +15,7 @@ from tests.support.leg_seen import Memory, Missing
 from tests.support.leg_words import STRENGTH
 
 START_S: Final = 3.0
-"""How long a start may take."""
+"""Longest duration of a start in seconds."""
 OLD_S: Final = 0.2
 """So long after a stop a drive may still say what it was before."""
 NEWS_S: Final = 1.0
@@ -26,7 +26,7 @@ GONE_S: Final = 10.0
 """Without a time-out: an owner that gives no sign for so long is gone."""
 
 RESTING: Final = frozenset(("ready", "inhibited", "fault", "switched on", "not ready"))
-"""What a drive says that is not enabled and does not brake."""
+"""States of a drive that is not enabled and does not brake."""
 LED: Final = frozenset(("ready", "switched on", "enabled"))
 """From here the enabling word is the next one."""
 FAULTED: Final = frozenset(("fault", "fault reaction"))
@@ -34,7 +34,7 @@ MOVING: Final = frozenset(("enabled", "braking", "fault reaction"))
 
 
 class Model(Memory):
-    """What is to happen, one step at a time."""
+    """Model of the leg, one step at a time."""
 
     __slots__ = ()
 
@@ -128,7 +128,7 @@ class Model(Memory):
     # what the owner and others do
 
     def stop(self, kind: str = "") -> None:
-        """Whatever was enabled has to be enabled anew."""
+        """Note a stop: whatever was enabled has to be enabled anew."""
         self.missing = min(self.missing, Missing.STOP_WORD)
         self.is_held = self.has_begun = False
         self._forget()
@@ -266,8 +266,8 @@ class Model(Memory):
             self.stop()
 
     def _no_news(self) -> None:
-        """What the drive has said last holds; of one that makes no sense nothing does,
-        unless it said nothing at all when the start began."""
+        """Keep what the drive has said last; of one that makes no sense nothing holds, unless it said nothing
+        at all when the start began."""
         self.news_until = None
         if self.says != "unknown" or self.news_from is None:
             self.missing = Missing.NOTHING

@@ -1,4 +1,4 @@
-"""What the rules of the oracle (``leg_oracle``) remember of one drive."""
+"""Memory of the oracle's rules (``leg_oracle``) on one drive."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.support.leg_words import LegWords
 
 
 class Missing(IntEnum):
-    """What the owner still has to do before an enabling word may leave the bridge."""
+    """Steps that the owner still has to take before an enabling word may leave the bridge."""
 
     ACKNOWLEDGE = 0
     STOP_WORD = 1
@@ -91,7 +91,7 @@ class Seen(NamedTuple):
     is_heard: bool = True
     may_enable: bool = True
     sends: bool = False
-    """What is on the bus enables the drive."""
+    """True while the frames on the bus enable the drive."""
     says: str = "ready"
     followed: bool = True
     """It has said "enabled" since the last enabling word, or nothing from before counts any more."""
@@ -102,7 +102,7 @@ class Seen(NamedTuple):
     is_up: bool = False
     """The bit that hands it over, as it should be."""
     was_up: bool = False
-    """What it was on the bus."""
+    """The same bit as it was on the bus."""
     is_taken: bool = False
     was_commanded: bool = False
     at: tuple[int, ...] = ()
@@ -118,8 +118,7 @@ _others = attrgetter(*Seen._fields[1:])
 
 
 class Memory:
-    """What the rules remember, while one step is judged; the attributes are those of ``Seen`` and
-    ``Times``."""
+    """Memory of the rules while one step is judged; the attributes are those of ``Seen`` and ``Times``."""
 
     __slots__ = ("asks", "now", "rules", *Times._fields, *Seen._fields[1:])
 

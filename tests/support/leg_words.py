@@ -15,7 +15,7 @@ from bridge.image import Value
 
 @dataclass(frozen=True, slots=True)
 class Bits:
-    """What some bits of a word have to be."""
+    """Bits of a word with the values that they have to have."""
 
     mask: int
     value: int
@@ -59,7 +59,7 @@ class LegWords:
     place: tuple[int, ...] = ()
 
     def stops(self, kind: str) -> tuple[Bits, ...]:
-        """How a stop of this kind may look: none that is in force already is lifted for a weaker one."""
+        """Words of a stop of this kind: none that is in force already is lifted for a weaker one."""
         return tuple(getattr(self, name) for name in STRENGTH[STRENGTH.index(kind) :])
 
 

@@ -38,7 +38,7 @@ class Load:
     """When each reaction to a silent controller was on the bus, after its last telegram (s)."""
 
     def sync_lateness_s(self) -> list[float]:
-        """How much longer than its period each pause between two SYNCs was."""
+        """Time by which each pause between two SYNCs was longer than its period."""
         pairs = zip(self.syncs, self.syncs[1:], strict=False)
         return [later - earlier - SYNC_PERIOD_S for earlier, later in pairs]
 

@@ -95,7 +95,7 @@ class Rig:
 
     @property
     def sent(self) -> Sequence[int]:
-        """What the bus gets for fu1."""
+        """Process data that the bus gets for fu1."""
         return self.fu1.channel.output.words
 
 

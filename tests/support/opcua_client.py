@@ -1,4 +1,4 @@
-"""What tests ask of the OPC UA server, down to the status code of each item."""
+"""Requests of tests to the OPC UA server, down to the status code of each item."""
 
 from __future__ import annotations
 

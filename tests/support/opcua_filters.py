@@ -24,7 +24,7 @@ def chosen(
 
 
 def element(operator: Op, *operands: object) -> ua.ContentFilterElement:
-    """What is no operand is meant as a literal."""
+    """Element of a filter. What is no operand is meant as a literal."""
     kinds = ua.FilterOperand | ua.ExtensionObject
     made = [one if isinstance(one, kinds) else literal(one) for one in operands]
     return ua.ContentFilterElement(operator, made)

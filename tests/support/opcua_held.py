@@ -68,7 +68,7 @@ class HeldTree:
             self._object(tree, ua.NodeId(Ids.ObjectsFolder), Ids.Organizes)
 
     def seen(self, where: ua.NodeId, space: AddressSpace | None = None) -> Seen:
-        """What clients see of a node here or in another ``space``, without times and values of points, and
+        """Node as clients see it here or in another ``space``, without times and values of points, and
         without what asyncua leaves empty."""
         space = space or self.space
         node = space[where]

@@ -39,7 +39,7 @@ _HONEST_DOUBLE: Final = 50.0
 
 
 class _Fill:
-    """What goes into strings and Doubles: ``hostile`` at the place ``at`` of those that are of its type."""
+    """Content of strings and Doubles: ``hostile`` at the place ``at`` of those that are of its type."""
 
     def __init__(self, at: int, hostile: str | float) -> None:
         self._at = at

@@ -109,7 +109,7 @@ class Book:
 
 
 def _aside(text: str) -> tuple[str, str]:
-    """What stands before the brackets at the end of a text, and in them."""
+    """Text before the brackets at the end of ``text``, and the one in them."""
     if text.endswith(")"):
         opened = 0
         for at in range(len(text) - 1, 0, -1):

@@ -28,7 +28,7 @@ def free_port() -> int:
 
 
 class Child(Protocol):
-    """What is used of ``subprocess.Popen``."""
+    """Part of ``subprocess.Popen`` that is used."""
 
     @property
     def pid(self) -> int: ...
@@ -77,7 +77,7 @@ _start: Start = start_cold
 
 @contextmanager
 def started_by(start: Start) -> Iterator[None]:
-    """How processes are started meanwhile."""
+    """Replace the function that starts processes meanwhile."""
     global _start
     before, _start = _start, start
     try:

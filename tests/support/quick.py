@@ -161,7 +161,7 @@ class Quick:
                 return
 
     def round(self) -> None:
-        """What the master does in one round, until the bus is quiet."""
+        """One round of the master, until the bus is quiet."""
         for node in self.nodes.values():
             if node.present:
                 node.on_time(self.now)
@@ -185,7 +185,7 @@ class Quick:
         return bool(frames)
 
     def deliver(self) -> bool:
-        """What the nodes have to say goes to the master."""
+        """Hand the nodes' frames to the master."""
         frames: list[Frame] = []
         for node in self.nodes.values():
             frames += node.outbox

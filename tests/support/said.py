@@ -1,4 +1,4 @@
-"""What modules of the bridge may say: the texts in their source, with samples for what is filled in.
+"""Texts of the bridge's modules, by their source, with samples for what is filled in.
 
 A text is a string with a space, or whatever is given to a call that says something. Names that are assigned
 texts within a function, and functions that return texts, are followed: what they fill in is part of others.
@@ -206,7 +206,7 @@ def _name(node: ast.AST) -> str:
 
 
 def _sample(node: ast.AST) -> str:
-    """What stands for a value that is not known here."""
+    """Sample for a value that is not known here."""
     if isinstance(node, ast.Call):
         if _name(node.func) == "str" and node.args:
             return _sample(node.args[0])

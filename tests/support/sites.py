@@ -16,7 +16,7 @@ from bridge.mapping import load_family
 
 FAMILY = "nord/sk-tu4-cao"
 SCALED = "parameters = { P105 = 50.0, P112 = 10.0 }"
-"""What setpoints and currents are scaled with: P105 in Hz, P112 in A."""
+"""Scales of setpoints and currents: P105 in Hz, P112 in A."""
 
 ACCEPTED = 'accepts = { runs_on = "nothing moves in a test" }'
 """Of a drive whose simulation does not watch the bridge: as it leaves the works."""

@@ -64,7 +64,7 @@ class Sniffer:
 
     @property
     def frames(self) -> list[Seen]:
-        """What has been on the bus until now, also on a machine on which the thread has to wait for a CPU."""
+        """Frames on the bus until now, also on a machine on which the thread has to wait for a CPU."""
         self._take_what_waits()
         return list(self._frames)
 

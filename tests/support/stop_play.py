@@ -21,7 +21,7 @@ END_S = 48.0
 
 
 class Deed(Enum):
-    """What else happens."""
+    """Further events beside words and reports."""
 
     MUTE = auto()
     HEARD_AGAIN = auto()

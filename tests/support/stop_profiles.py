@@ -1,4 +1,4 @@
-"""What may happen to the judge of a drive's stops together, so that all of it can be explored."""
+"""Profiles of events for the judge of a drive's stops, so that all of them can be explored together."""
 
 from __future__ import annotations
 

@@ -15,9 +15,9 @@ OFF, RAMP, SILENCE = 1, 2, 2
 LONGEST = max(OFF + RAMP, SILENCE)
 """Words may alternate: each has its bound, but all together no more."""
 LATE = 2
-"""How much later a deaf drive may be named, where the judge is asked only when it wants to be."""
+"""Ticks by which a deaf drive may be named later, where the judge is asked only when it wants to be."""
 FORGOTTEN = -(LONGEST + LATE)
-"""What was before is as long ago as anything."""
+"""Time of what was before: as long ago as anything."""
 BOUNDS = {"OFF": OFF, "RAMP": RAMP, "SILENT": SILENCE}
 
 
@@ -177,7 +177,7 @@ def _check_followed(memory: Memory, told: Told) -> None:
 
 
 def check_state(memory: Memory, outcome: str, *, follows: bool, is_judged: bool) -> None:
-    """What is published fits what is remembered."""
+    """Check that what is published fits what is remembered."""
     assert outcome == memory.outcome
     assert follows != memory.has_ignored
     assert is_judged == bool(memory.words and memory.is_there)

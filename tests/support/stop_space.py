@@ -35,7 +35,7 @@ _KEPT: Final = {
     "follows_since": -RAMP,
     "look_at": 0,
 }
-"""What is longer ago is as long ago as anything."""
+"""Oldest time of each attribute that makes a difference: longer ago is as long ago as anything."""
 _PAUSE: Final = 1
 
 

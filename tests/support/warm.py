@@ -26,7 +26,7 @@ _MODULES: Final = ("bridge", "asyncua", "canopen", "pymodbus.client", "zenoh")
 
 
 class WarmProcess:
-    """What ``subprocess.Popen`` is for others. ``ended`` is where its exit status is told."""
+    """Stand-in for ``subprocess.Popen``. ``ended`` is where its exit status is told."""
 
     def __init__(self, command: Sequence[str], pid: int, ended: int) -> None:
         self.pid = pid
@@ -85,7 +85,7 @@ class _Interpreter:
 
 @contextmanager
 def warm_interpreter() -> Iterator[None]:
-    """Whatever ``process`` starts meanwhile comes from one interpreter, where it is Python."""
+    """Let one interpreter start every Python process of ``process`` meanwhile."""
     ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     script = str(REPOSITORY / "tests" / "support" / "warm_interpreter.py")
     command = [sys.executable, script, str(its.fileno()), *_MODULES]

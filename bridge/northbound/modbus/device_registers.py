@@ -83,7 +83,7 @@ class DeviceMap:
         self.parameters = value_rows(Table.HOLDING_REGISTER, shown, own, allows, PARAMETERS)
 
     def end(self, table: Table) -> int:
-        """Where its inputs or outputs end."""
+        """First address behind its inputs or outputs."""
         rows = self.inputs if table is Table.INPUT_REGISTER else self.outputs
         return rows[-1].address + rows[-1].size if rows else VALUES
 

@@ -111,8 +111,8 @@ class DeviceUnit(Unit):
         ]
 
     def _flags(self, start: int, count: int) -> Sequence[bool]:
-        """Which values are not good: those of the input registers and then the parameters, or the discrete
-        inputs."""
+        """Flags of the values that are not good: those of the input registers and then the parameters, or the
+        discrete inputs."""
         first, indices = INPUT_FLAGS, [index for _, index in self._bits[Table.DISCRETE_INPUT]]
         if start < INPUT_FLAGS:
             of_rows = [index for _, index in self._rows[Table.INPUT_REGISTER]]

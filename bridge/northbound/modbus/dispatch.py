@@ -149,7 +149,7 @@ class Dispatcher:
         _log.warning("Modbus: %s is refused: %s", caller.address, why, extra=about(source, unit_id))
 
     def _why(self, unit_id: int) -> str:
-        """Why nothing can be written to a unit id; empty for that of a drive or device."""
+        """Reason why nothing can be written to a unit id; empty for that of a drive or device."""
         if unit_id in self._names:
             return ""
         if unit_id in BRIDGE_UNITS:

@@ -36,7 +36,7 @@ class Function(IntEnum):
 
 
 class ExceptionCode(IntEnum):
-    """Why a request was refused, §7."""
+    """Exception codes of a refused request, §7."""
 
     ILLEGAL_FUNCTION = 0x01
     ILLEGAL_ADDRESS = 0x02

@@ -101,7 +101,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Allows:
-    """What Modbus clients may write of a drive."""
+    """Rights of Modbus clients to write to a drive."""
 
     write: Callable[[Point], bool] = lambda point: point.writable
     may_command: bool = True
@@ -176,7 +176,7 @@ class DriveMap:
         )
 
     def end(self, table: Table, start: int) -> int:
-        """Where the registers end among which ``start`` is."""
+        """First address behind the block of registers that contains ``start``."""
         if table is not Table.INPUT_REGISTER and start >= PARAMETERS:
             return PARAMETERS + 2 * len(self.parameters)
         return VALUES + 2 * len(self.inputs if table is Table.INPUT_REGISTER else self.setpoints)

@@ -52,7 +52,7 @@ class ModbusServer:
         )
         self._owner_names: frozenset[str] = frozenset()
         self.rounds = Rounds(lambda go_on: asyncio.get_running_loop().call_soon(go_on))
-        """Whose requests are handled next."""
+        """Turns in which requests are handled."""
         self._writers: dict[str, set[Session]] = {}
         """Those of each address that have written."""
         self._server: asyncio.Server | None = None
@@ -189,8 +189,9 @@ class ModbusServer:
 
 
 def _limits(connections: int) -> Limits:
-    """Whoever has most makes room, so that a crowd pushes out itself: of it who has said nothing yet, else
-    who has been idle longest. Clients connect once and stay, so idle ones have no time that is up."""
+    """Limits by which the address with most connections makes room, so that a crowd pushes out itself: of its
+    connections one that has said nothing yet, else the one idle longest. Clients connect once and stay, so
+    idle ones have no time that is up."""
     return Limits(connections, connections, connections, slow_s=inf, all_yield=True)
 
 

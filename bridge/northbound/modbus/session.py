@@ -24,7 +24,7 @@ from bridge.northbound.modbus.rounds import Rounds
 from bridge.northbound.pulse import Pulse
 
 STALL_LIMIT_S: Final = 5.0
-"""How long a client may leave its answers unread; then it is disconnected."""
+"""Time in seconds for which a client may leave its answers unread; then it is disconnected."""
 
 READ_MOST: Final = 16 * 1024
 """Bytes that are read at once, and that may wait here before reading stops: 64 requests of the longest
@@ -201,7 +201,7 @@ class Session(asyncio.BufferedProtocol):
 
     @property
     def source(self) -> str:
-        """Whom limits count it for, and lines of the log."""
+        """Name of the client for limits and lines of the log."""
         return source_of(self.identity.user) if self.identity else ""
 
     @property

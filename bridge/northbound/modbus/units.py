@@ -1,4 +1,4 @@
-"""What has a unit id, and its map."""
+"""Unit ids and their register maps."""
 
 from __future__ import annotations
 
@@ -41,9 +41,8 @@ def device_maps(plant: Plant) -> tuple[DeviceMap, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """What has a unit id: the drives, the nodes that are no drives, and the bridge itself with its buses
-    and its nodes, but those that the
-    site file leaves out of service. All are in the order of the site file."""
+    """Owners of unit ids: the drives, the nodes that are no drives, and the bridge itself with its buses and
+    its nodes, but those that the site file leaves out of service. All are in the order of the site file."""
 
     site: str
     buses: tuple[str, ...]

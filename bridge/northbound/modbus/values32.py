@@ -37,7 +37,7 @@ class Values32:
         return [quality is not Quality.GOOD for quality in self._image.qualities(self.indices)]
 
     def written(self, start: int, words: Sequence[int]) -> list[tuple[Row, Value]]:
-        """What is written to each, by its type."""
+        """Value written to each row, by its type."""
         first = (start - self._first) // 2
         pairs = zip(words[::2], words[1::2], strict=True)
         rows = self.rows[first : first + len(words) // 2]

@@ -1,4 +1,4 @@
-"""What each zenoh link may do, as zenoh's ``access_control``. Sans-IO.
+"""Access rights of each zenoh link, as zenoh's ``access_control``. Sans-IO.
 
 Only the bridge publishes, answers and holds tokens below ``<prefix>/<site>/``, and it forwards nothing
 between its links. So nobody can pose as the bridge, or block it by waiting for another client.

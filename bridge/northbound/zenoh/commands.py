@@ -93,7 +93,7 @@ _Model = TypeVar("_Model")
 
 
 def identity_of(attachment: bytes | None) -> Identity:
-    """Who asks: ``{"controller": "<name>", "session": "<name>"}`` in the attachment, each of which may be
+    """Identity in an attachment: ``{"controller": "<name>", "session": "<name>"}``, each of which may be
     missing. Raises BadCommand.
 
     Nobody checks the controller's name: it is for sites without users.
@@ -119,7 +119,7 @@ def session_of(attachment: bytes | None) -> str:
 
 
 class Commands:
-    """What can be commanded on a site, derived from its points."""
+    """Commands of a site, derived from its points."""
 
     def __init__(self, points: Iterable[Point]) -> None:
         self._points = {point.name: point for point in points}

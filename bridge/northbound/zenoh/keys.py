@@ -78,7 +78,7 @@ class KeySpace:
         self.own_commands = f"{self.top}/@/controller/*/*/*/command/**"
         owners = [_owner(point.name) for point in points]
         self.owners = tuple(dict.fromkeys(owners))
-        """What points belong to: each drive, node and bus, and the bridge."""
+        """Owners of points: each drive, node and bus, and the bridge."""
         self._places = {owner: place for place, owner in enumerate(self.owners)}
         self.owner_of: tuple[int, ...] = tuple(self._places[owner] for owner in owners)
         """The place of each point's in ``owners``."""

@@ -1,4 +1,4 @@
-"""Which session of a controller asks, and that it has ended. zenoh itself does not tell. Sans-IO."""
+"""Sessions of controllers: which one asks, and that it has ended. zenoh itself does not tell. Sans-IO."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Sessions:
         return identity
 
     def ended(self, source: str) -> list[tuple[Identity, bool]]:
-        """Whose session this was, and whether the same user has been heard over others."""
+        """Identities of this session, each with whether the same user has been heard over others."""
         name = f"session {source}"
         gone = [self._seen.pop(key) for key in list(self._seen) if key[1] == name]
         return [(one, any(one.user == user for user, _ in self._seen)) for one in gone]

@@ -1,4 +1,4 @@
-"""Who a zenoh client is: with users, the user that its link has authenticated as.
+"""Identity of a zenoh client: with users, the user that its link has authenticated as.
 
 zenoh does not tell which link a query came by, but it can restrict the keys that a link may use. So each user
 has command keys of its own, ``…/@/controller/<user>/…``, which tell the bridge who asks.
@@ -42,8 +42,8 @@ class Users:
     sole: str = ""
 
     def owner(self, tail: str) -> tuple[str, str]:
-        """Whose command key ``tail`` (without prefix and site) is, and which plain key it stands for. A plain
-        key belongs to nobody, ``""``, or to the sole user."""
+        """User whose command key ``tail`` (without prefix and site) is, and the plain key it stands for. A
+        plain key belongs to nobody, ``""``, or to the sole user."""
         if not self.are_proved or not tail.startswith(_OWN_KEYS):
             return self.sole, tail
         name, _, rest = tail.removeprefix(_OWN_KEYS).partition("/")

@@ -20,7 +20,7 @@ MAPPINGS: Final = (
 )
 _OBJECT: Final = re.compile(r"(?:drive/)?(6[0-9A-Fa-f]{3})(?::([0-9A-Fa-f]{2}))?")
 _COMMANDS: Final = (0x6040, 0x6042, 0x607A, 0x60FF)
-"""What the master commands is not a parameter."""
+"""Objects by which the master commands, which are no parameters."""
 
 
 def cia402(node_id: int, parameters: Mapping[str, float]) -> Cia402Drive:

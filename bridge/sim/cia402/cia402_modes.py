@@ -1,4 +1,4 @@
-"""How each mode of operation uses set-points and its bits in the control word (CiA 402).
+"""Modes of operation: use of set-points and of the bits in the control word (CiA 402).
 
 A mode runs while the drive is enabled and not being stopped, and gives bits 10 … 13 of the status word.
 ``leave`` ends its action.
@@ -52,7 +52,7 @@ class OperationMode(Protocol):
 
 
 class Parts:
-    """What all modes share."""
+    """Parts that all modes share."""
 
     def __init__(self, motor: Motor, settings: Callable[[], Cia402Settings], targets: Targets) -> None:
         self.motor = motor

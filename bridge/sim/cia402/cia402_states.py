@@ -38,7 +38,7 @@ class State(IntEnum):
 
 
 class Command(Enum):
-    """What bits 0 … 3 of the control word ask for."""
+    """Commands in bits 0 … 3 of the control word."""
 
     SHUTDOWN = "shutdown"
     SWITCH_ON = "switch on, disable operation"
@@ -48,7 +48,7 @@ class Command(Enum):
 
 
 class Ramp(Enum):
-    """How the motor comes to a standstill."""
+    """Ways in which the motor comes to a standstill."""
 
     COAST = "coast"
     SLOW_DOWN = "slow down"
@@ -114,7 +114,7 @@ class Automaton:
 
     @property
     def ramp(self) -> Ramp | None:
-        """How the motor is being stopped; None while it follows its mode."""
+        """Ramp on which the motor is being stopped; None while it follows its mode."""
         options = self._options()
         match self.state:
             case State.ENABLED:

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class AbortCode(IntEnum):
-    """Why an SDO transfer was aborted: bytes 4…7 of the abort."""
+    """Abort codes of SDO transfers: bytes 4…7 of the abort."""
 
     TOGGLE_BIT = 0x0503_0000
     COMMAND_UNKNOWN = 0x0504_0001

@@ -27,7 +27,7 @@ _OUTBOX_MAX: Final = 256
 
 
 class Application(ABC):
-    """How the device reacts to its communication."""
+    """Reactions of the device to its communication."""
 
     @abstractmethod
     def nmt_changed(self, state: NmtState) -> None:
@@ -86,7 +86,7 @@ class CanopenSlave:
 
     @property
     def _plan(self) -> SlavePlan:
-        """What the present settings make of the slave."""
+        """Plan of the slave by its present settings."""
         if self._present_plan is None:
             own = (0, _ERROR_CONTROL + self.node_id)
             parts = (self._servers, self._sdo_channels, self._tpdos, self._objects_of)
@@ -100,7 +100,7 @@ class CanopenSlave:
 
     @property
     def dictionary(self) -> Dictionary:
-        """What its PDOs can map."""
+        """Objects that its PDOs can map."""
         return self._dictionary
 
     @property
@@ -205,7 +205,7 @@ class CanopenSlave:
         return self._store.current.sdo
 
     def _objects_of(self, number: int) -> Dictionary:
-        """What PDO ``number`` (from 0), either direction, can map."""
+        """Objects that PDO ``number`` (from 0), either direction, can map."""
         del number
         return self._dictionary
 

@@ -1,4 +1,4 @@
-"""What all simulated drives have in common: frames, time and power."""
+"""Base of all simulated drives: frames, time and power."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class SimulatedDevice(Application):
         self._is_steady = False
         """Nothing has changed since time was last passed: a frame of the same moment need not do it again."""
         self._slave_hears: frozenset[int] | None = None
-        """What ``heard`` was made of."""
+        """Identifiers of the slave for which ``heard`` was made."""
         self._habits: HabitPlayer | None = None
 
     # To be defined by the device.
@@ -112,14 +112,14 @@ class SimulatedDevice(Application):
         return earliest(self._due, held, *self._deadlines())
 
     def take_frames(self) -> list[Frame]:
-        """What the node has to send, oldest first."""
+        """Frames that the node has to send, oldest first."""
         if self._habits is None:
             return self._sent()
         self._pass_through_habits()
         return self._habits.due(self._now)
 
     def _sent(self) -> list[Frame]:
-        """What the device itself has to send, oldest first."""
+        """Frames that the device itself has to send, oldest first."""
         return self.slave.take_frames()
 
     def _hear(self, frame: Frame) -> None:

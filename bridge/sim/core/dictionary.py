@@ -172,7 +172,7 @@ class ServedObject(Protocol):
 
 
 class ServedObjects(Protocol):
-    """What an SDO server asks for."""
+    """Objects as an SDO server needs them."""
 
     def find(self, index: int, sub: int) -> ServedObject: ...
 

@@ -26,7 +26,7 @@ class EmcyProducer:
 
     @property
     def history_size(self) -> int:
-        """How many errors 1003h remembers."""
+        """Number of errors that 1003h remembers."""
         return self._rules.error_entries
 
     @property

@@ -28,8 +28,8 @@ _DEEDS: Final = ("data", "size", "abort", "delay_ms", "silent")
 
 
 class Rule(Table):
-    """What becomes of one kind of frame. Rules are applied in the order of the file, each to what the one
-    before has left."""
+    """Treatment of one kind of frame. Rules are applied in the order of the file, each to what the one before
+    has left."""
 
     frames: FrameKind = Field(description="the frames it is about")
     like: RegularExpression = Field(

@@ -31,7 +31,7 @@ class HabitPlayer:
         """It is under way: its segments look like commands."""
 
     def on_frame(self, frame: Frame, now: float) -> Frame | None:
-        """What the node gets of a frame from the bus; None where it gets nothing."""
+        """Frame from the bus as the node gets it; None where it gets nothing."""
         if frame.can_id != _REQUEST + self._node_id or not frame.data:
             return frame
         self._follow(frame.data)
@@ -67,7 +67,7 @@ class HabitPlayer:
         return told
 
     def due(self, now: float) -> list[Frame]:
-        """What goes out by ``now``, in order."""
+        """Frames to be sent by ``now``, in order."""
         frames = [frame for at, frame in self._held if at <= now]
         self._held = [(at, frame) for at, frame in self._held if at > now]
         return frames
@@ -107,7 +107,7 @@ class HabitPlayer:
         return "tpdo" if frame.can_id in _TPDOS else None
 
     def _follow(self, data: bytes) -> None:
-        """Which object the transfer is about: an abort has to name it."""
+        """Remember the object that the transfer is about: an abort has to name it."""
         if data[0] == _ABORT:
             self._receives_block = False
         if self._receives_block or len(data) < 4:

@@ -113,7 +113,7 @@ class ActiveTpdo:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where an RPDO has the value of an object: bytes ``start`` … ``end``. The object may be missing."""
+    """Place of an object's value in an RPDO: bytes ``start`` … ``end``. The object may be missing."""
 
     start: int
     end: int

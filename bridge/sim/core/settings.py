@@ -17,7 +17,7 @@ TPDO_BASES: Final = (0x180, 0x280, 0x380, 0x480)
 
 @dataclass(frozen=True, slots=True)
 class SlaveRules:
-    """How devices differ where CiA 301 leaves a choice, or where they deviate from it."""
+    """Choices that CiA 301 leaves to devices, and deviations from it."""
 
     wrong_state: AbortCode = AbortCode.WRONG_STATE
     """Answer to a write that is allowed in Pre-Operational only."""

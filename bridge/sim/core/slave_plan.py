@@ -1,4 +1,4 @@
-"""What a slave's settings make of it: whom it hears, and where its PDOs' objects are.
+"""Plan of a slave by its settings: the identifiers that it hears, and the objects in its PDOs.
 
 Settings change by SDO and NMT only, so this is made when one of these has come, and not for every frame.
 """

@@ -1,4 +1,4 @@
-"""What comes again and again: something that must not stay away, and something that is sent in a cycle."""
+"""Cyclic events: one that must not stay away, and one that is sent."""
 
 from __future__ import annotations
 

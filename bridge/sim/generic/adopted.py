@@ -50,7 +50,7 @@ def _variable(plan: NumberPlan | BytesPlan, value: int | None) -> Entry:
 
 
 def _identity(rule: IdentityRule) -> Iterable[tuple[At, int, int]]:
-    """What 1000h and 1018h are asked to hold, in which bits."""
+    """Bits of 1000h and 1018h that an identity rule requires: object, value and mask."""
     for at, want, mask in (
         ((0x1000, 0), rule.device_type, rule.device_type_mask),
         ((0x1018, 1), rule.vendor_id, None),

@@ -42,9 +42,9 @@ _COPIES: Final = (
     Copy((0x607A, 0), (0x6064, 0), stays=True),
 )
 _PROFILE: Final = "cia402/profile-position"
-"""Whose state machine a drive of the profile has; of all of them it says the most."""
+"""Mapping whose state machine a drive of the profile has; of all of them it says the most."""
 _LEAST: Final = frozenset({(0x1000, 0), (0x1001, 0), (0x1018, 0), (0x1018, 1)})
-"""What CiA 301 asks of every node, whether its file has it or not."""
+"""Objects that CiA 301 requires of every node, whether its file has them or not."""
 
 
 def plan_of_description(description: Description, node_id: int) -> NodePlan:

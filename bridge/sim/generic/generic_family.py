@@ -65,11 +65,11 @@ _PDO_ENTRIES: Final = 8
 _DIGITAL_OUTPUTS: Final = range(0x6200, 0x6400)
 """CiA 401: a bit of error mode and error value for each of them."""
 _EVENT_MS: Final = 500
-"""How often the TPDOs of a device come at least whose mapping says nothing of PDOs."""
+"""Longest period in ms of the TPDOs of a device whose mapping says nothing of PDOs."""
 
 
 def identity_of(rule: IdentityRule, name: str, *, device_type: int = 0) -> DeviceIdentity:
-    """What a node says of itself to be taken for one of this family."""
+    """Identity by which a node is taken for one of this family."""
     return DeviceIdentity(
         device_type=rule.device_type if rule.device_type is not None else device_type,
         vendor_id=rule.vendor_id or 0,
@@ -156,7 +156,7 @@ def _raw(limit: float | None, parameter: Parameter) -> int | None:
 
 
 def _further(family: Family) -> Iterator[tuple[At, DataType, int]]:
-    """What the bridge asks for or writes beside parameters."""
+    """Objects that the bridge reads or writes beside parameters."""
     for poll in family.poll:
         yield (poll.object.index, poll.object.sub), _POLLED[poll.data_type], 0
     for own in family.own_supervision:
@@ -263,7 +263,8 @@ def _axis(family: Family, slot: Slot) -> AxisPlan:
 
 
 def _first_word(family: Family, slot: Slot, value: ProcessValue) -> str:
-    """Where a code tells the words, by the defaults of the mapping file; empty where none has it."""
+    """Name of the first word of a value whose place a code tells, by the defaults of the mapping file; empty
+    where none has it."""
     if value.word_names:
         return value.word_names[0]
     runs = family.meanings_of(slot, value.group)

@@ -26,7 +26,7 @@ _TICKS_PER_BIT: Final = 5
 _RAMP_TICKS: Final = 100
 """An analogue input goes up as long, and down again."""
 _APART_TICKS: Final = 30
-"""How far one of several is ahead of the one before it."""
+"""Ticks by which one of several is ahead of the one before it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ Motion = Walk | Ramp | Turn
 
 
 def motions_of(plan: NodePlan) -> tuple[Motion, ...]:
-    """How the inputs of this node move; empty for a drive, whose values are its own."""
+    """Motions of the inputs of this node; empty for a drive, whose values are its own."""
     if plan.axes:
         return ()
     numbers = {

@@ -33,7 +33,7 @@ _CONSUMER: Final = (0x1016, 1)
 _LONGEST: Final = 1 << 16
 _PDO_OBJECTS: Final = range(0x1400, 0x1C00)
 _IN_ERROR: Final = {0: NmtCommand.ENTER_PRE_OPERATIONAL, 2: NmtCommand.STOP}
-"""What 1029h:01 has the node do when it has lost its master."""
+"""NMT commands for the values of 1029h:01, carried out when the node has lost its master."""
 
 
 class GenericNode(SimulatedDevice):
@@ -66,7 +66,7 @@ class GenericNode(SimulatedDevice):
         return self._numbers.current[at]
 
     def set_value(self, at: At, value: int) -> None:
-        """What a test or a demonstration does to a number, such as an input."""
+        """Set a number, such as an input, for a test or a demonstration."""
         self._injected.append(lambda: self._numbers.current.update({at: value}))
 
     def fail(self, code: int, axis: int = 0) -> None:

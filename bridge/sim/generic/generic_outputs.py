@@ -1,4 +1,4 @@
-"""What the outputs of a simulated node become when its communication fails (CiA 401)."""
+"""Outputs of a simulated node when its communication fails (CiA 401)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a simulated node of any kind is made of: objects, PDOs and axes."""
+"""Plan of a simulated node of any kind: objects, PDOs and axes."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class AxisPlan:
     status_word: StatusWord
     copies: tuple[Copy, ...] = ()
     error: At | None = None
-    """What tells the code of its last error."""
+    """Object that holds the code of its last error."""
 
 
 @dataclass(frozen=True, slots=True)

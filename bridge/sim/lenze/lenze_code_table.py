@@ -1,4 +1,4 @@
-"""How codes become objects: index = 5FFFh − code, sub-index = sub-code (EDS84DMOTCAN 3.0, §9.2.2)."""
+"""Objects of codes: index = 5FFFh − code, sub-index = sub-code (EDS84DMOTCAN 3.0, §9.2.2)."""
 
 from __future__ import annotations
 

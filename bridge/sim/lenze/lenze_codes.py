@@ -60,7 +60,7 @@ class BusDisplay:
 
 @dataclass(frozen=True, slots=True)
 class CodeParts:
-    """What the codes display and change."""
+    """Parts of the drive that the codes display and change."""
 
     codes: Store[LenzeCodes]
     stack: Store[CommunicationSettings]

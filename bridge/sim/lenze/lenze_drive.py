@@ -16,7 +16,7 @@ from bridge.sim.core.ticks import next_tick
 from bridge.sim.lenze.lenze_settings import LenzeCodes
 
 INIT_S: Final = 0.2
-"""How long the initialisation lasts; the manual gives no time."""
+"""Time in seconds that the initialisation lasts; the manual gives none."""
 COAST_S: Final = 1.0
 """The motor's run-down from C00011 to standstill without voltage."""
 HUNDRED_PERCENT: Final = 0x4000

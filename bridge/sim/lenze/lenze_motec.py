@@ -73,7 +73,7 @@ class LenzeMotec(SimulatedDevice):
         return self.objects
 
     def save(self) -> None:
-        """What C00002/11 does, and who commissions it: the codes outlast the mains."""
+        """Save the codes, which then outlast the mains: by C00002/11, or by whoever commissions the drive."""
         self._codes.save()
 
     def _sent(self) -> list[Frame]:

@@ -166,7 +166,7 @@ def communication(codes: LenzeCodes, words: tuple[int, int]) -> CommunicationSet
 
 
 CYCLE_PLACES: Final = (4, 1)
-"""Where C00356 has the cycle times of TPDO1 and TPDO2."""
+"""Sub-codes of C00356 with the cycle times of TPDO1 and TPDO2."""
 
 
 def _cob_ids(codes: LenzeCodes, number: int) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""What an 8400 motec supervises on the bus and reports (EDS84DMOTCAN 3.0, §10)."""
+"""Supervision of the bus by an 8400 motec, and its reports (EDS84DMOTCAN 3.0, §10)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an 8400 motec sends by itself, and what it counts (EDS84DMOTCAN 3.0, §7.2.3, §8.5, C00360)."""
+"""Frames that an 8400 motec sends by itself, and its counters (EDS84DMOTCAN 3.0, §7.2.3, §8.5, C00360)."""
 
 from __future__ import annotations
 

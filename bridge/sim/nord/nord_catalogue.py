@@ -20,7 +20,7 @@ _P151_MOST_MS: Final = 32767
 _POSITION: Final = MappingProxyType(
     {"P543": 10.0, "P544": 15.0, "P545": 1.0, "P546": 23.0, "P547": 24.0, "P548": 1.0, "P600": 2.0}
 )
-"""What the mapping sk-tu3-cao-pdo3 requires of its drive (BU 2500 §5.4): a position in two words, a
+"""Settings that the mapping sk-tu3-cao-pdo3 requires of its drive (BU 2500 §5.4): a position in two words, a
 frequency, and that it positions."""
 _SLOTS: Final = ("fu1", "fu2", "fu3", "fu4")
 

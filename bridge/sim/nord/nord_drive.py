@@ -26,7 +26,7 @@ from bridge.sim.nord.nord_states import STATE_BITS, State, commanded
 CHARGING_S: Final = 0.2
 """Power-on until the charging relay closes (transition 1); the manual gives no time."""
 FAULT_REACTION_S: Final = 0.02
-"""How long state G lasts: long enough to be seen on the wire (TPDO inhibit time 10 ms)."""
+"""Time in seconds that state G lasts: long enough to be seen on the wire (TPDO inhibit time 10 ms)."""
 COAST_S: Final = 1.0
 """The motor's run-down from P105 to standstill without voltage."""
 
@@ -174,7 +174,7 @@ class NordDrive:
         return True
 
     def follow(self, demand: Demand | None) -> None:
-        """What the interface demands in the drive profile."""
+        """Follow what the interface demands in the drive profile."""
         if demand != self.demand:
             self.demand = demand
             self.news.is_there = True
@@ -264,7 +264,7 @@ class NordDrive:
         return target(self.setpoints, lambda n: self.parameters.meaning(546, n, self._set), stretched)
 
     def _positioning_hz(self) -> float:
-        """How fast it may go there. The position gives the direction."""
+        """Greatest speed at which it may go there. The position gives the direction."""
         if self.parameters.raw(600, 1, self._set) == PositionControl.AT_P105:
             return self._max_hz
         return abs(self._set_share()) * self._max_hz

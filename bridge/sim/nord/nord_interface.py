@@ -33,7 +33,7 @@ _BAUD_250: Final = 1
 
 @dataclass(frozen=True, slots=True)
 class InterfaceParts:
-    """What the dictionary displays and changes."""
+    """Parts of the node that the dictionary displays and changes."""
 
     node_id: int
     kind: Kind

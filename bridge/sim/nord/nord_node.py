@@ -1,4 +1,4 @@
-"""What every NORD node has in common, whatever stands behind it."""
+"""Base of every NORD node, whatever stands behind it."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ INCREMENTS: Final = 1000
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """What an interface demands in the drive profile (§6.7.3), in place of the drive's setpoints and ramps.
-    The times are those between 0 and P105; None is P102 or P103."""
+    """Demand of an interface in the drive profile (§6.7.3), in place of the drive's setpoints and ramps. The
+    times are those between 0 and P105; None is P102 or P103."""
 
     target_hz: float
     accelerate_s: float | None

@@ -1,4 +1,5 @@
-"""What a NORD node supervises and reports: P151 or P513, P170, P173 (BU 2500 §7.1.1, §7.1.3, §8.1, §8.2)."""
+"""Supervision by a NORD node, and its reports: P151 or P513, P170, P173 (BU 2500 §7.1.1, §7.1.3, §8.1,
+§8.2)."""
 
 from __future__ import annotations
 

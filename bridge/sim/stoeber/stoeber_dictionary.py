@@ -1,4 +1,4 @@
-"""How objects are reached on CAN 5000: expedited with four bytes, and by axis (ID 441684.06 §8.2)."""
+"""Access to objects on CAN 5000: expedited with four bytes, and by axis (ID 441684.06 §8.2)."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ class CommunicationObjects:
         self.saves += 1
 
     def _add_ranges(self, dictionary: Dictionary) -> None:
-        """Where §11.1 says more than CiA 301: SYNC 1…2047, 1015h as U32, 1006h."""
+        """Add the ranges of §11.1 that are narrower than CiA 301: SYNC 1…2047, 1015h as U32, 1006h."""
         communication, u32 = self._communication, Type.UNSIGNED32
 
         def set_emcy(value: int) -> None:

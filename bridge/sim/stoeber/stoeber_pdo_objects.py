@@ -22,7 +22,7 @@ def resolved(cob_id: int, function_code: int, node_id: int) -> int:
 
 
 class StoeberPdoObjects(PdoObjects):
-    """Where CAN 5000 differs from the rules of CiA 301."""
+    """PDO objects where CAN 5000 differs from CiA 301."""
 
     def __init__(
         self,

@@ -23,9 +23,9 @@ POSITIVE_LIMIT: Final = 0x08
 NEGATIVE_LIMIT: Final = 0x10
 ABORTED: Final = 0x20
 LIMIT_AT: Final = 100_000
-"""Where the limit switches are, to both sides of where the axis stood when it was made."""
+"""Distance of the limit switches, to both sides of the place where the axis stood when it was made."""
 HOME_AT: Final = -2_000
-"""Where the reference switch is."""
+"""Place of the reference switch."""
 _STEP_S: Final = 0.005
 _MOST_STEPS: Final = 2000
 
@@ -59,7 +59,7 @@ class PositioningAxis(StoeberAxis):
         self._goal: float | None = None
         self._bits = 0
         self._machine = 0.0
-        """Where the axis really is at position 0: it goes there at the reference switch."""
+        """Place on the machine of position 0, which the reference switch sets."""
 
     @property
     def posi_status(self) -> int:
@@ -71,7 +71,7 @@ class PositioningAxis(StoeberAxis):
 
     @property
     def place(self) -> float:
-        """Where the axis is, seen from the limit switches."""
+        """Place of the axis, seen from the limit switches."""
         return self.motor.position + self._machine
 
     def power_on(self, now: float) -> None:

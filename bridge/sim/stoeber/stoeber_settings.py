@@ -61,7 +61,7 @@ class StoeberPdo(PdoSettings):
 
 @dataclass(slots=True)
 class StoeberSettings:
-    """What "save values" keeps in addition to the communication objects."""
+    """Settings that "save values" keeps in addition to the communication objects."""
 
     axes: list[AxisParameters]
     edited_axis: list[int]

@@ -15,7 +15,7 @@ _ROUNDING: Final = 1e-9
 
 
 class BurstEnd(NamedTuple):
-    """From ``at`` on (monotonic seconds) a burst sends ``frame``; with None it ends then."""
+    """End of a burst: from ``at`` on (monotonic seconds) it sends ``frame``; with None it ends then."""
 
     at: float
     frame: Frame | None

@@ -93,7 +93,7 @@ class CanSockets:
 
 
 def _filters(can_ids: Collection[int]) -> bytes:
-    """Those of the kernel for these identifiers, or for their function codes where that are too many."""
+    """Kernel filters for these identifiers, or for their function codes where that are too many."""
     wanted = {(can_id, _EXACT) for can_id in can_ids}
     if len(wanted) > _MOST_FILTERS:
         wanted = {(can_id & 0x780, _FUNCTION) for can_id in can_ids}

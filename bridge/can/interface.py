@@ -100,7 +100,7 @@ class Bus(Protocol):
         ...
 
     def next_deadline(self) -> float | None:
-        """When ``on_time`` has to be called next, or None."""
+        """Time at which ``on_time`` has to be called next, or None."""
         ...
 
     def on_time(self, now: float) -> None:

@@ -53,7 +53,7 @@ class _Sent(NamedTuple):
     until: float
     """The burst surely runs so long."""
     is_fresh: bool
-    """It was started, and not refilled."""
+    """True if it was started, and not refilled."""
 
 
 class KernelBursts:

@@ -1,4 +1,4 @@
-"""When to look at an interface: once a second while it works, less and less often while it is gone."""
+"""Schedule of looks at an interface: once a second while it works, less and less often while it is gone."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ class _Gathering:
 
 
 class SocketCanListener(_Gathering):
-    """On the interface ``channel``; it hears the frames of its own machine, too."""
+    """Listener on the interface ``channel``; it hears the frames of its own machine, too."""
 
     def __init__(self, channel: str) -> None:
         super().__init__()
@@ -124,7 +124,7 @@ class SocketCanListener(_Gathering):
 
 
 class TapListener(_Gathering):
-    """At the wiretap ``path`` of another process of ours."""
+    """Listener at the wiretap ``path`` of another process of ours."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()

@@ -66,7 +66,8 @@ def query(channel: str) -> Link:
 
 
 def look_at(channel: str) -> Link:
-    """As ``query``; where the kernel may not be asked, an interface that is up and says nothing else."""
+    """Result of ``query``; where the kernel may not be asked, an interface that is up and says nothing
+    else."""
     try:
         return query(channel)
     except OSError as error:

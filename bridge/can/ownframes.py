@@ -21,7 +21,7 @@ LINGER_S: Final = 1.0
 _SPARE: Final = 64
 """Frames that may come in a bunch: what waited in those queues, and what was sent beside the rhythm."""
 _FASTER: Final = 1.1
-"""By this much the allowance grows faster than we use it up, so that it recovers after an intruder."""
+"""Factor by which the allowance grows faster than we use it up, so that it recovers after an intruder."""
 _MOST_PAST: Final = 256
 
 

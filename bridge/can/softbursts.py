@@ -11,7 +11,7 @@ from bridge.canopen.frame import Frame
 
 _SYNC: Final = 0x080
 _ROUNDING: Final = 1e-6
-"""Of a period: a time that is a multiple of it but for its last bits counts as one."""
+"""Fraction of a period: a time that is a multiple of it but for its last bits counts as one."""
 
 
 @dataclass(slots=True)
@@ -42,7 +42,7 @@ class SoftBursts:
         self._in_step = in_step
         self._jobs: dict[int, _Job] = {}
         self._next = inf
-        """When the first of them is due."""
+        """Time at which the first of them is due."""
 
     def start(self, burst: Burst, now: float, *, at_once: bool) -> Frame | None:
         """Start or renew; gives the frame that is to be sent right now."""

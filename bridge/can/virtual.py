@@ -64,7 +64,7 @@ class VirtualBus(SoftBus):
         return foreign
 
     def pass_by(self, frame: Frame, now: float) -> None:
-        """Somebody else's frame is on the wire."""
+        """Take in somebody else's frame on the wire."""
         self._passes(frame)
         if frame.can_id in self._ours and self._wake and len(self._foreign) < _MOST_WAITING:
             self._foreign.append(frame)

@@ -1,4 +1,5 @@
-"""When frames are fetched from a socket: at once where the bus is quiet, some together where it is busy."""
+"""Times at which frames are fetched from a socket: at once where the bus is quiet, some together where it is
+busy."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _MOST_READERS: Final = 16
 
 
 class Wiretap:
-    """On ``bus``, at the Unix socket ``path`` in a folder that is ours alone."""
+    """Tap on ``bus``, at the Unix socket ``path`` in a folder that is ours alone."""
 
     def __init__(self, bus: SoftBus, path: Path) -> None:
         self._bus = bus

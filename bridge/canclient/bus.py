@@ -30,7 +30,7 @@ _log = logging.getLogger(__name__)
 _RUNTIME_DIR: Final = "/run/drivebridge"
 _NODES: Final = range(1, 128)
 _MOST_BYTES: Final = 32 * 1024
-"""Of one value: fits a line of the gateway."""
+"""Size of a value that fits a line of the gateway."""
 _BLOCK_SEGMENTS: Final = 127
 _MOST_WAITING: Final = 1 << 15
 """Frames that a script has not taken yet; further ones of the bus are lost, answers are not."""
@@ -177,8 +177,8 @@ class DrivebridgeBus(can.BusABC):
     def _send_periodic_internal(
         self, msgs: Sequence[can.Message] | can.Message, *_: object, **__: object
     ) -> can.broadcastmanager.CyclicSendTaskABC:
-        """Nothing is sent again and again. Raises ``can.CanOperationError`` here, and not in the thread that
-        would send it."""
+        """Refuse cyclic frames: raises ``can.CanOperationError`` here, and not in the thread that would send
+        them."""
         first = msgs if isinstance(msgs, can.Message) else msgs[0]
         raise can.CanOperationError(_why_not_sent(first))
 

@@ -109,11 +109,12 @@ class HabitCounter:
         return [_said(odd, one) for odd, one in self._counts.items() if one.count >= least]
 
     def habits(self) -> list[str]:
-        """As ``said``, for those that are too frequent for a disturbance."""
+        """Sentences as in ``said``, for those that are too frequent for a disturbance."""
         return self.said(_NAMED_FROM)
 
     def take_news(self) -> list[str]:
-        """As ``habits``, for those that have become habits since the last call, or ten times as frequent."""
+        """Sentences as in ``habits``, for those that have become habits since the last call, or ten times as
+        frequent."""
         self.has_news = False
         news: list[str] = []
         for odd, one in self._counts.items():

@@ -18,7 +18,7 @@ NO_NODE_ID: Final = 0xFF
 """The node id of a device that has none."""
 
 BIT_RATES: Final = (1_000_000, 800_000, 500_000, 250_000, 125_000, None, 50_000, 20_000, 10_000)
-"""By index in table 0 (CiA 305 §6.4.3; 5 is reserved)."""
+"""Bit rates in bit/s by index in table 0 (CiA 305 §6.4.3; 5 is reserved)."""
 AUTOMATIC: Final = 9
 
 SWITCH_GLOBAL: Final = 0x04
@@ -40,7 +40,7 @@ _SERIAL: Final = 3
 U32: Final = struct.Struct("<I")
 U16: Final = struct.Struct("<H")
 QUESTION: Final = struct.Struct("<IBBB")
-"""Of a fastscan: number, lowest bit that is compared, field, next field (CiA 305 §6.7)."""
+"""Question of a fastscan: number, lowest bit that is compared, field, next field (CiA 305 §6.7)."""
 _STANDARD_ERRORS: Final = {
     NODE_ID: {1: "a node id must be 1…127 or 255"},
     BIT_TIMING: {1: "this bit rate is not supported"},
@@ -127,7 +127,7 @@ def inquire_identity() -> Service[LssAddress]:
 
 
 def inquire_node_id() -> Service[int]:
-    """Its present node id, ``NO_NODE_ID`` if it has none."""
+    """Present node id of the device, ``NO_NODE_ID`` if it has none."""
     answer = yield LssExchange(_message(INQUIRE_NODE_ID), INQUIRE_NODE_ID, "asking for its node id")
     return answer[1] if answer else NO_NODE_ID
 

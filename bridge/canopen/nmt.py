@@ -18,7 +18,7 @@ class NmtCommand(IntEnum):
 
 
 class NmtState(IntEnum):
-    """As heartbeats and guarding answers report it."""
+    """NMT states as heartbeats and guarding answers report them."""
 
     INITIALISING = 0x00
     STOPPED = 0x04
@@ -32,7 +32,7 @@ class NmtState(IntEnum):
 
     @property
     def words(self) -> str:
-        """As written in sentences."""
+        """Name of the state in sentences."""
         return self.label.replace("_", "-") if self is NmtState.PRE_OPERATIONAL else self.label
 
 

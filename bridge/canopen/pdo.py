@@ -27,7 +27,7 @@ class PdoEntry:
 
     @classmethod
     def from_object(cls, value: int) -> PdoEntry:
-        """From the 32-bit value of 16xxh/1Axxh: ``IIIISSLL``."""
+        """Entry of the 32-bit value of 16xxh/1Axxh: ``IIIISSLL``."""
         return cls(value >> 16, value >> 8 & 0xFF, value & 0xFF)
 
     def to_object(self) -> int:
@@ -35,7 +35,8 @@ class PdoEntry:
 
     @property
     def is_dummy(self) -> bool:
-        """It stands for a data type and fills a gap (CiA 301 §7.4.7): sent as 0, ignored when received."""
+        """True if it stands for a data type and fills a gap (CiA 301 §7.4.7): sent as 0, ignored when
+        received."""
         return self.index in _DUMMY_INDICES
 
     def __str__(self) -> str:

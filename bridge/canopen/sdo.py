@@ -80,7 +80,7 @@ class SdoChannel:
         self.unmatched = 0
         """Frames on the reply COB-ID that were no answer."""
         self.late = 0
-        """Those of them that answered a request which we had given up."""
+        """Number of those that answered a request which we had given up."""
         self.lateness_s = 0.0
         """Time from its request to the last of these."""
         self._segment_s = segment_s

@@ -58,7 +58,7 @@ class BlockUse:
     segments in a row arrive without loss."""
 
     why_not: str = ""
-    """In a sentence; empty as long as the server is asked."""
+    """Reason in a sentence; empty as long as the server is asked."""
     segments: int = MOST_SEGMENTS
 
     def on_block(self, whole: bool) -> None:

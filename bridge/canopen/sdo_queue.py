@@ -39,7 +39,7 @@ class SdoJob:
 
 
 class SdoQueue:
-    """At most ``MOST_WAITING`` jobs."""
+    """Queue of at most ``MOST_WAITING`` jobs."""
 
     def __init__(self) -> None:
         self._lanes: dict[Priority, deque[SdoJob]] = {priority: deque() for priority in Priority}
@@ -48,7 +48,7 @@ class SdoQueue:
         return sum(map(len, self._lanes.values()))
 
     def __iter__(self) -> Iterator[SdoJob]:
-        """In the order in which they are served."""
+        """Jobs in the order in which they are served."""
         for lane in self._lanes.values():
             yield from lane
 

@@ -33,7 +33,7 @@ class Exchange:
     identity: dict[str, int]
     drives: dict[str, _Facts] = field(default_factory=dict[str, Any])
     is_unsaved: bool = False
-    """Something was written that the node has not been told to save."""
+    """True while something was written that the node has not been told to save."""
     warnings: list[str] = field(default_factory=list[str])
 
     def keep(self, drive: str, facts: Mapping[str, Any]) -> None:

@@ -29,7 +29,7 @@ class _Server(msgspec.Struct):
 
 
 class _File(msgspec.Struct):
-    """By bus, then by the COB-ID of requests."""
+    """Servers by bus, then by the COB-ID of requests."""
 
     servers: dict[str, dict[int, _Server]] = msgspec.field(default_factory=dict[str, dict[int, _Server]])
 

@@ -163,7 +163,7 @@ def parse_identity(text: str) -> LssAddress:
 
 
 def identity_text(identity: LssAddress) -> str:
-    """As ``--identity`` takes it."""
+    """Identity as ``--identity`` takes it."""
     return ":".join(f"{number:08X}" for number in identity)
 
 

@@ -134,7 +134,7 @@ class Target:
         writes: bool = False,
         watch: Callable[[Show], None] = lambda show: None,
     ) -> T | ParameterError:
-        """As ``run``, with the reason of a failure as the result."""
+        """Result of ``run``, with the reason of a failure as the result."""
         not_virtual(self.line.table)
         if writes:
             self.count()

@@ -30,7 +30,7 @@ class EndingSignals:
         self._before = {number: signal.signal(number, self._on_signal) for number in ENDING}
 
     def release(self) -> None:
-        """As before ``hold``."""
+        """Restore the state before ``hold``."""
         for number, handler in self._before.items():
             # None: it was not set from Python.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)

@@ -23,7 +23,7 @@ from bridge.sim.core.habit import Rule, load_habit
 from bridge.sim.shell import Simulation
 
 Habits = Mapping[str, Sequence[Rule]]
-"""By the name of the node that has them."""
+"""Rules by the name of the node that has them."""
 NONE: Final[Habits] = MappingProxyType({})
 
 

@@ -23,7 +23,7 @@ def _escaped(character: str) -> str:
 
 
 def printable_lines(text: str) -> str:
-    """As ``printable``, but our own line breaks stay."""
+    """Text as ``printable`` makes it, but our own line breaks stay."""
     return "\n".join(map(printable, text.split("\n")))
 
 

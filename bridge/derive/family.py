@@ -99,8 +99,8 @@ def _drives(description: Description, mode: Mode, axes: Sequence[int]) -> list[A
 
 
 def _is_half_a_drive(description: Description) -> bool:
-    """Its number does not speak against a drive, and it has the control word: who made it can be asked for
-    the rest."""
+    """True if its number does not speak against a drive, and it has the control word: who made it can be
+    asked for the rest."""
     return _profile(description) in (0, PROFILE_402) and _has(description, CONTROL_WORD)
 
 

@@ -1,4 +1,4 @@
-"""In which PDOs a drive of the profile CiA 402 gets its control word and tells its status word."""
+"""PDOs in which a drive of the profile CiA 402 gets its control word and sends its status word."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def _is_placeable(description: Description, pdo: PdoSummary) -> bool:
 
 
 def _placed(pdo: PdoSummary, bases: Mapping[int, int], axes: Axes | None) -> int:
-    """Its COB-ID without the node id. Raises ``NoLayout`` where there is none left."""
+    """COB-ID of a PDO without the node id. Raises ``NoLayout`` where there is none left."""
     base = bases.get(pdo.number)
     if base is None and axes:
         base = axes.spare(pdo.receives)
@@ -250,7 +250,7 @@ def _is_usable(description: Description, pdo: PdoSummary) -> bool:
 
 
 def _base(description: Description, pdo: PdoSummary) -> int | None:
-    """Its COB-ID without the node id; None where the file does not tell."""
+    """COB-ID of a PDO without the node id; None where the file does not tell."""
     entry = description.entry((0x1400 if pdo.receives else 0x1800) + pdo.number - 1, 1)
     value = entry.current if entry else None
     if value and value.plus_node_id and isinstance(value.plain, int):

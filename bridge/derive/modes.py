@@ -60,7 +60,7 @@ MODES: Final = (
     Mode("cyclic-position", 8, 0x607A, 0x6064),
     Mode("homing", 6, None, 0x6064),
 )
-"""The one that is taken first where a device has several first."""
+"""Modes in order of preference, for a device that supports several."""
 
 
 def modes_of(description: Description) -> list[Mode]:

@@ -42,7 +42,7 @@ _OF_BASE: Final = frozenset((0x6040, 0x6042, 0x6071, 0x607A, *range(0x60B0, 0x60
 
 
 def parameter_name(index: int, sub: int, *, has_subs: bool) -> str:
-    """As ``cia402/base`` writes them: 6083, 6046:01."""
+    """Name as ``cia402/base`` writes it: 6083, 6046:01."""
     return f"{index:04X}:{sub:02X}" if has_subs else f"{index:04X}"
 
 

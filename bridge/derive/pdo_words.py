@@ -21,7 +21,7 @@ _DUMMIES: Final = range(0x0001, 0x0008)
 """Data types that fill a PDO (CiA 301 §7.4.7)."""
 
 Words = dict[str, tuple[int, int]]
-"""By the name of each word: the object that fills it, and how many bits it has."""
+"""Object that fills each word, and how many bits it has, by the name of the word."""
 
 
 class NoLayout(Exception):
@@ -54,7 +54,7 @@ class PdoLayout:
     signed: tuple[str, ...] = ()
     """Objects of one byte with a sign."""
     times: tuple[str, ...] = ()
-    """When it is sent, where it is written: keys of the mapping file with their values."""
+    """Transmission settings, where they are written: keys of the mapping file with their values."""
 
     def of_node(self, view: View) -> PdoLayout:
         """The PDO of an axis, with the objects as the node has them."""
@@ -62,7 +62,7 @@ class PdoLayout:
         return replace(self, objects=objects, signed=signed)
 
     def lines(self, direction: str) -> list[str]:
-        """As an item of ``[[slot]]``."""
+        """Lines of an item of ``[[slot]]``."""
         objects = ", ".join(f"[{string(one)}]" for one in self.objects)
         lines = [f"[[slot.{direction}]]", f"number = {self.number}", f"cob_id = {word(self.cob_id, 3)}"]
         lines += [f"words = {strings(self.words)}", f"objects = [{objects}]"]
@@ -91,7 +91,7 @@ class FurtherWords:
         self._taken.update(words)
 
     def names(self, kind: str, one: MappedObject, rest: int, count: int, used: Collection[str]) -> list[str]:
-        """Those of the words that an object fills which the mode does not name; ``used`` are the axis's."""
+        """Names of the words that an object fills which the mode does not name; ``used`` are the axis's."""
         key = (kind, one.index, one.sub, one.bits, rest)
         there = self._names.get(key, [])
         if there and not set(there) & set(used):

@@ -13,7 +13,7 @@ _MAPPINGS: Final = {True: range(0x1600, 0x1800), False: range(0x1A00, 0x1C00)}
 """Mapping parameters of RPDOs (True) and TPDOs (CiA 301 §7.5.2.36, §7.5.2.38)."""
 _COMMUNICATION: Final = (range(0x1400, 0x1600), range(0x1800, 0x1A00))
 _MPDO: Final = (0xFE, 0xFF)
-"""In sub-index 0 they are no counts (CiA 301 §7.5.2.36)."""
+"""Values of sub-index 0 that are no counts (CiA 301 §7.5.2.36)."""
 _MOST_BITS: Final = 64
 _LAST_TYPE: Final = 0x1F
 """Up to here a mapped index is a data type: a dummy (CiA 301 §7.4.7.3)."""
@@ -51,7 +51,7 @@ def _limits(entry: Entry) -> Iterator[str]:
 
 
 def _number(value: Value | None) -> int | float | None:
-    """Of what depends on the node id nothing is known here."""
+    """Number of a value; None where it depends on the node id, of which nothing is known here."""
     if value is None or value.plus_node_id or not isinstance(value.plain, int | float):
         return None
     return value.plain

@@ -33,7 +33,7 @@ def read_device_file(path: Path, modules: Sequence[str] = ()) -> Description:
 
 
 def read_device(content: bytes, name: str, modules: Sequence[str] = ()) -> Description:
-    """As ``read_device_file``, from a file's content; ``name`` is for messages."""
+    """Description as ``read_device_file`` gives it, from a file's content; ``name`` is for messages."""
     report = Report()
     is_xml = content.lstrip(b" \t\r\n").startswith(_XML_STARTS)
     if is_xml and modules:
@@ -57,8 +57,8 @@ def read_device(content: bytes, name: str, modules: Sequence[str] = ()) -> Descr
 
 
 def read_whole_device_file(path: Path, modules: Sequence[str] = ()) -> Description:
-    """As ``read_device_file``, for those who make something of it: half a description is none, and raises
-    ``FileFaults``, too."""
+    """Description as ``read_device_file`` gives it, for those who make something of it: half a description is
+    none, and raises ``FileFaults``, too."""
     description = read_device_file(path, modules)
     line = description.broken_off_at
     if line is None:

@@ -176,7 +176,7 @@ class Device:
     revision: int | None = None
     order_code: str = ""
     bitrates: tuple[int, ...] = ()
-    """In bit/s."""
+    """Bit rates in bit/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +199,7 @@ class Commissioning:
     node_id: int | None = None
     node_name: str = ""
     bitrate: int | None = None
-    """In bit/s."""
+    """Bit rate in bit/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,7 +263,7 @@ class Report:
             self._more += 1
 
     def findings(self) -> tuple[Finding, ...]:
-        """In the order of the file."""
+        """Findings in the order of the file."""
         found = sorted(self._findings, key=lambda finding: finding.line)
         if self._more:
             found.append(Finding(0, Severity.WARNING, f"and {self._more} more of this kind"))

@@ -80,7 +80,7 @@ class Modules:
         return Module(number, info.text("ProductName"), info.text("OrderCode"))
 
     def connected(self) -> tuple[int, ...]:
-        """Those that the file itself says are plugged in, in their order, as a DCF does."""
+        """Modules that the file itself says are plugged in, in their order, as a DCF does."""
         section = self._sections.get(_CONNECTED)
         if section is None:
             return ()
@@ -179,7 +179,7 @@ class Modules:
         self._sections[f"{index:04x}sub{sub:x}"] = Section(f"{index:04X}sub{sub:X}", line, keys)
 
     def _section(self, name: str) -> Section | None:
-        """By its name with four digits and no 0x, in whatever of the usual forms the file has it."""
+        """Section by its name with four digits and no 0x, in whatever of the usual forms the file has it."""
         index, part, sub = name.partition("sub")
         forms = (name, f"0x{name}", f"{index}{part}{sub:0>2}", f"0x{index}{part}{sub:0>2}")
         return next((self._sections[one] for one in forms if one in self._sections), None)

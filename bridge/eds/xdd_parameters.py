@@ -18,7 +18,7 @@ _ACCESS: Final = {
     "readwriteoutput": "rww",
     "noaccess": "ro",
 }
-"""By the attribute in lower case. noAccess counts as read-only: it is not written."""
+"""Access by the attribute in lower case. noAccess counts as read-only: it is not written."""
 DEFAULT_ACCESS: Final = "ro"
 """For parameters and objects without an access (the schema's default is ``read``)."""
 

@@ -53,7 +53,7 @@ class Backup:
     unreadable: dict[str, str] = field(default_factory=dict[str, str])
     identity: dict[str, int] = field(default_factory=dict[str, int])
     indices_done: int = 0
-    """Of ``Names.settings``."""
+    """Number of finished entries of ``Names.settings``."""
     silent: set[str] = field(default_factory=set[str])
     """Names for which the drive once did not answer."""
     answers: int = 0
@@ -92,8 +92,7 @@ def settings(names: Names, *, on_first: bool = True) -> list[Entry]:
 
 
 def left_out(names: Names, *, on_first: bool = True) -> dict[str, str]:
-    """By name, what could be set and belongs into no set, because it moves something or may; with the
-    reason."""
+    """Reasons by name, for what could be set and belongs into no set, because it moves something or may."""
     return {
         one.name: why
         for one in _set(names, on_first)

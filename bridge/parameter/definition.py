@@ -34,7 +34,7 @@ class Entry:
 
     @property
     def leaf(self) -> str:
-        """Its name as a point, such as ``p102_2_3`` for P102[2].3."""
+        """Name as a point, such as ``p102_2_3`` for P102[2].3."""
         return leaf_of(self.name)
 
     @property

@@ -7,23 +7,23 @@ from typing import Final
 
 
 class Effect(Enum):
-    """In the order in which they are looked for: the first that an object has counts."""
+    """Effects in the order in which they are looked for: the first that an object has counts."""
 
     COMMANDS = "command"
-    """It moves, switches or enables something: process data, which the owner alone commands."""
+    """Moves, switches or enables something: process data, which the owner alone commands."""
     BUS = "bus"
     """The communication that the bridge supervises: the site file's."""
     SHAPES = "shapes"
     """Polarity, offset or scaling of an output: an output changes with it at once, and its safe value
     becomes another one."""
     SUPERVISES = "communication"
-    """It decides who commands the node, or what the node does when the bridge falls silent."""
+    """Decides who commands the node, or what the node does when the bridge falls silent."""
     MAKES_SAFE = "safe"
-    """It decides how something stops, or what it becomes when it is made safe."""
+    """Decides how something stops, or what it becomes when it is made safe."""
     MAY_MOVE = "may_move"
-    """Nobody says what it does: an RPDO can carry it, or it is not described at all."""
+    """Unknown: an RPDO can carry it, or it is not described at all."""
     OPERATES = "while_enabled"
-    """It changes a movement that goes on, and begins none."""
+    """Changes a movement that goes on, and begins none."""
     SETTING = ""
 
     @property

@@ -91,7 +91,7 @@ class Ledger:
         return unsaved
 
     def put_back(self, unsaved: Mapping[Key, list[float]]) -> None:
-        """They could not be kept: they are there again the next time."""
+        """Put counts back that could not be kept: they are there again the next time."""
         for key, times in unsaved.items():
             self._unsaved[key] = [*times, *self._unsaved.get(key, ())]
 

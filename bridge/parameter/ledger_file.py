@@ -118,7 +118,7 @@ class LedgerFile:
 
     @contextlib.contextmanager
     def _lock(self) -> Generator[None]:
-        """Nobody else reads and writes meanwhile. Without file locks (not on Unix) nobody waits."""
+        """Lock for reading and writing the file. Without file locks (not on Unix) nobody waits."""
         if sys.platform == "win32":
             yield
             return

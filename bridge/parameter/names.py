@@ -1,4 +1,4 @@
-"""From a vendor's name of a parameter to the object that holds it, by the rules of the mapping file.
+"""Names of parameters by the vendors, and the objects that hold them, by the rules of the mapping file.
 
 ``P102``, ``P102[2].3``, ``C00039/1``, ``E08``, ``2066:01`` and the names of points (``p102_2_3``) all lead
 to an ``Entry``. A name that fits the vendor's pattern is taken whether or not the file lists it.

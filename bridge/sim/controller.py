@@ -34,7 +34,7 @@ _IDENTITY: Final = json.dumps({"controller": "demo"})
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """In seconds; ``cycle_s`` is the longest silence and shorter than the drive's watchdog time."""
+    """Times in seconds; ``cycle_s`` is the longest silence and shorter than the drive's watchdog time."""
 
     cycle_s: float = 0.25
     run_s: float = 60.0
@@ -55,7 +55,8 @@ class Move:
 
     @classmethod
     def from_text(cls, text: str) -> Move:
-        """From ``drives/demo/fan/drive/command/velocity=1500``. Raises ValueError for anything else."""
+        """Movement of ``drives/demo/fan/drive/command/velocity=1500``. Raises ValueError for anything
+        else."""
         key, _, most = text.rpartition("=")
         drive_key, _, value = key.rpartition("/command/")
         if not drive_key:
@@ -130,7 +131,7 @@ class Controller:
         return self._get(f"{self._key}/status/state").get("s") == "operation_enabled"
 
     def _give_way(self) -> None:
-        """Somebody else has stopped the drive, or it has a fault: leave it alone while another has it."""
+        """Leave a drive alone that somebody else has stopped or that has a fault, while another has it."""
         self.ask("release_control")
         end = time.monotonic() + self._times.away_s
         while time.monotonic() < end:

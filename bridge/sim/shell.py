@@ -29,12 +29,12 @@ class Simulation:
         self._is_playing = False
         self._due_at: float | None = None
         self._due: dict[SimulatedDevice, float | None] = {}
-        """When each node is due; one that is missing here is due now. Asking all of them for every frame of a
-        busy bus would cost more than simulating them."""
+        """Time at which each node is due; one that is missing here is due now. Asking all of them for every
+        frame of a busy bus would cost more than simulating them."""
         self._heard: dict[SimulatedDevice, frozenset[int]] = {}
         """Identifiers heard by each device, from which ``_hearers`` was made."""
         self._hearers: dict[int, list[SimulatedDevice]] = {}
-        """By identifier."""
+        """Devices by the identifier that they hear."""
 
     def open(self) -> None:
         """Open the bus. Raises ``Unavailable`` if that fails."""

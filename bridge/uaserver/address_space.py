@@ -22,8 +22,8 @@ def is_empty(held: AttributeValue) -> bool:
 
 
 class Attributes(Mapping[AttributeIds, AttributeValue]):
-    """Those of ``node``: what it has for itself, ``own`` makes, all else is its kind's. ``common`` has all of
-    them."""
+    """Attributes of ``node``: what it has for itself, ``own`` makes, all else is its kind's. ``common`` has
+    all of them."""
 
     __slots__ = ("_common", "_node", "_own")
 

@@ -24,7 +24,7 @@ _MISSING: Final = {Stage.CONNECTED: "hello", Stage.GREETED: "channel", Stage.CHA
 
 
 def limits() -> Limits:
-    """Those of one server."""
+    """Limits of one server."""
     return Limits(
         MOST_CONNECTIONS,
         MOST_OF_ADDRESS,

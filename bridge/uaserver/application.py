@@ -91,5 +91,5 @@ class ServedApplication(Protocol[U]):
         ...
 
     def arrivals(self) -> Arrivals:
-        """Those of a new connection."""
+        """Arrival times of a new connection."""
         ...

@@ -9,13 +9,13 @@ NEVER: Final = float("-inf")
 """The time of a request that may have waited for any time."""
 
 received_at: ContextVar[float | None] = ContextVar("received_at", default=None)
-"""When the message whose service is being carried out can have come at the earliest; None for just now."""
+"""Earliest time at which the message whose service is being carried out can have come; None for just now."""
 
 
 class Arrivals(Protocol):
     """Times of what comes through one connection."""
 
     def arrive(self, *, crowded: bool) -> float:
-        """Something was read just now: when it can have come at the earliest, or ``NEVER``. ``crowded``: more
-        may be left, or more is under way than there should be."""
+        """Earliest time at which what was read just now can have come, or ``NEVER``. ``crowded``: more may be
+        left, or more is under way than there should be."""
         ...

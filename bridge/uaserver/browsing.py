@@ -29,14 +29,14 @@ from bridge.uaserver.library import (
 )
 
 MOST_CONTINUATION_POINTS: Final = 20
-"""Of one session."""
+"""Limit for one session."""
 
 _NULL: Final = node_id(ObjectIds.Null)
 _BEFORE_YIELD: Final = 5_000
 """References that are looked at before others have their turn."""
 
 _MOST_REFERENCES: Final = 100_000
-"""In one response."""
+"""Limit for one response."""
 
 _LONGEST_PATH: Final = 100
 _POINT_BYTES: Final = 8

@@ -27,10 +27,10 @@ from asyncua.ua import ua_binary
 from bridge.uaserver.library import StatusCodes, UaError, UaStatusCodeError, ua
 
 MOST_ELEMENTS: Final = 30_000
-"""Of all arrays in one message that are decoded one by one, while nobody else has a turn; a thousand take
-about 10 ms. Ten thousand operations with arrays of two fit in."""
+"""Limit for the elements of all arrays in one message that are decoded one by one, while nobody else has a
+turn; a thousand take about 10 ms. Ten thousand operations with arrays of two fit in."""
 MOST_BEFORE_SESSION: Final = 1_000
-"""Of the messages that open a session, which name a few."""
+"""Limit for the messages that open a session, which name a few."""
 
 _MOST_DIMENSIONS: Final = 10
 _LENGTH: Final = struct.Struct("<i")
@@ -46,7 +46,7 @@ class _Budget:
 
 
 _budget: ContextVar[_Budget | None] = ContextVar("decoding_budget", default=None)
-"""That of the message which the present task has before it."""
+"""Budget of the message which the present task has before it."""
 
 
 def begin(most: int) -> None:
@@ -97,7 +97,7 @@ def _string(data: Buffer) -> str | None:
 
 
 def _read(self: Any, size: int) -> bytes:
-    """In place of ``Buffer.read``."""
+    """Replacement of ``Buffer.read``."""
     if not 0 <= size <= self._size:
         raise NotEnoughData(f"{size} bytes asked for where {self._size} are left")
     begin = self._cur_pos

@@ -18,7 +18,7 @@ from asyncua.ua.ua_binary import struct_to_binary
 from bridge.uaserver.library import ServiceError, StatusCodes, ua
 
 _TURN_BYTES: Final = 16 * 1024
-"""That are encoded before others have their turn; a few milliseconds."""
+"""Bytes that are encoded before others have their turn; a few milliseconds."""
 _EACH_BYTES: Final = 32
 """Bytes that one value or result counts besides its own: small ones take their time, too."""
 _LENGTH: Final = struct.Struct("<i")

@@ -14,7 +14,7 @@ _TOLD_BY_US: Final = "Got malformed header"
 
 
 def _shorten(record: logging.LogRecord) -> bool:
-    """As a filter of a logger."""
+    """Filter of a logger that shortens its records."""
     if str(record.msg).startswith(_TOLD_BY_US):
         return False
     error = record.exc_info[1] if record.exc_info else None

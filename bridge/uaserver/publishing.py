@@ -10,7 +10,7 @@ from typing import Final, Protocol
 from bridge.uaserver.library import StatusCodes, ua
 
 MOST_BYTES: Final = 1024 * 1024
-"""Of the notifications in one message, about; what is left follows with the next request."""
+"""Approximate size of the notifications in one message; what is left follows with the next request."""
 
 _MORE_THAN_SUBSCRIPTIONS: Final = 10
 """A server takes more Publish requests than there are subscriptions, but not without end."""
@@ -18,7 +18,7 @@ _MORE_THAN_SUBSCRIPTIONS: Final = 10
 
 @dataclass(frozen=True, slots=True)
 class PublishRequest:
-    """One that is not answered yet. ``results`` are those of its acknowledgements.
+    """Publish request that is not answered yet. ``results`` are those of its acknowledgements.
 
     It is worth nothing once ``is_open`` says no: its connection is gone, or its session is elsewhere.
     """
@@ -28,7 +28,7 @@ class PublishRequest:
     answer: Callable[[ua.PublishResult], None]
     refuse: Callable[[int], None]
     most_bytes: int = MOST_BYTES
-    """Of the notifications, about: the last one may go beyond it."""
+    """Approximate size of the notifications: the last one may go beyond it."""
     results: list[ua.StatusCode] = field(default_factory=list[ua.StatusCode])
 
 

@@ -42,7 +42,7 @@ _Act = Callable[[Session, Any], Any]
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One that came on a connection. ``send`` takes the response, ``is_open`` says whether it still can."""
+    """Request on a connection. ``send`` takes the response, ``is_open`` says whether it still can."""
 
     header: Any
     body: Buffer
@@ -143,7 +143,7 @@ ROUTES: Final[Mapping[ua.NodeId, Route]] = {
         Route("DeleteMonitoredItems", _items(MonitoredItems.delete), "MonitoredItemIds"),
     )
 }
-"""By the type of the requests."""
+"""Routes by the type of the requests."""
 
 
 def _limit(operations: Sequence[object] | None, most: int) -> None:

@@ -63,7 +63,7 @@ VALUES: Final[Mapping[str, ua.Variant]] = {
     "Server_ServerDiagnostics_EnabledFlag": variant(False, _Type.Boolean),
     "Server_ServerRedundancy_RedundancySupport": variant(ua.RedundancySupport.None_, _Type.Int32),
 }
-"""By the names of the nodes."""
+"""Values by the names of the nodes."""
 
 NOT_DONE: Final = (
     f"{_AT_ONCE}MaxNodesPerHistoryReadData",

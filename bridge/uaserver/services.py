@@ -108,7 +108,7 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
         Service("DeleteSubscriptions", "Publish requests that wait are answered with the last one"),
     ),
 }
-"""By service set, in the order of Part 4 §5."""
+"""Services by service set, in the order of Part 4 §5."""
 
 REFUSED: Final[Mapping[ua.NodeId, int]] = {
     request_type(service.name): service.refused

@@ -44,7 +44,7 @@ _LONGEST_SESSION_MS: Final = 120_000.0
 
 _TOKEN_BYTES: Final = 32
 _NAME_BYTES: Final = 4
-"""Of the name by which a session is told from others of its user, also from those before a restart."""
+"""Length of the name by which a session is told from others of its user, also from those before a restart."""
 _READ: Final = 1
 """Bit of an access level."""
 _OBSERVER_ACCESS: Final = data_value(variant(_READ, ua.VariantType.Byte))
@@ -76,9 +76,9 @@ class Session(InternalSession):
         self.answer: Results | None = None
         """Answer that is being encoded for it."""
         self.most_bytes = 0
-        """Of an answer, as its client takes it on that connection."""
+        """Largest answer that its client accepts on that connection, in bytes."""
         self.left_at = 0.0
-        """When it lost its last connection; monotonic."""
+        """Monotonic time at which it lost its last connection."""
         self.admitted: UserIdentity | None = None
         """User for whom ``activate_session`` is; set by the processor once the login has been checked."""
 
@@ -118,7 +118,7 @@ class Session(InternalSession):
         return self._server.application
 
     def leave(self, now: float) -> None:
-        """Its connection has ended. It may be activated on another one, and goes on then."""
+        """Note that its connection has ended. It may be activated on another one, and goes on then."""
         self.holder, self.left_at = None, now
         self._tell(is_there=False)
 
@@ -177,8 +177,8 @@ class Session(InternalSession):
         return self.subscriptions.create(self, params)
 
     async def _timeout_loop(self) -> None:
-        """In place of asyncua's, which deletes the subscriptions with the session: they are there for a
-        transfer as long as they live (Part 4 §5.6.4)."""
+        """Replacement of asyncua's loop, which deletes the subscriptions with the session: they are there for
+        a transfer as long as they live (Part 4 §5.6.4)."""
         while self.state is not SessionState.Closed:
             left_s = (self.session_timeout or 0.0) + self._last_activity - loop_time()
             if left_s <= 0:
@@ -225,14 +225,14 @@ class Server(InternalServer):
     async def get_endpoints(
         self, params: ua.GetEndpointsParameters | None = None, sockname: tuple[str, int] | None = None
     ) -> list[ua.EndpointDescription]:
-        """Those of the transport profiles that are asked for."""
+        """Endpoints of the transport profiles that are asked for."""
         endpoints = await super().get_endpoints(params, sockname)
         profiles: list[str] = (get(params, "ProfileUris") if params else None) or []
         return [one for one in endpoints if not profiles or get(one, "TransportProfileUri") in profiles]
 
     @property
     def sessions(self) -> list[Session]:
-        """Those of clients."""
+        """Sessions of clients."""
         return [one for one in self._external_sessions.values() if isinstance(one, Session)]
 
     async def stop(self) -> None:

@@ -20,7 +20,7 @@ MOST_ITEMS: Final = 100_000
 """Monitored items of all clients together."""
 MOST_ITEMS_OF_ADDRESS: Final = 50_000
 MOST_ON_ONE: Final = 1_000
-"""Of one address on one attribute: each is told of every change of it."""
+"""Limit for one address on one attribute: each item is told of every change of it."""
 MOST_LISTENERS: Final = 1_000
 """Limit of the weight of all clients' items for events: each is asked about every event."""
 MOST_LISTENERS_OF_ADDRESS: Final = 500

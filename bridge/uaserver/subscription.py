@@ -119,7 +119,7 @@ class Subscription:
     # what there is to tell
 
     def noticed(self, item: Item) -> None:
-        """Something may have become of an item's value, or of its queue."""
+        """Look at an item whose value, or queue, may have changed."""
         if isinstance(item, ValueItem) and item.is_holding:
             self._holding[item.number] = item
         if item.has_something:
@@ -206,7 +206,7 @@ class Subscription:
         return more
 
     def _collect(self, most_bytes: int) -> tuple[list[ua.MonitoredItemNotification], list[ua.EventFieldList]]:
-        """As many notifications as go into one message."""
+        """Notifications for one message, as many as go into it."""
         values: list[ua.MonitoredItemNotification] = []
         events: list[ua.EventFieldList] = []
         left, bytes_left = self.terms.most_per_message, most_bytes

@@ -91,7 +91,7 @@ class Subscriptions:
             self._close(oldest)
 
     def _left_behind(self) -> Iterator[Subscription]:
-        """Those whose session has ended, the oldest first."""
+        """Subscriptions whose session has ended, the oldest first."""
         return (found for found in self.subscriptions.values() if found.owner.is_gone)
 
     def end(self, owner: Owner, *, delete: bool) -> None:
@@ -197,7 +197,7 @@ class Subscriptions:
             self.items.drop(subscription, item)
 
     def _release_requests(self, owner: Owner) -> None:
-        """Nothing can come to a session without subscriptions: what it waits for is answered."""
+        """Answer the Publish requests of a session without subscriptions, to which nothing can come."""
         if not self.of(owner):
             owner.publishing.refuse_all(StatusCodes.BadNoSubscription, loop_time())
 

@@ -92,7 +92,8 @@ class Processor(UaProcessor):
         self._connection.source = self._source
         self._was_greeted = False
         self.arrivals: deque[float] = deque()
-        """When the messages that are still to be processed can have come at the earliest, in their order."""
+        """Earliest times at which the messages that are still to be processed can have come, in their
+        order."""
 
     @property
     def stage(self) -> Stage:
@@ -105,7 +106,7 @@ class Processor(UaProcessor):
 
     @property
     def most_bytes(self) -> int:
-        """Of messages that wait for their turn: little as long as nobody has a session."""
+        """Limit for messages that wait for their turn: little as long as nobody has a session."""
         return _MOST_UNDER_WAY if self.stage is Stage.SESSION else MOST_BEFORE_SESSION
 
     @property
@@ -388,7 +389,7 @@ class Processor(UaProcessor):
 
 
 def _request_handle(header: Buffer) -> int:
-    """That of a RequestHeader of which nothing else need be sound. Raises for one that ends before it."""
+    """Handle of a RequestHeader of which nothing else need be sound. Raises for one that ends before it."""
     nodeid_from_binary(header)
     _, handle = _TIME_AND_HANDLE.unpack(header.read(_TIME_AND_HANDLE.size))
     return int(handle)

@@ -20,7 +20,7 @@ MOST_OPERANDS: Final = 500
 
 Fields = Mapping[str, ua.Variant]
 _Operand = Callable[[Fields, Sequence[Any]], Any]
-"""Its value for an event, and for what the elements after its own have come to."""
+"""Operand: its value for an event, and for what the elements after its own have come to."""
 
 
 def _compared(how: Callable[[Any, Any], bool]) -> Callable[..., bool | None]:

@@ -37,7 +37,7 @@ class Asked:
     parameters: str
     """The selector's part after the ``?``."""
     received_at: float
-    """When zenoh handed it over, in monotonic seconds; it may have waited for the loop since."""
+    """Time at which zenoh handed it over, in monotonic seconds; it may have waited for the loop since."""
     source: str
     """Id of the client's zenoh session, where the client gives it; not proved."""
     _query: zenoh.Query

@@ -36,7 +36,7 @@ class Lane:
         return self._thread.is_alive()
 
     def do(self, job: Job) -> bool:
-        """From any thread. False: there is no room, or the lane has ended."""
+        """Queue a job, from any thread. False: there is no room, or the lane has ended."""
         if self._is_stopping or self._jobs.qsize() >= LIMIT:
             return False
         self._jobs.put(job)

@@ -272,7 +272,7 @@ class ZenohLink:
         self.submit(declare)
 
     def drop_subscriber(self, key: str) -> None:
-        """Of samples that have come already, some may still be handed over."""
+        """End a subscription. Of samples that have come already, some may still be handed over."""
 
         def undeclare(_: zenoh.Session) -> None:
             subscriber = self._worker.subscribers.pop(key, None)

@@ -1,4 +1,4 @@
-"""When to send: soon after something has changed, and never too often."""
+"""Pace of sending: soon after something has changed, and never too often."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from typing import Final
 _OFF: Final = struct.pack("ii", 0, 0)
 _IP: Final = (socket.AF_INET, socket.AF_INET6)
 _SO_DOMAIN: Final = 39
-"""From asm-generic/socket.h; Python's socket module has no name for it."""
+"""Constant of asm-generic/socket.h; Python's socket module has no name for it."""
 
 
 class Connections:

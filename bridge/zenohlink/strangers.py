@@ -33,7 +33,7 @@ class Strangers:
         self._waiting |= dict.fromkeys({_bare(place) for place in places} - self._links, now)
 
     def take(self, now: float) -> list[str]:
-        """Those whose time is up, each once."""
+        """Strangers whose time is up, each once."""
         gone = [place for place, since in tuple(self._waiting.items()) if now - since >= PATIENCE_S]
         for place in gone:
             self._waiting.pop(place, None)

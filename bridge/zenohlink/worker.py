@@ -95,7 +95,7 @@ class Worker:
         self._thread.start()
 
     def do(self, job: Job) -> None:
-        """From any thread."""
+        """Queue a job, from any thread."""
         self._jobs.put(job)
 
     def lane(self, session: zenoh.Session) -> Lane:
@@ -217,7 +217,8 @@ class Inbox:
         self._drain_is_due = False
 
     def take_in(self, call: Callable[[], None], share: str = "") -> bool:
-        """From any thread. False: there is no room. One wake-up of the loop serves all waiting calls."""
+        """Queue a call for the loop, from any thread. False: there is no room. One wake-up of the loop serves
+        all waiting calls."""
         if share not in self._shares and len(self._shares) >= _MOST_SHARES:
             share = ""
         waiting = self._shares.setdefault(share, deque())
@@ -230,7 +231,8 @@ class Inbox:
         return True
 
     def tell(self, call: Callable[[*Arguments], object], *arguments: *Arguments) -> None:
-        """From any thread, without a limit: for the completion of what the loop itself has begun."""
+        """Queue a call for the loop, from any thread and without a limit: for the completion of what the loop
+        itself has begun."""
         try:
             self._loop.call_soon_threadsafe(call, *arguments)
         except RuntimeError:

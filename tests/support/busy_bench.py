@@ -64,7 +64,8 @@ class BusyBench(Bench):
             self.bus.status.bits = self.bits
 
     def _pass(self, until: float) -> None:
-        """To ``until``: what is on the wire arrives, everybody acts, and the next frame begins."""
+        """Pass the time to ``until``: what is on the wire arrives, everybody acts, and the next frame
+        begins."""
         self.now = until
         if self._on_wire and self._on_wire[2] <= until:
             self._arrive(*self._on_wire[:2])

@@ -44,7 +44,7 @@ class Watched:
         self.beat()
 
     def begin(self) -> None:
-        """As a bridge that has just been started."""
+        """Begin as a bridge that has just been started."""
         self.troubles = Troubles(self.image, self.layout, self.now_ms)
 
     def set(self, name: str, value: Value, quality: Quality = Quality.GOOD, reason: str = "") -> None:

@@ -89,7 +89,7 @@ def coupler(
 
 
 def connected(*numbers: int) -> str:
-    """As a DCF has it."""
+    """Modules as a DCF has them."""
     listed = "".join(f"{place}={number}\n" for place, number in enumerate(numbers, 1))
     return f"[ConnectedModules]\nNrOfEntries={len(numbers)}\n{listed}"
 

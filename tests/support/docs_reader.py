@@ -1,4 +1,4 @@
-"""Somebody who follows a page of the documentation: runs its commands, saves its files, compares outputs."""
+"""Reader of a page of the documentation: runs its commands, saves its files, compares outputs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ COMMAND_LIMIT_S = 20.0
 
 
 class Reader:
-    """Somebody who sits in the repository with .venv activated and does what a page says."""
+    """Reader who sits in the repository with .venv activated and does what a page says."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

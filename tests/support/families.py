@@ -174,7 +174,7 @@ class FamilyBridge:
         return self.call(happen)
 
     def cut(self) -> None:
-        """Nobody hears anybody any more; what is on its way arrives."""
+        """Cut the bus: nobody hears anybody any more; what is on its way arrives."""
         self.call(self._cut)
 
     def _cut(self) -> None:

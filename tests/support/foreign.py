@@ -22,7 +22,7 @@ from tests.support.invented_eds import NODE_ID, DerivedBench
 _ANSWER_S = 0.5
 _MAKER = range(0x2000, 0x6000)
 _HISTORY = 0x1003
-"""It has the sub-indices of what has happened, and nothing has."""
+"""Object with the sub-indices of what has happened, and nothing has."""
 _MOST_SHOWN = 3
 
 
@@ -39,7 +39,7 @@ class Result:
 
     @property
     def is_device(self) -> bool:
-        """It is no drive, and not half of one either, of which no mapping is made."""
+        """True if it is no drive, and not half of one either, of which no mapping is made."""
         return not self.is_drive and not (self.step == "mapping" and "describes no drive" in self.problem)
 
 
@@ -123,7 +123,7 @@ def _objects_unlike(node: GenericNode, description: Description) -> Iterator[str
 
 
 def _is_default(entry: Entry, data: bytes) -> bool:
-    """Of the maker's integers: whether the value is the one of the file, as far as it fits the type."""
+    """True if an integer of the maker's has the value of the file, as far as it fits the type."""
     plain = entry.current.at(NODE_ID) if entry.current else None
     if entry.index not in _MAKER or type(plain) is not int:
         return True
@@ -131,8 +131,8 @@ def _is_default(entry: Entry, data: bytes) -> bool:
 
 
 def table(results: Sequence[Result], *, findings: bool = False) -> str:
-    """Those that did not come all the way with the reason, and how many did; with ``findings`` what could not
-    be read of each."""
+    """Table of the files that did not come all the way with the reason, and how many did; with ``findings``
+    what could not be read of each."""
     lines: list[str] = []
     for one in results:
         if one.problem:

@@ -80,7 +80,7 @@ class JudgedPlant:
         self.looks()
 
     def goes_on(self, until_s: float, every_s: float = 1 / 32) -> None:
-        """It sends what it said last until so many seconds after the begin, with one TPDO then."""
+        """Send what the drive said last until so many seconds after the begin, with one TPDO then."""
         while self.now + every_s < BEGIN + until_s:
             self.now += every_s
             self.says(self.drive.words[0])
@@ -88,7 +88,7 @@ class JudgedPlant:
         self.says(self.drive.words[0])
 
     def is_silent(self, until_s: float) -> None:
-        """Nothing comes; the plant is called whenever it asked for it."""
+        """Send nothing; the plant is called whenever it asked for it."""
         end = BEGIN + until_s
         while (due := self.plant.next_deadline(self.now)) is not None and due <= end:
             self.now = max(due, self.now)

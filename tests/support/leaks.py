@@ -26,7 +26,7 @@ _WORKERS: Final = ("thread asyncio_", "thread password_")
 """Threads that a loop or a server starts when it first needs them, and ends with itself: that of a module may
 have them after one of its tests."""
 _LOOP_OF_MODULE: Final = "_module_scoped_runner"
-"""That of pytest-asyncio."""
+"""Fixture of pytest-asyncio."""
 
 STARTERS: Final[set[int]] = set()
 """Processes that start others for the tests: these count, too."""

@@ -37,7 +37,7 @@ def settings_of(mapping: str, **given: object) -> LegSettings:
 
 
 class Leg:
-    """Its node is operational, and the drive has been heard."""
+    """Leg of a drive that has been heard, on an operational node."""
 
     def __init__(self, settings: LegSettings) -> None:
         self.settings = settings
@@ -81,14 +81,14 @@ class Leg:
 
     @property
     def outcome(self) -> Outcome:
-        """Of the last request."""
+        """Outcome of the last request."""
         (outcome,) = (effect.outcome for effect in self.effects if isinstance(effect, Answer))
         return outcome
 
     # time
 
     def at(self, now: float) -> None:
-        """It is this time: what is due happens."""
+        """Set the time: what is due happens."""
         self.now = now
         self.happens(Time(self.state.way))
 
@@ -118,7 +118,7 @@ class Leg:
 
     @property
     def setpoints(self) -> tuple[int, ...]:
-        """As they are sent."""
+        """Setpoints as they are sent."""
         return self.state.sent.words[1:]
 
     @property

@@ -19,7 +19,7 @@ class Done:
 
     event: Event
     stage: Stage
-    """In which it was asked for."""
+    """Stage in which it was asked for."""
     after: LegState
     effects: Sequence[Effect]
     enables: bool
@@ -38,7 +38,7 @@ class Done:
 
     @property
     def is_kept(self) -> bool:
-        """It was taken, and nothing is sent for it."""
+        """True if it was taken, and nothing is sent for it."""
         return any(isinstance(effect, Answer) and not effect.outcome.forwarded for effect in self.effects)
 
     @property
@@ -64,7 +64,7 @@ class Done:
 
 
 def _reacts(done: Done) -> bool:
-    """At the trip, or where a reaction that goes on turns into the next."""
+    """True at the trip, or where a reaction that goes on turns into the next."""
     return done.has_tripped or (done.stage is Stage.RAMPING and not done.enables)
 
 

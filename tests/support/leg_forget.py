@@ -58,6 +58,6 @@ class Forgetting:
         return leg._replace(word=word, is_ours=True, is_asked=False)
 
     def _holds(self, word: int) -> bool:
-        """It would hold the motor of a drive that stands: so it matters whose stop it is."""
+        """True if the word would hold the motor of a drive that stands: so it matters whose stop it is."""
         word &= ~self._words.acknowledge_mask
         return self._words.withhold(word) != word

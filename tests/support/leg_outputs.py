@@ -29,7 +29,7 @@ class _State(NamedTuple):
     leg: LegState
     held: tuple[int, ...]
     is_stopped: bool = False
-    """Somebody else has stopped them, and the owner has sent no safe values since."""
+    """True if somebody else has stopped them, and the owner has sent no safe values since."""
 
 
 class OutputSpace:
@@ -81,7 +81,7 @@ class OutputSpace:
         self.steps = 0
 
     def _settled(self) -> None:
-        """As ``Outputs`` does it."""
+        """Settle as ``Outputs`` does it."""
         if self.channel.output.words[0] & 1:
             self.words.held = self.channel.output.words[1:]
 

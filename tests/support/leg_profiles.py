@@ -29,7 +29,7 @@ CYCLIC: Final = replace(
     setpoint={"position": 70_000},
     place=(0x2222, 0x0002),
 )
-"""Its setpoints follow the drive's own position."""
+"""Profile of a drive whose setpoints follow its own position."""
 FAMILIES: Final = (*ALL, CYCLIC)
 REACTIONS: Final = ("disable_voltage", "quick_stop", "stop", "silence", "hold")
 
@@ -70,7 +70,7 @@ _SHORT_START: Final = {
 """Enough for each stage of a start to be there when the time is up."""
 _NORDS: Final = {"owner writes a setpoint", "owner's control data are not valid"}
 _NO_WORDS: Final = {"owner's stop comes late", "rival enables", "bus back", "nothing is due"}
-"""Of these the words of another family make nothing else than NORD's."""
+"""Events with which the words of another family make nothing else than NORD's."""
 _NOBODY: Final = {
     "reader enables",
     "reader stops the drive",
@@ -136,7 +136,7 @@ _ALIVE: Final = {
     "drive follows",
     "everything is due",
 }
-"""Of a drive that asks for a life sign."""
+"""Events of a drive that asks for a life sign."""
 _LEAN: Final = _BASE - {
     "owner acknowledges by an edge",
     "owner's stop comes late",
@@ -395,7 +395,7 @@ MOST: Final = 20_000
 
 @dataclass(slots=True)
 class Figures:
-    """Of the profiles of one row. ``seconds`` are those of the processor."""
+    """Figures of the profiles of one row. ``seconds`` are those of the processor."""
 
     profiles: int = 0
     states: int = 0

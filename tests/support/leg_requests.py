@@ -18,7 +18,7 @@ _LATE_S: Final = 1.0
 
 
 class _One(Identity):
-    """Told apart as an object: every state that is looked up has some of them."""
+    """Identity told apart as an object: every state that is looked up has some of them."""
 
     __slots__ = ()
     __eq__ = object.__eq__

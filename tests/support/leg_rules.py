@@ -28,7 +28,7 @@ GONE_S: Final = 10.0
 RESTING: Final = frozenset(("ready", "inhibited", "fault", "switched on", "not ready"))
 """States of a drive that is not enabled and does not brake."""
 LED: Final = frozenset(("ready", "switched on", "enabled"))
-"""From here the enabling word is the next one."""
+"""States from which the enabling word is the next one."""
 FAULTED: Final = frozenset(("fault", "fault reaction"))
 MOVING: Final = frozenset(("enabled", "braking", "fault reaction"))
 
@@ -46,13 +46,13 @@ class Model(Memory):
         return who is owner or (self.is_cut and who.user == owner.user)
 
     def pressed(self, who: Any) -> bool:
-        """Its last telegram acknowledged by a register."""
+        """True if its last telegram acknowledged by a register."""
         last = self.pressed_by
         return who is last or (self.is_pressed_cut and who.user == last.user)
 
     def dies_at(self, who: Any, token: Any) -> float | None:
-        """When telegrams of ``who`` end to count, with this token or the one brought before; None for
-        never."""
+        """Time at which telegrams of ``who`` end to count, with this token or the one brought before; None
+        for never."""
         ages_s = self.rules.ages_s
         if ages_s is None:
             return None

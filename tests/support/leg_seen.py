@@ -32,7 +32,7 @@ class Rules(NamedTuple):
     stop_by_anyone: bool
     is_writable: bool
     ages_s: Mapping[int, float] | None = None
-    """Of the tokens of a drive that asks for a life sign."""
+    """Ages in seconds of the tokens of a drive that asks for a life sign."""
 
 
 class Times(NamedTuple):
@@ -76,9 +76,10 @@ class Seen(NamedTuple):
     is_starting: bool = False
     """A start was taken and its end has not been told."""
     is_plain: bool = False
-    """It leads a drive that was heard and has said nothing since that asks for another word than "enable"."""
+    """True if it leads a drive that was heard and has said nothing since that asks for another word than
+    "enable"."""
     is_late: bool = False
-    """When it began, the drive might still follow an enabling word from before a stop."""
+    """True if the drive, when it began, might still follow an enabling word from before a stop."""
     has_begun: bool = False
     bit: bool | None = None
     pressed_by: Any = None
@@ -94,7 +95,7 @@ class Seen(NamedTuple):
     """True while the frames on the bus enable the drive."""
     says: str = "ready"
     followed: bool = True
-    """It has said "enabled" since the last enabling word, or nothing from before counts any more."""
+    """True if it has said "enabled" since the last enabling word, or nothing from before counts any more."""
     ordered: Any = None
     """A position to be handed over."""
     handed: Any = None
@@ -126,7 +127,7 @@ class Memory:
         self.rules = rules
         self.now = now
         self.asks = False
-        """Somebody has just asked for a stop."""
+        """True if somebody has just asked for a stop."""
         (
             self.heard_at,
             self.deadline,

@@ -35,7 +35,7 @@ class Load:
     opcua_url: str
     syncs: list[float] = field(default_factory=list[float])
     reactions: list[float] = field(default_factory=list[float])
-    """When each reaction to a silent controller was on the bus, after its last telegram (s)."""
+    """Times in seconds from a silent controller's last telegram to the reaction on the bus."""
 
     def sync_lateness_s(self) -> list[float]:
         """Time by which each pause between two SYNCs was longer than its period."""

@@ -21,8 +21,8 @@ class LssSlave:
     activated_ms: int | None = None
     cannot_store: bool = False
     talks_when_found: bool = False
-    """As CANopenNode 4: in configuration state every question of a fastscan is answered, and every switch
-    state selective is taken for its own."""
+    """Behaviour of CANopenNode 4: in configuration state every question of a fastscan is answered, and every
+    switch state selective is taken for its own."""
     never_leaves: bool = False
     """The last confirmation of a fastscan does not lead to configuration state."""
     answers_all: bool = False

@@ -17,7 +17,7 @@ FUNCTIONS: Final = {
 }
 _MOST: Final = {Table.COIL: 2000, Table.DISCRETE_INPUT: 2000}
 _MOST_REGISTERS: Final = 124
-"""Of one request: 125, and an even number for values of two registers."""
+"""Registers of one request: 125, and an even number for values of two registers."""
 
 
 @dataclass(frozen=True, slots=True)

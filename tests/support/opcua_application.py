@@ -25,7 +25,7 @@ class User:
 
 
 class AtOnce:
-    """Nothing has ever waited."""
+    """Arrivals of requests that have never waited."""
 
     def arrive(self, *, crowded: bool) -> float:
         return 0.0

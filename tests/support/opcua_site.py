@@ -123,7 +123,7 @@ async def connected(server: OpcUaServer, **how: object) -> AsyncIterator[Client]
 
 
 def break_off(client: Client) -> None:
-    """As a client that has died: asyncua's own would go on asking and looking after itself for ever."""
+    """End a client as if it had died: asyncua's own would go on asking and looking after itself for ever."""
     client.disconnect_socket()
     for task in (
         client.uaclient._publish_task,

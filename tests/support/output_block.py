@@ -20,7 +20,7 @@ _NMT_STOP: Final = b"\x02\x14"
 
 
 class Block(PdoNode):
-    """That of ``io_block``. ``refuses_reading`` are indices that it aborts, ``mute`` those that it does not
+    """Node of ``io_block``. ``refuses_reading`` are indices that it aborts, ``mute`` those that it does not
     answer."""
 
     def __init__(self) -> None:

@@ -59,7 +59,7 @@ class QuickNode:
 
     @property
     def next_at(self) -> float:
-        """When it has something to send."""
+        """Time at which it has something to send."""
         return min(self.heartbeat_at, self._late[0][0] if self._late else float("inf"))
 
     def on_time(self, now: float) -> None:

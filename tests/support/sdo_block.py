@@ -124,7 +124,7 @@ class Asker:
         return [frame.data.hex(" ").upper() for frame in self.channel.take_frames()]
 
     def silence(self) -> None:
-        """Nothing is heard for as long as the channel waits."""
+        """Let as much time pass without an answer as the channel waits."""
         deadline = self.channel.next_deadline()
         assert deadline is not None
         self.now = deadline

@@ -102,7 +102,8 @@ def _functions(module: ModuleType) -> Iterator[tuple[str, FunctionType]]:
 
 
 class _Loop:
-    """In place of pytest's own: each fault has a process of its own, with tests that are collected."""
+    """Replacement of pytest's own loop: each fault has a process of its own, with tests that are
+    collected."""
 
     def __init__(self, faults: tuple[Seeded, ...]) -> None:
         self._faults = faults

@@ -19,7 +19,7 @@ SCALED = "parameters = { P105 = 50.0, P112 = 10.0 }"
 """Scales of setpoints and currents: P105 in Hz, P112 in A."""
 
 ACCEPTED = 'accepts = { runs_on = "nothing moves in a test" }'
-"""Of a drive whose simulation does not watch the bridge: as it leaves the works."""
+"""Acceptance of a drive whose simulation does not watch the bridge: as it leaves the works."""
 
 family = cache(load_family)
 
@@ -104,7 +104,7 @@ def plant_of(text: str, mapping: str = FAMILY) -> Plant:
 
 
 def has_default_meanings(plant: Plant) -> None:
-    """As if the drives had been asked, and are as their mapping takes them to be."""
+    """Mark the drives as asked, and as their mapping takes them to be."""
     for drive in plant.drives.values():
         drive.channel.meanings.take_defaults()
         drive.compile()

@@ -16,7 +16,7 @@ PAUSE_S = 1 / 8
 OFF_S, RAMP_S, SILENCE_S = 0.5, 4.0, 6.0
 BOUNDS = Bounds(OFF_S, RAMP_S, SILENCE_S)
 UNWATCHED = Bounds(OFF_S, RAMP_S)
-"""Nobody knows whether the drive stops when we fall silent."""
+"""Bounds of a drive of which nobody knows whether it stops when we fall silent."""
 END_S = 48.0
 
 
@@ -55,7 +55,7 @@ class Play:
     heard_at: float | None = None
     shown: Says | None = None
     looks: list[float] = field(default_factory=list[float])
-    """When it was asked."""
+    """Times at which it was asked."""
     verdicts: list[Verdict] = field(default_factory=list[Verdict])
 
     def run(self, script: Script, end: float = END_S) -> Play:

@@ -35,14 +35,14 @@ class Memory(NamedTuple):
     says: str = "NOTHING"
     left_at: int = -OFF
     stopping_at: int = -RAMP
-    """When the drive has come on a ramp, or it was told while it was on one, or was heard again."""
+    """Time at which the drive has come on a ramp, or was told while it was on one, or was heard again."""
     is_deaf: bool = False
     """The drive has said nothing but *enabled* since the bound began, and each tick had its telegram."""
     has_obeyed: bool = False
     """The drive has said anything else since the stop was handed over, or said so then."""
     outcome: str = "NONE"
     has_ignored: bool = False
-    """It has ignored a stop since a word that enables, and followed none since."""
+    """True if it has ignored a stop since a word that enables, and followed none since."""
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ def _tell_end(pid: int, tell: int) -> None:
 
 
 def become(asked: dict[str, Any], files: list[int]) -> None:
-    """As if this had just been started by ``python`` with these arguments."""
+    """Become a process that ``python`` has just started with these arguments."""
     os.setpgid(0, 0)
     output, error, _, *others = files
     _have(dict(zip((1, 2, *asked["files"]), (output, error, *others), strict=True)))

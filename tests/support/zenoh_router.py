@@ -15,7 +15,7 @@ _SCRIPT = Path(__file__).parents[1] / "peers" / "zenoh_router.py"
 
 @asynccontextmanager
 async def zenoh_router(settings: str = "{}") -> AsyncIterator[str]:
-    """Its endpoint. ``settings`` are zenoh's, in JSON5."""
+    """Endpoint of a router. ``settings`` are zenoh's, in JSON5."""
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     process = await asyncio.create_subprocess_exec(
         sys.executable,

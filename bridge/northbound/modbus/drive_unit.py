@@ -170,7 +170,7 @@ class DriveUnit(Unit):
             refuse_quality(qualities[0])
 
     def _input_words(self, start: int, end: int, quality: Quality) -> list[int]:
-        """Those of the input registers 0 … 31 that are in the range."""
+        """Words of the input registers 0 … 31 that are in the range."""
         words: list[int] = []
         if start < DIAGNOSTICS:
             refuse_quality(quality)

@@ -36,11 +36,11 @@ class Rounds:
         self._turns.enter(one, source)
 
     def leave(self, one: Served) -> None:
-        """It is not served any more. May be called again."""
+        """End serving ``one``. May be called again."""
         self._turns.leave(one)
 
     def wish(self, one: Served) -> None:
-        """It has requests or answers: it is served at once where nobody waits, else in its turn."""
+        """Serve ``one``, which has requests or answers, at once where nobody waits, else in its turn."""
         self._turns.wish(one)
         if not self._is_serving:
             self._serve()

@@ -54,7 +54,7 @@ class ModbusServer:
         self.rounds = Rounds(lambda go_on: asyncio.get_running_loop().call_soon(go_on))
         """Turns in which requests are handled."""
         self._writers: dict[str, set[Session]] = {}
-        """Those of each address that have written."""
+        """Sessions of each address that have written."""
         self._server: asyncio.Server | None = None
         self._socket: socket.socket | None = None
 
@@ -128,7 +128,7 @@ class ModbusServer:
         return identity
 
     def leave(self, session: Session) -> None:
-        """Its client has closed the connection, or it is closed for another reason."""
+        """Forget a session: its client has closed the connection, or it is closed for another reason."""
         self._forget(session)
         identity = session.identity
         if identity is None:
@@ -177,7 +177,7 @@ class ModbusServer:
         return Stage.GREETED if session.has_spoken else Stage.CONNECTED
 
     def _end(self, session: Session) -> None:
-        """It makes room for another one."""
+        """Close a session to make room for another one."""
         self._forget(session)
         session.close()
 

@@ -142,8 +142,8 @@ class Conversation:
         return True
 
     def _arrival(self, place: int) -> float:
-        """When the frame that ends at this place in the stream was received. To be called in order of
-        place."""
+        """Time at which the frame that ends at this place in the stream was received. To be called in order
+        of place."""
         earlier = self._earlier
         while earlier and earlier[0][0] < place:
             earlier.popleft()
@@ -156,7 +156,7 @@ class Conversation:
 
 
 class Clients(Protocol):
-    """Those of the server: who may connect, and whose turn it is."""
+    """Clients of the server: who may connect, and whose turn it is."""
 
     @property
     def rounds(self) -> Rounds: ...
@@ -190,7 +190,7 @@ class Session(asyncio.BufferedProtocol):
         self.identity: Identity | None = None
         """The identity given by the server; None until the client is admitted."""
         self.visitor: Visitor | None = None
-        """Its place among the connections, while it has one."""
+        """Place among the connections, while it has one."""
         self.has_spoken = False
         self._transport: asyncio.Transport | None = None
         self._stalled: asyncio.TimerHandle | None = None
@@ -206,7 +206,8 @@ class Session(asyncio.BufferedProtocol):
 
     @property
     def has_been_closed(self) -> bool:
-        """Its client has closed the connection, whether that was read or not; as far as the kernel tells."""
+        """True if its client has closed the connection, whether that was read or not; as far as the kernel
+        tells."""
         transport = self._transport
         if transport is None or transport.is_closing():
             return True

@@ -43,7 +43,7 @@ OUTPUT_METHODS: Final = (
     Action.RELEASE_CONTROL,
     Action.KEEP_ALIVE,
 )
-"""Of the outputs of a node that is no drive."""
+"""Methods of the outputs of a node that is no drive."""
 _WITHOUT_PAYLOAD: Final = (Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE, Action.RELEASE_CONTROL)
 """These need no payload. Everything else does, so that reading a key with a plain get cannot start or
 acknowledge anything."""
@@ -57,7 +57,7 @@ _PARAMETER: Final = "/parameter/"
 _CACHED_MS: Final = 2**31
 """Any age: whatever was read last."""
 _LONGEST_MS: Final = 2**32 - 1
-"""As OPC UA's UInt32 argument."""
+"""Range of OPC UA's UInt32 argument."""
 _HEXADECIMAL: Final = re.compile(r"0[xX][0-9A-Fa-f]{1,8}")
 
 

@@ -22,7 +22,7 @@ class _Answered(Generic[Get]):
 
 
 class Gets(Generic[Get]):
-    """Those that are being answered. Whoever has the most of them makes room for who has at least two less,
+    """Gets that are being answered. Whoever has the most of them makes room for who has at least two less,
     and one that is read slowly for anybody; so no asker keeps another waiting, and each gets the same share.
 
     ``asker`` is what the client's zenoh session says it is. One that lies shares its turns with another, or
@@ -42,7 +42,7 @@ class Gets(Generic[Get]):
         return len(self._answered) < AT_ONCE or self._ending(asker, now) is not None
 
     def add(self, get: Get, asker: str, now: float) -> Get | None:
-        """To be called where there is room. The one that has to end for it, which is forgotten."""
+        """Add a get where there is room. Returns the one that has to end for it, which is forgotten."""
         ending = self._ending(asker, now) if len(self._answered) >= AT_ONCE else None
         if ending:
             self._answered.remove(ending)
@@ -50,7 +50,7 @@ class Gets(Generic[Get]):
         return ending.get if ending else None
 
     def done(self, get: Get) -> None:
-        """It may have been forgotten already."""
+        """Remove a get, which may have been forgotten already."""
         self._answered = [one for one in self._answered if one.get != get]
 
     def _ending(self, asker: str, now: float) -> _Answered[Get] | None:

@@ -107,7 +107,7 @@ class KeySpace:
         return self._of_owner.get(_owner(self.tail(key)), ())
 
     def share(self, key: str, payload: bytes | None) -> str:
-        """In whose queue a query or put waits. zenoh does not tell who sent it, but each user has command
+        """Queue in which a query or put waits. zenoh does not tell who sent it, but each user has command
         keys of its own; and readers must not crowd out commands."""
         words = self.tail(key).split("/")
         if words[:2] == ["@", "controller"]:

@@ -41,7 +41,7 @@ class Publication:
         self._feed = self._image.feed(self._pace.wake)
         self._has_readers = [False] * len(space.owners)
         self._held: list[dict[int, None]] = [{} for _ in space.owners]
-        """Of each owner, what has changed since nobody reads it."""
+        """Changes of each owner since nobody reads it."""
         self._bridge = self._image.index[_BRIDGE]
         self._tokens = {
             index: space.node_token(name.removesuffix(_NODE_STATE))

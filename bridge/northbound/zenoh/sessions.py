@@ -14,7 +14,7 @@ _MOST: Final = 256
 
 
 class Sessions:
-    """Those that have asked."""
+    """Sessions that have asked."""
 
     def __init__(self) -> None:
         self._seen: dict[tuple[str, str], Identity] = {}

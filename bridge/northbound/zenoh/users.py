@@ -33,8 +33,9 @@ class Login:
 
 @dataclass(frozen=True, slots=True)
 class Users:
-    """If links authenticate, ``controllers`` have command keys of their own; otherwise clients are who they
-    say they are. ``sole`` is the only user beside the bridge's own, if there can be no other."""
+    """Users of a site. If links authenticate, ``controllers`` have command keys of their own; otherwise
+    clients are who they say they are. ``sole`` is the only user beside the bridge's own, if there can be no
+    other."""
 
     login: Login | None = None
     are_proved: bool = False

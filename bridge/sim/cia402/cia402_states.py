@@ -73,7 +73,7 @@ TRANSITIONS: Final = {
     (State.QUICK_STOP_ACTIVE, Command.DISABLE_VOLTAGE): (12, State.SWITCH_ON_DISABLED),
     (State.QUICK_STOP_ACTIVE, Command.ENABLE_OPERATION): (16, State.ENABLED),
 }
-"""By state and command. 0, 1, 13, 14 and 15 depend on no command."""
+"""Transitions by state and command. 0, 1, 13, 14 and 15 depend on no command."""
 
 
 def command_of(control_word: int) -> Command:

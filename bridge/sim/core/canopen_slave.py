@@ -158,7 +158,7 @@ class CanopenSlave:
             self._send_due_tpdos(now)
 
     def next_deadline(self) -> float | None:
-        """When ``poll`` has to be called next if nothing else happens."""
+        """Time at which ``poll`` has to be called next if nothing else happens."""
         if self.state is NmtState.INITIALISING:
             return None
         deadlines = [self._error_control.next_deadline()]
@@ -201,7 +201,7 @@ class CanopenSlave:
 
     @property
     def _sdo_channels(self) -> list[SdoSettings]:
-        """Those that are in effect."""
+        """SDO channels that are in effect."""
         return self._store.current.sdo
 
     def _objects_of(self, number: int) -> Dictionary:

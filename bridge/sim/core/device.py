@@ -30,9 +30,10 @@ class SimulatedDevice(Application):
         self._now = 0.0
         self._injected: list[Callable[[], None]] = []
         self._due: float | None = None
-        """When ``_finish`` has something to do although there is no news."""
+        """Time at which ``_finish`` has something to do although there is no news."""
         self._is_steady = False
-        """Nothing has changed since time was last passed: a frame of the same moment need not do it again."""
+        """True if nothing has changed since time was last passed: a frame of the same moment need not do it
+        again."""
         self._slave_hears: frozenset[int] | None = None
         """Identifiers of the slave for which ``heard`` was made."""
         self._habits: HabitPlayer | None = None
@@ -63,7 +64,7 @@ class SimulatedDevice(Application):
         return self.slave.hears()
 
     def _finish_due(self) -> float | None:
-        """When ``_finish`` has something to do although there is no news."""
+        """Time at which ``_finish`` has something to do although there is no news."""
         return self.slave.next_deadline()
 
     @property
@@ -103,7 +104,7 @@ class SimulatedDevice(Application):
         self._pass_through_habits()
 
     def next_deadline(self) -> float | None:
-        """When ``on_time`` has to be called next, or None."""
+        """Time at which ``on_time`` has to be called next, or None."""
         if self._injected:
             return self._now
         if not self.powered:
@@ -157,7 +158,7 @@ class SimulatedDevice(Application):
     # What a test or a demonstration does to any node.
 
     def adopt_habits(self, rules: Sequence[Rule]) -> None:
-        """From now on its frames differ from the standard by these rules."""
+        """Apply rules by which its frames differ from the standard from now on."""
         self._habits = HabitPlayer(self.node_id, rules)
 
     def silence(self) -> None:

@@ -18,8 +18,8 @@ from bridge.config.model import Table
 from bridge.tomlfile import TomlFile
 
 FrameKind = Literal["request", "answer", "error_control", "emcy", "tpdo"]
-"""Of the node: SDO requests to it and answers of its first SDO server, its heartbeats, boot-up messages and
-answers to node guarding, its emergency messages, and its TPDOs."""
+"""Frames of a node: SDO requests to it and answers of its first SDO server, its heartbeats, boot-up messages
+and answers to node guarding, its emergency messages, and its TPDOs."""
 
 _FOLDER: Final = Path(__file__).parents[1] / "habits"
 _TEMPLATE: Final = re.compile(r"(\.\.|[0-9A-Fa-f]{2})( (\.\.|[0-9A-Fa-f]{2})){0,7}")

@@ -28,7 +28,7 @@ class HabitPlayer:
         self._begins_block = False
         """The last transfer that was begun is a block download."""
         self._receives_block = False
-        """It is under way: its segments look like commands."""
+        """True while a block is received: its segments look like commands."""
 
     def on_frame(self, frame: Frame, now: float) -> Frame | None:
         """Frame from the bus as the node gets it; None where it gets nothing."""

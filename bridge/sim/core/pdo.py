@@ -1,4 +1,5 @@
-"""When a PDO is sent and when a received one takes effect (BU 2500 §6.5.6, CiA 301 §7.5.2.37)."""
+"""Times at which a PDO is sent and at which a received one takes effect (BU 2500 §6.5.6, CiA 301
+§7.5.2.37)."""
 
 from __future__ import annotations
 
@@ -58,7 +59,7 @@ class Tpdo:
         self._waiting = False
 
     def next_deadline(self, settings: PdoSettings) -> float | None:
-        """When an event-driven PDO is due if nothing changes until then."""
+        """Time at which an event-driven PDO is due if nothing changes until then."""
         if settings.transmission_type < EVENT_MIN or self._sent_at is None:
             return None
         free_at = self._inhibited_until(settings, self._sent_at)
@@ -107,7 +108,7 @@ class ActiveTpdo:
     entries: tuple[Entry, ...]
 
     def payload(self) -> bytes:
-        """Its data at this moment."""
+        """Data of the PDO at this moment."""
         return b"".join([entry.upload() for entry in self.entries])
 
 

@@ -44,7 +44,7 @@ class CobId:
 
     @classmethod
     def of(cls, word: int) -> CobId:
-        """From the value of its object."""
+        """COB-ID of its object's value."""
         return CobId(word & COB_ID_MASK, not word & DISABLED)
 
     @property

@@ -61,7 +61,7 @@ class SlavePlan:
 
     @cached_property
     def rpdos_by_cob_id(self) -> dict[int, list[MappedRpdo]]:
-        """Those that are on."""
+        """Enabled RPDOs by COB-ID."""
         found: dict[int, list[MappedRpdo]] = {}
         for rpdo in self.rpdos:
             if rpdo.settings.enabled:
@@ -70,7 +70,7 @@ class SlavePlan:
 
     @cached_property
     def tpdos(self) -> tuple[ActiveTpdo, ...]:
-        """Those that are on and carry anything."""
+        """Enabled TPDOs with at least one mapped object."""
         return tuple(
             ActiveTpdo(tpdo, pdo, entries_of(self._objects_of(number), pdo))
             for number, (tpdo, pdo) in enumerate(zip(self._tpdos, self._settings.tpdo, strict=True))

@@ -10,7 +10,8 @@ NO_RESPONSE: Final = 255
 
 
 class Watch:
-    """From its first sign on, the next must come within ``time_s``. With 0 nothing is watched."""
+    """Watch over a sign: from the first one on, the next must come within ``time_s``. With 0 nothing is
+    watched."""
 
     def __init__(self, time_s: Callable[[], float]) -> None:
         self._time_s = time_s
@@ -74,7 +75,7 @@ class HeartbeatConsumer(Watch):
 
 
 class Cycle:
-    """Something that is sent every ``period_s``; 0 is never."""
+    """Cycle in which something is sent every ``period_s``; 0 is never."""
 
     def __init__(self, period_s: Callable[[], float]) -> None:
         self._wanted_s = period_s

@@ -1,4 +1,4 @@
-"""When something is due: a common tick for everything that moves, and the first of several deadlines."""
+"""Due times: a common tick for everything that moves, and the first of several deadlines."""
 
 from __future__ import annotations
 

@@ -210,7 +210,7 @@ class GenericNode(SimulatedDevice):
         return self.axes[0].status_word if self.axes else 0
 
     def _add_communication(self, everything: Dictionary) -> set[At]:
-        """Those that the node has. Returns them all."""
+        """Add the communication objects that the node has, and return them all."""
         taken: set[At] = set()
         for index in range(0x1000, 0x1300):
             if not everything.has_object(index):

@@ -89,7 +89,7 @@ class PdoPlan:
     event_timer_ms: int = 0
     entries: int = LEAST_ENTRIES
     fixed_mapping: bool = False
-    """It cannot be written."""
+    """True if the mapping cannot be written."""
     fixed_cob_id: bool = False
 
 
@@ -115,7 +115,7 @@ class NodePlan:
         return replace(self, objects=objects)
 
     def communication(self, node_id: int) -> CommunicationSettings:
-        """Its communication objects as delivered."""
+        """Communication objects as delivered."""
         return CommunicationSettings(
             emcy=CobId(0x80 + node_id),
             sdo=[SdoSettings.at(0x600 + node_id, 0x580 + node_id)],

@@ -63,7 +63,7 @@ class LenzeObjects:
     # What the objects and their codes do.
 
     def pdo(self, place: int) -> PdoSettings:
-        """By the place in C00354: RPDO1, TPDO1, RPDO2, TPDO2."""
+        """PDO by the place in C00354: RPDO1, TPDO1, RPDO2, TPDO2."""
         return self._rules.pdo(place // 2, receives=not place % 2)
 
     def set_pdo_cob_id(self, place: int, value: int) -> None:
@@ -86,7 +86,7 @@ class LenzeObjects:
         types[place // 2] = value
 
     def set_inhibit_ms(self, number: int, value_ms: int) -> None:
-        """Of a TPDO, only while it is off."""
+        """Set the inhibit time of a TPDO, only while it is off."""
         pdo = self.pdo(2 * number + 1)
         if pdo.enabled:
             raise SdoAbort(AbortCode.WRONG_STATE)

@@ -76,7 +76,7 @@ class BusWatch:
         self._watch(Watched.HEARTBEAT, False, Reaction.NONE, HEARTBEAT_LOST)
 
     def check_length(self, length: int, expected: int) -> None:
-        """Of an RPDO, in bytes (§10.4)."""
+        """Check the length of an RPDO, in bytes (§10.4)."""
         reaction = self._codes().bus_reactions[0]
         self._watch(Watched.FAULTY_TELEGRAM, length < expected, reaction, PDO_TOO_SHORT)
         self._reporter.communication_error(PDO_TOO_LONG, is_there=length > expected)
@@ -116,7 +116,7 @@ class BusWatch:
         return Watch(lambda: self._codes().rpdo_time_ms[number] / 1000)
 
     def _watch(self, number: Watched, present: bool, reaction: int, code: int = 0) -> None:
-        """Something supervised has come or gone: ``reaction`` of C00592, and EMCY ``code``."""
+        """Note that something supervised has come or gone: ``reaction`` of C00592, and EMCY ``code``."""
         if present:
             self._drive.error(number, Reaction(reaction))
         else:

@@ -92,4 +92,4 @@ NORD: Final = {
     **dict.fromkeys(_names("nord/sk-5xxe-rj45", ["encoder"]), _single(RJ45_5XX)),
     **dict.fromkeys(_names("nord/sk-54xe-rj45", ["encoder"]), _single(RJ45_54X)),
 }
-"""By mapping. Where mappings differ for the same device, as by the profile, the boot-up sets it."""
+"""Devices by mapping. Where mappings differ for the same device, as by the profile, the boot-up sets it."""

@@ -292,7 +292,7 @@ class NordDrive:
         return self.output_hz == self._goal_hz()
 
     def _is_under_way(self) -> bool:
-        """To a position, with a speed to go there."""
+        """True on the way to a position, with a speed to go there."""
         goal = self._position_goal() if self._runs else None
         return goal is not None and self.position_increments != goal and self._positioning_hz() > 0
 

@@ -25,7 +25,7 @@ from bridge.sim.nord.nord_supervision import FaultDisplay
 
 Kind = Literal["SK CU4-CAO", "SK TU4-CAO"]
 KINDS: Final[tuple[Kind, ...]] = ("SK CU4-CAO", "SK TU4-CAO")
-"""In the order of P172."""
+"""Kinds in the order of P172."""
 _SOFTWARE: Final = (12, 0, 0)
 """P171: version 1.2, revision 0, no special version."""
 _BAUD_250: Final = 1

@@ -74,7 +74,7 @@ class NordNode(SimulatedDevice):
 
     @abstractmethod
     def _present_faults(self) -> Sequence[int | None]:
-        """Of each drive, in tenths; None where the node cannot see it."""
+        """Fault of each drive, in tenths; None where the node cannot see it."""
 
     # The application of the CANopen slave, as far as all have it in common.
 

@@ -129,7 +129,7 @@ class DriveParameters:
                 self._ram[number, one, parameter_set] = raw
 
     def at_keypad(self, number: int, raw: int, *, element: int = 1, parameter_set: int = 1) -> None:
-        """Somebody sets it at the drive itself: it goes to the EEPROM, unless P560 says RAM only."""
+        """Set a parameter at the drive itself: it goes to the EEPROM, unless P560 says RAM only."""
         self._ram[number, element, parameter_set] = raw
         if self.raw(_SAVE_TO_EEPROM) == 1:
             self._eeprom[number, element, parameter_set] = raw

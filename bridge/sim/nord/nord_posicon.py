@@ -38,7 +38,7 @@ class PositionControl(IntEnum):
     OFF = 0
     AT_P105 = 1
     AT_SETPOINT = 2
-    """As fast as the set frequency says."""
+    """Speed of the set frequency."""
 
 
 def commission(parameters: DriveParameters) -> None:

@@ -84,7 +84,7 @@ RJ45_54X: Final = Variant(
 
 
 def factory_settings(node_id: int, variant: Variant) -> CommunicationSettings:
-    """As delivered: one SDO channel, the PDOs of §6.5.7."""
+    """Settings as delivered: one SDO channel, the PDOs of §6.5.7."""
     return CommunicationSettings(
         emcy=CobId(0x80 + node_id),
         sdo=[SdoSettings.at(0x600 + node_id, 0x580 + node_id)],

@@ -15,7 +15,7 @@ from bridge.sim.core.ticks import next_tick
 
 SELF_TEST_S: Final = 0.2
 CLOSING_S: Final = 0.02
-"""From the enable to speed control: the duration of state 3."""
+"""Time in seconds from the enable to speed control: the duration of state 3."""
 FAULT_REACTION_S: Final = 0.02
 COAST_S: Final = 1.0
 """Run-down from C01 to standstill without voltage."""
@@ -72,7 +72,7 @@ class StoeberAxis:
         self.state = AxisState.SELF_TEST
         self.control = 0
         self.setpoint = 0
-        """In 0.1 % of C01."""
+        """Setpoint in 0.1 % of C01."""
         self.speed_rpm = 0.0
         self._parameters = parameters
         self._may_switch_on = may_switch_on
@@ -82,7 +82,7 @@ class StoeberAxis:
 
     @property
     def status_byte(self) -> int:
-        """As E200: enabled, error, quick stop, axis, active, local, handshake."""
+        """Status as in E200: enabled, error, quick stop, axis, active, local, handshake."""
         byte = 0x01 if self.state is AxisState.ENABLED else 0
         byte |= 0x02 if self.state in FAULTY else 0
         byte |= 0x04 if self._is_stopping else 0
@@ -92,7 +92,7 @@ class StoeberAxis:
 
     @property
     def _is_stopping(self) -> bool:
-        """On the ramp of the quick stop, which a fault may use, too."""
+        """True on the ramp of the quick stop, which a fault may use, too."""
         reacts = self.state is AxisState.FAULT_REACTION and self._brakes
         return self.state is AxisState.QUICK_STOP or reacts
 

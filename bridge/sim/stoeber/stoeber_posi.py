@@ -140,7 +140,7 @@ class PositioningAxis(StoeberAxis):
             self._arrived()
 
     def _is_blocked(self, goal: float) -> bool:
-        """At a limit switch, and on the way beyond it."""
+        """True at a limit switch, and on the way beyond it."""
         way = goal - self.motor.position
         return (way > 0 and self.place >= LIMIT_AT) or (way < 0 and self.place <= -LIMIT_AT)
 

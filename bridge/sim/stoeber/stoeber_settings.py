@@ -80,7 +80,8 @@ def factory_settings(axes: int) -> StoeberSettings:
 def factory_communication(
     node_id: int, axes: int, *, mapped: bool, positions: bool = False
 ) -> CommunicationSettings:
-    """As delivered; ``mapped``: with an application downloaded from POSITool, which ``positions`` or not."""
+    """Settings as delivered; ``mapped``: with an application downloaded from POSITool, which ``positions`` or
+    not."""
     received, sent = [RECEIVED], [SENT]
     if positions:
         received, sent = [POSI_RECEIVED, POSI_RAMPS], [POSI_SENT]

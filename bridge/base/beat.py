@@ -1,5 +1,7 @@
-"""The beat on which OPC UA clients are told of changes, in both processes: the bus process tells the front
-right before it looks, and the front tells its clients right after. Else each of them would wait for the next.
+"""Publishing grid shared by both processes.
+
+The bus process sends changes to the OPC UA front right before the front looks for them, and the front
+publishes to its clients right after; otherwise each would wait for the next.
 
 Times are of the monotonic clock, which is also the event loop's and the same in all processes.
 """
@@ -10,11 +12,11 @@ import math
 from typing import Final
 
 LOOK_EVERY_S: Final = 0.05
-"""As long as the shortest publishing interval: more often, nobody would see it."""
-_BEFORE_S: Final = 0.006
-"""Which a change takes to the front, about."""
-_BEHIND_S: Final = 0.008
-"""Which a look takes, about. What it has not seen by then is told a cycle later."""
+"""Shortest publishing interval: more often, nobody would see it."""
+_TO_FRONT_S: Final = 0.006
+"""Typical delay of a change on the link to the front."""
+_LOOK_S: Final = 0.008
+"""Typical duration of one look. Changes that it misses are sent one cycle later."""
 
 
 def next_look(now: float) -> float:
@@ -24,9 +26,9 @@ def next_look(now: float) -> float:
 
 def next_before_look(now: float) -> float:
     """The first moment after ``now`` from which something reaches the front right before it looks."""
-    return next_look(now + _BEFORE_S) - _BEFORE_S
+    return next_look(now + _TO_FRONT_S) - _TO_FRONT_S
 
 
 def cycle_by(at: float) -> float:
     """The last moment until ``at`` that is right behind a look: publishing cycles are then."""
-    return math.floor((at - _BEHIND_S) / LOOK_EVERY_S) * LOOK_EVERY_S + _BEHIND_S
+    return math.floor((at - _LOOK_S) / LOOK_EVERY_S) * LOOK_EVERY_S + _LOOK_S

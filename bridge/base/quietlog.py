@@ -22,8 +22,9 @@ A_FEW: Final = 3
 
 
 def about(source: str, kind: Hashable = None, *, first: int = 1) -> dict[str, Hashable]:
-    """For ``extra`` of a call that others bring about: who or what it is about, and how many are told before
-    they are counted. Lines of one call are of one kind unless ``kind`` tells them apart."""
+    """Source of a log line, for ``extra`` of a call that others can cause: who or what it is about, and how
+    many lines are written before they are counted. Lines of one call are of one kind unless ``kind`` tells
+    them apart."""
     return {_SOURCE: source, _KIND: kind, _FIRST: first}
 
 

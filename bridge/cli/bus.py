@@ -67,7 +67,7 @@ def takes_bus(command: Callable[..., None]) -> Callable[..., None]:
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class CliBus:
     """The bus that a command works on. Without a site ``families`` is empty and ``is_of_site`` false.
 
     A bit rate that was not given is assumed, and not compared with the interface's.
@@ -123,7 +123,7 @@ class Line:
         return node_id
 
 
-def choose_line(site: Path | None, which: BusChoice, *, is_recorded: bool = False) -> Line:
+def choose_line(site: Path | None, which: BusChoice, *, is_recorded: bool = False) -> CliBus:
     """The bus that the options name; one that was recorded has no interface. Raises ``BadParameter`` if they
     name none or two."""
     bus = which.bus
@@ -138,7 +138,7 @@ def choose_line(site: Path | None, which: BusChoice, *, is_recorded: bool = Fals
         table = BusTable.model_validate(content | ({"bitrate": which.bitrate} if which.bitrate else {}))
         if not is_recorded:
             not_virtual(table)
-        return Line(table, {}, is_of_site=False, states_bitrate=which.bitrate is not None)
+        return CliBus(table, {}, is_of_site=False, states_bitrate=which.bitrate is not None)
     if which != BusChoice(bus):
         raise typer.BadParameter("SITE says interface, channel and bit rate: leave the options out")
     project = load_project(site)
@@ -149,7 +149,7 @@ def choose_line(site: Path | None, which: BusChoice, *, is_recorded: bool = Fals
         raise typer.BadParameter(f"which bus? Give --bus, one of {', '.join(tables)}")
     state_dir = Path(project.site.site.state_dir)
     table = tables[bus] if is_recorded else not_virtual(tables[bus])
-    return Line(table, project.families, is_of_site=True, state_dir=state_dir)
+    return CliBus(table, project.families, is_of_site=True, state_dir=state_dir)
 
 
 def not_virtual(table: BusTable) -> BusTable:
@@ -206,7 +206,7 @@ async def run_errand(bus: Bus, errand: Errand, watch: Callable[[], None] = lambd
 
 
 def carry_out(
-    line: Line,
+    line: CliBus,
     make: Callable[[float], _E],
     watch: Callable[[_E], None] = lambda errand: None,
     *,

@@ -17,7 +17,7 @@ from bridge import __version__
 from bridge.base.errors import OperationFailed
 from bridge.canopen.lss import LssAddress, LssError
 from bridge.cli import drop_report, drop_test
-from bridge.cli.bus import AsJson, Line, carry_out, print_table, tell
+from bridge.cli.bus import AsJson, CliBus, carry_out, print_table, tell
 from bridge.cli.parameter_drive import SiteArgument, Target, Yes, find
 from bridge.cli.terminal import progress
 from bridge.errands.conformance import Conformance, Slave, Verdict
@@ -62,7 +62,7 @@ def conformance(
     identity: dict[str, int] = {}
     targets[0].run(lambda now: backups.identify(identity))
     slave = Slave(table.id, table.sdo_timeout_ms / 1000)
-    line = Line(bus, project.families, is_of_site=True)
+    line = CliBus(bus, project.families, is_of_site=True)
     try:
         _try_out(line, node, slave, reset=reset)
     finally:
@@ -87,7 +87,7 @@ def conformance(
         raise typer.Exit(OperationFailed.exit_code)
 
 
-def _try_out(line: Line, node: str, slave: Slave, *, reset: bool) -> None:
+def _try_out(line: CliBus, node: str, slave: Slave, *, reset: bool) -> None:
     with progress(node) as show:
         errand = carry_out(
             line,

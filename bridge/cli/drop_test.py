@@ -17,7 +17,7 @@ from bridge import __version__
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
 from bridge.cli import drop_report
-from bridge.cli.bus import AsJson, Line, carry_out, not_virtual, tell
+from bridge.cli.bus import AsJson, CliBus, carry_out, not_virtual, tell
 from bridge.cli.stopping import until_stopped
 from bridge.command import Plant
 from bridge.config import BusTable, NodeTable, Site
@@ -119,7 +119,7 @@ def refuse_company(project: Project, bus: BusTable, node: NodeTable) -> None:
     family = project.families[node.mapping_key]
     commands = command_ids(node, family)
     listen_s = max(_LISTEN_S, 3 * bus.heartbeat_ms / 1000)
-    line = Line(bus, project.families, is_of_site=True)
+    line = CliBus(bus, project.families, is_of_site=True)
     heard = carry_out(line, lambda now: ForeignMaster(bus.master_node_id, commands, now, listen_s))
     if heard.found:
         raise OperationFailed(f"another master is active on {bus.name}: {heard.found}; stop it first")

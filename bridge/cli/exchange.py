@@ -16,7 +16,7 @@ import typer
 from bridge import __version__
 from bridge.base.errors import OperationFailed
 from bridge.cli import drop_report, drop_test, exchange_report
-from bridge.cli.bus import AsJson, Line, carry_out, tell
+from bridge.cli.bus import AsJson, CliBus, carry_out, tell
 from bridge.cli.exchange_report import Exchange
 from bridge.cli.own_check import audit_drives, audit_facts
 from bridge.cli.parameter_backup import (
@@ -182,7 +182,7 @@ def _judge(
 def _open_channels(project: Project, bus: BusTable, name: str) -> None:
     """A new interface may have only its first SDO channel open, which does not reach all of its drives."""
     node = Plant(project.site, project.families, __version__).nodes[name]
-    errand = carry_out(Line(bus, project.families, is_of_site=True), lambda now: OpenChannels(node, now))
+    errand = carry_out(CliBus(bus, project.families, is_of_site=True), lambda now: OpenChannels(node, now))
     for note in errand.notes:
         tell(f"{name}: {note}")
     if errand.failure:

@@ -14,7 +14,7 @@ from typing import Final
 
 import msgspec
 
-from bridge.cli.bus import Line, tell
+from bridge.cli.bus import CliBus, tell
 
 NAME: Final = "sdo-servers.json"
 _KEPT_S: Final = 30 * 86_400.0
@@ -37,7 +37,7 @@ class _File(msgspec.Struct):
 class KnownServers:
     """The servers of one bus."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: CliBus) -> None:
         folder = line.state_dir or _own_folder()
         self.path = folder / NAME
         self._bus = line.table.name if line.is_of_site else f"{line.table.interface} {line.table.channel}"

@@ -13,7 +13,7 @@ import typer
 from bridge.base.errors import OperationFailed
 from bridge.canopen.lss import BIT_RATES, NO_NODE_ID, LssAddress, LssError, Service
 from bridge.canopen.lss_scan import Scanned, find_all
-from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, print_table, takes_bus, tell
+from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.terminal import progress
 from bridge.errands import lss as lss_errand
 from bridge.errands.lss import LssErrand
@@ -182,7 +182,7 @@ def _report(facts: Mapping[str, object], what: str, keep: bool, as_json: bool) -
     print(json.dumps(facts) if as_json else f"{what} {'stored' if keep else 'set, not stored'}")
 
 
-def _run(line: Line, service: Service[_T], timeout_ms: int) -> _T:
+def _run(line: CliBus, service: Service[_T], timeout_ms: int) -> _T:
     """Carry it out, with the present step on a terminal. Raises ``OperationFailed``."""
 
     def make(now: float) -> LssErrand[_T]:

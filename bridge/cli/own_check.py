@@ -12,7 +12,7 @@ import typer
 
 from bridge import __version__
 from bridge.base.errors import Unavailable
-from bridge.cli.bus import AsJson, BusName, Line, carry_out, print_table, tell
+from bridge.cli.bus import AsJson, BusName, CliBus, carry_out, print_table, tell
 from bridge.cli.terminal import progress
 from bridge.command import Plant
 from bridge.command.node import Node
@@ -108,7 +108,7 @@ def audit_drives(
         if not offline and table.interface == "virtual":
             tell(f"bus {table.name} is virtual: by site file and factory settings alone")
         elif not offline:
-            answers = _ask(Line(table, project.families, is_of_site=True), nodes, unavailable)
+            answers = _ask(CliBus(table, project.families, is_of_site=True), nodes, unavailable)
         for node in nodes:
             for drive in node.commanded:
                 case = cases.get(drive.name)
@@ -125,7 +125,7 @@ def audit_drives(
                 yield Audited(node, found, own is not None, failure)
 
 
-def _ask(line: Line, nodes: Sequence[Node], unavailable: list[str]) -> _Answers:
+def _ask(line: CliBus, nodes: Sequence[Node], unavailable: list[str]) -> _Answers:
     try:
         with progress(f"bus {line.table.name}"):
             errand = carry_out(line, lambda now: OwnCheck(nodes, now))

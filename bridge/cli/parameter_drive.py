@@ -11,7 +11,7 @@ import typer
 
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
-from bridge.cli.bus import Line, carry_out, not_virtual, tell
+from bridge.cli.bus import CliBus, carry_out, not_virtual, tell
 from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import Show, progress
 from bridge.command.output_words import OutputWords
@@ -55,7 +55,7 @@ class Target:
     """One drive of a site, or a node that is none and has no slot, with the ledger that counts the writes to
     it."""
 
-    line: Line
+    line: CliBus
     node: NodeTable
     family: Family
     slot: Slot | None
@@ -194,5 +194,5 @@ def find(site: Path, drive: str) -> Target:
     access = DriveParameters(
         name, node.name, family, Names(family), ledger, on_first=family.is_on_first(slot)
     )
-    line = Line(bus, project.families, is_of_site=True, state_dir=Path(project.site.site.state_dir))
+    line = CliBus(bus, project.families, is_of_site=True, state_dir=Path(project.site.site.state_dir))
     return Target(line, node, family, slot, access, ledger, file)

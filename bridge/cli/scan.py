@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from bridge.base.errors import OperationFailed
-from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, print_table, takes_bus, tell
+from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_line, print_table, takes_bus, tell
 from bridge.cli.scan_site import write_site
 from bridge.cli.terminal import progress
 from bridge.errands.scan import FoundNode, Scanner
@@ -65,7 +65,7 @@ def scan(
         tell(write_site(write, eds, line.table, [(row.node, row.match) for row in found], families))
 
 
-def _run(line: Line, *, passive: bool, listen_s: float, timeout_s: float) -> Scanner:
+def _run(line: CliBus, *, passive: bool, listen_s: float, timeout_s: float) -> Scanner:
     def make(now: float) -> Scanner:
         return Scanner(
             now,
@@ -129,7 +129,7 @@ class _Row:
         return (str(node.id), node.name or "–", state, *shown, by, self.site_node or "–")
 
 
-def _row(node: FoundNode, line: Line, families: dict[str, Family]) -> _Row:
+def _row(node: FoundNode, line: CliBus, families: dict[str, Family]) -> _Row:
     found = Found(node.device_type, node.vendor, node.product, node.revision, node.name)
     match = best_match(found, families)
     site_node = next((table.name for table in line.table.node if table.id == node.id), None)

@@ -15,7 +15,7 @@ from bridge.canopen import datatypes, width
 from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Plain, TypeName
 from bridge.canopen.decode_sdo import shown
 from bridge.canopen.sdo import SdoError
-from bridge.cli.bus import AsJson, BusChoice, Line, carry_out, choose_line, split_site, takes_bus, tell
+from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_line, split_site, takes_bus, tell
 from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import printable, progress
 from bridge.errands.single import SdoErrand
@@ -59,8 +59,8 @@ def read(
     site, (node, name) = split_site(what, 2, _READ_USAGE)
     line = choose_line(site, which)
     index, sub = parse_object(name)
-    way = _way(line, line.node_id(node), sdo_channel, timeout_ms, retries)
-    data = _transfer(line, way, index, sub, None, as_json=as_json)
+    target = _sdo_target(line, line.node_id(node), sdo_channel, timeout_ms, retries)
+    data = _transfer(line, target, index, sub, None, as_json=as_json)
     try:
         value = None if kind is None else decode(kind, data)
     except ValueError as error:
@@ -101,12 +101,12 @@ def write(
     why = "" if force else why_forced(line, node_id, ObjectRef(index, sub))
     if why:
         raise typer.BadParameter(f"{why}. --force writes it: not beside a bridge whose drive runs")
-    way = _way(line, node_id, sdo_channel, timeout_ms, retries)
+    target = _sdo_target(line, node_id, sdo_channel, timeout_ms, retries)
     where = f"{index:04X}h:{sub:02X} of node {node_id}"
     question = f"write {decode(kind, data)} ({kind}) to {where}?"
     if not yes and sys.stdin.isatty() and not typer.confirm(question, err=True):
         raise OperationFailed("nothing written")
-    _transfer(line, way, index, sub, data, as_json=as_json)
+    _transfer(line, target, index, sub, data, as_json=as_json)
     if as_json:
         facts = {"node": node_id, "index": f"{index:04X}", "sub": sub, "data": data.hex()}
         print(json.dumps({"ok": True} | facts))
@@ -114,7 +114,7 @@ def write(
     print(f"{where} written: {text}")
 
 
-def why_forced(line: Line, node_id: int, address: ObjectRef) -> str:
+def why_forced(line: CliBus, node_id: int, address: ObjectRef) -> str:
     """Reason why this object of a node is written with ``--force`` only. Without a site there is no bridge
     that supervises the node."""
     node = next((node for node in line.table.node if node.id == node_id), None)
@@ -178,7 +178,7 @@ def for_people(value: int | float | str | bool | None, data: bytes) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Way:
+class _SdoTarget:
     """SDO server of a node, with its time-out."""
 
     node_id: int
@@ -187,23 +187,35 @@ class _Way:
     retries: int
 
 
-def _way(line: Line, node_id: int, sdo_channel: int, timeout_ms: int | None, retries: int | None) -> _Way:
+def _sdo_target(
+    line: CliBus, node_id: int, sdo_channel: int, timeout_ms: int | None, retries: int | None
+) -> _SdoTarget:
     timeout_s, times = line.sdo_policy(node_id)
     if timeout_ms is not None:
         timeout_s = timeout_ms / 1000
-    return _Way(
+    return _SdoTarget(
         node_id, line.sdo_server(node_id, sdo_channel), timeout_s, times if retries is None else retries
     )
 
 
-def _transfer(line: Line, way: _Way, index: int, sub: int, data: bytes | None, *, as_json: bool) -> bytes:
+def _transfer(
+    line: CliBus, target: _SdoTarget, index: int, sub: int, data: bytes | None, *, as_json: bool
+) -> bytes:
     """Run the transfer. Raises ``OperationFailed`` with the abort text if the node refuses or is silent."""
-    node_id, servers = way.node_id, KnownServers(line)
+    node_id, servers = target.node_id, KnownServers(line)
     known = servers.known()
 
     def make(now: float) -> SdoErrand:
         return SdoErrand(
-            node_id, index, sub, data, now, way.timeout_s, retries=way.retries, server=way.server, known=known
+            node_id,
+            index,
+            sub,
+            data,
+            now,
+            target.timeout_s,
+            retries=target.retries,
+            server=target.server,
+            known=known,
         )
 
     with progress(f"{index:04X}h:{sub:02X} of node {node_id}") as show:

@@ -1,5 +1,5 @@
-"""Who commands something on a bus, and what it gets: what the bus and the clients say becomes events of the
-leg, and what comes of them becomes outcomes, events and words.
+"""Command side of one drive, or of the outputs of one node: frames and requests become events of the leg, and
+its effects become outcomes, events and words.
 
 Sans-IO: every entry takes ``now`` (monotonic seconds). A request lets the controller's timers run first, so a
 telegram that waited in a buffer while the process hung cannot save a drive whose time was up. The drive's own

@@ -1,4 +1,4 @@
-"""What is commanded on a bus, a drive or the outputs of a node that is none: how long its words take."""
+"""Timing common to drives and the outputs of other nodes: how long their words take."""
 
 from __future__ import annotations
 

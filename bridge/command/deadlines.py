@@ -1,4 +1,4 @@
-"""Which of many have something to do now: only those that are due cost anything."""
+"""Lazy heap of deadlines: of many owners only those that are due cost anything."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _MOST_ENTRIES: Final = 8
 
 
 class Owner(Protocol):
-    """Who has deadlines: the earliest of them at any time, ``now`` for one that is past."""
+    """Owner of deadlines: the earliest of them at any time, ``now`` for one that is past."""
 
     def next_deadline(self, now: float) -> float | None: ...
 
@@ -38,7 +38,7 @@ class Deadlines(Generic[T]):
         self._heap: list[tuple[float, int]] = []
         self._swept = 0
         self.missed = 0
-        """How often ``sweep`` has found a deadline that nobody had told of."""
+        """Number of deadlines that ``sweep`` has found without having been told of them."""
 
     def add(self, owner: T) -> None:
         """It gets the next place, from 0."""

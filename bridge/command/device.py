@@ -29,7 +29,7 @@ class InputPdo:
 
 
 @dataclass(slots=True)
-class _Heard:
+class _InputTpdo:
     """One TPDO: the points that its entries are shown by, and how good they are shown to be."""
 
     pdo: InputPdo
@@ -70,7 +70,7 @@ class Device:
         self._refused_count = 0
         self.outputs: Outputs | None = None
         """Where it has some."""
-        self._heard: list[_Heard] = []
+        self._heard: list[_InputTpdo] = []
         self._unserved: dict[int, str] = {}
         """Points that no TPDO carries, with the reason."""
         self._state: tuple[Quality, str] = (Quality.WAITING, "")
@@ -90,7 +90,7 @@ class Device:
             link = Link(0.0, self._hold_ms)
             link.on_boot(pdo.deadline_s, ())
             link.on_node(self._node, now)
-            heard = _Heard(pdo, link)
+            heard = _InputTpdo(pdo, link)
             for entry, ref in enumerate(pdo.objects):
                 if ref is not None and ref in self._signals and in_charge[ref] == place:
                     heard.shown.append((entry, self._signals[ref], self._points[ref]))
@@ -130,7 +130,7 @@ class Device:
         shown: list[Value] = [signal.decode(values[entry]) for entry, signal, _ in heard.shown]
         self._image.set_values(heard.points, shown, now)
 
-    def _tell(self, heard: _Heard, values: Sequence[int], now: float) -> None:
+    def _tell(self, heard: _InputTpdo, values: Sequence[int], now: float) -> None:
         """The link does not know of the TPDO yet."""
         told = [(ref, values[entry] & mask) for entry, ref, mask in heard.told]
         outputs, last, deadline_s = self.outputs, heard.link.last_pdo, heard.pdo.deadline_s
@@ -160,11 +160,11 @@ class Device:
         return max((heard.link.age_ms(now) for heard in self._shown), default=0xFFFF_FFFF)
 
     @property
-    def _shown(self) -> list[_Heard]:
+    def _shown(self) -> list[_InputTpdo]:
         """The TPDOs that points are shown by."""
         return [heard for heard in self._heard if heard.shown]
 
-    # as whoever has its parameters sees it
+    # the HasParameters side
 
     @property
     def is_enabled(self) -> bool:
@@ -222,7 +222,7 @@ class Device:
                 quality, reason = Quality.CONFIG_ERROR, why
             self._image.judge((index,), quality, now, reason)
 
-    def _judge_one(self, heard: _Heard, now: float) -> None:
+    def _judge_one(self, heard: _InputTpdo, now: float) -> None:
         quality = heard.link.quality(now)
         if quality is Quality.STALE and heard.link.last_pdo is None:
             quality = Quality.WAITING

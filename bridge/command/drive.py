@@ -110,7 +110,7 @@ class Drive(Commanded):
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
         self._actual = ActualData(self.channel, self.slot, self.stop_check, image, self._on_code)
-        # What its node brings, which is not looked at here.
+        # Forwarded unchanged from the node.
         self.on_process_data = self._actual.on_process_data
         self.on_unchanged_data = self._actual.on_unchanged_data
         self.on_further_data = self._actual.on_further_data
@@ -263,7 +263,7 @@ class Drive(Commanded):
         self.identification = identification
         self._show(self._identity, [getattr(identification, leaf) for leaf in _IDENTITY], now)
 
-    # as whoever has its parameters sees it
+    # the HasParameters side
 
     @property
     def is_enabled(self) -> bool:

@@ -16,7 +16,7 @@ from bridge.command.messages.telegram import TelegramDecoder
 from bridge.command.setpoint_doubts import SetpointDoubts
 from bridge.command.status import DriveStatus
 from bridge.config import DriveTable
-from bridge.drive import FAULTED, DriveState, Explained, Meanings, Told
+from bridge.drive import FAULTED, DriveState, EmergencyMeaning, Explained, Meanings
 from bridge.image import Quality
 from bridge.mapping.model import Family
 from bridge.text import Text
@@ -171,7 +171,7 @@ class DriveChannel(Channel):
             self._status.link_fault = 0.0
             self._happen(self._way(now), now)
 
-    def on_emcy(self, told: Told, now: float, *, is_its_own: bool = True) -> None:
+    def on_emcy(self, told: EmergencyMeaning, now: float, *, is_its_own: bool = True) -> None:
         """An emergency message about this drive, or else about one of those of its node."""
         self._status.on_emcy(told)
         if is_its_own:

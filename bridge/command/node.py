@@ -27,11 +27,11 @@ class HasParameters(Protocol):
 
     @property
     def is_enabled(self) -> bool:
-        """What it moves is in motion or may be: parameters on which that rests are left alone."""
+        """True while its motor may turn; parameters that affect that are then not written."""
         ...
 
     def refusal(self, identity: Identity) -> Text | None:
-        """Why ``identity`` may not command it; None where it may."""
+        """Reason why ``identity`` may not command it; None where it may."""
         ...
 
     def on_refused(self, now: float) -> None:
@@ -90,6 +90,6 @@ class Node:
         return self.drives
 
     def on_heard_again(self) -> None:
-        """It could not be heard for a while, and goes on as it was."""
+        """The node is heard again, and did not restart in between."""
         for drive in self.drives:
             drive.on_heard_again()

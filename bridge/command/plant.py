@@ -47,8 +47,8 @@ CarryOut = Callable[[Request, float, Reply], bool]
 """Takes a command on a node or a bus, or a request for a parameter; False where there is nobody to do it."""
 
 
-def nobody(request: Request, now: float, reply: Reply) -> bool:
-    """The plant is on no bus."""
+def on_no_bus(request: Request, now: float, reply: Reply) -> bool:
+    """Refuse a command on a node or a bus where the plant is on no bus."""
     return False
 
 
@@ -142,7 +142,7 @@ class Plant:
             self.count(leaf, began, 0)
 
     def _due(self) -> Callable[[float], None]:
-        """Takes the deadlines of who is added next."""
+        """Callback for the deadlines of the next object that is added."""
         return partial(self._deadlines.due, len(self._commanded))
 
     def _add(self, one: Drive | Outputs) -> None:
@@ -192,11 +192,11 @@ class Plant:
         """Set a point by its full name."""
         self.image.set(self.image.index[name], value, now, quality, reason)
 
-    def submit(self, request: Request, now: float, reply: Reply, carry_out: CarryOut = nobody) -> bool:
+    def submit(self, request: Request, now: float, reply: Reply, carry_out: CarryOut = on_no_bus) -> bool:
         """Carry out ``request``; ``reply`` is called exactly once, now or later. ``carry_out`` takes what is
         not done by a drive's channel.
 
-        True where the bus should be told at once.
+        Returns True if a round must run now.
         """
         reply = self.audit.follow(request, now, reply)
         if self._is_closing and request.action not in STOP_ACTIONS:
@@ -402,7 +402,7 @@ class PlantView:
         plant: Plant,
         clock: Callable[[], float],
         epoch_ns: Callable[[float], int],
-        carry_out: CarryOut = nobody,
+        carry_out: CarryOut = on_no_bus,
         wake: Callable[[], None] = lambda: None,
     ) -> None:
         self._plant = plant

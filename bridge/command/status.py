@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.drive import FAULTED, DriveState, Explained, FaultWords, StatusWords, Told
+from bridge.drive import FAULTED, DriveState, EmergencyMeaning, Explained, FaultWords, StatusWords
 from bridge.mapping.model import Family
 
 
@@ -14,8 +14,8 @@ class DriveStatus:
         self.words = StatusWords(family.status_word)
         self.word = 0
         self.emcy_code = 0
-        self._told: Told | None = None
-        """The last emergency message, while it says that there is a fault."""
+        self._told: EmergencyMeaning | None = None
+        """Meaning of the active emergency message; None when cleared."""
         self.link_fault = 0.0
         """Present fault of the leg between bridge and drive."""
         self.drive_fault: float = 0.0
@@ -23,7 +23,7 @@ class DriveStatus:
         self._drive_last: float = 0.0
         self.last_fault = 0.0
 
-    def on_emcy(self, told: Told) -> None:
+    def on_emcy(self, told: EmergencyMeaning) -> None:
         self.emcy_code = told.code
         self._told = None if told.is_gone else told
 

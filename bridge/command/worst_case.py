@@ -38,7 +38,8 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class StopTime:
-    """The sum. Without ``terms`` nothing stops the drive, or it is ``unknown`` why that takes how long."""
+    """Sum of the terms. Without ``terms`` nothing stops the drive, or ``unknown`` says why no bound can be
+    given."""
 
     terms: tuple[Term, ...] = ()
     unknown: str = ""

@@ -1,4 +1,4 @@
-"""What a drive family knows of its objects, put into canopen's object dictionary."""
+"""Objects of a drive family, put into canopen's object dictionary."""
 
 # canopen declares no types for what its dictionaries hold.
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false

@@ -2,8 +2,8 @@
 
 from bridge.drive.conditions import Key as Key
 from bridge.drive.conditions import Lack as Lack
+from bridge.drive.emergency import EmergencyMeaning as EmergencyMeaning
 from bridge.drive.emergency import EmergencyReader as EmergencyReader
-from bridge.drive.emergency import Told as Told
 from bridge.drive.fault_words import Explained as Explained
 from bridge.drive.fault_words import FaultWords as FaultWords
 from bridge.drive.meaning import Codes as Codes

@@ -13,9 +13,10 @@ _VENDOR_BYTE: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """``is_gone``: it says that there is no fault any more. ``number`` is the family's own number of the
-    event or error, None where the message has none; ``cause`` that of the event."""
+class EmergencyMeaning:
+    """Meaning of an emergency message. ``is_gone``: it says that there is no fault any more. ``number`` is
+    the family's own number of the event or error, None where the message has none; ``cause`` that of the
+    event."""
 
     code: int
     text: str
@@ -31,20 +32,22 @@ class EmergencyReader:
         self._model = family.emcy
         self._words = FaultWords(family)
 
-    def read(self, code: int, vendor: bytes) -> Told:
+    def read(self, code: int, vendor: bytes) -> EmergencyMeaning:
         """``vendor`` is the manufacturer's five bytes, fewer where the message was short."""
         model = self._model
         if model.event is not None and (event := _byte(vendor, model.event.byte)) is not None:
             is_gone = code == 0 or event == model.event.gone
             cause = None if model.event.cause_byte is None else _byte(vendor, model.event.cause_byte)
             text = model.text(code) if is_gone else self._named(event, "event", code, cause)
-            return Told(code, text, is_gone, event, None if is_gone else cause)
+            return EmergencyMeaning(code, text, is_gone, event, None if is_gone else cause)
         if model.number is not None and self._has_number(code):
             first = model.number.byte - _VENDOR_BYTE
             number = int.from_bytes(vendor[first : first + model.number.size], "little")
             if number:
-                return Told(code, self._named(number, "error", code), is_gone=False, number=number)
-        return Told(code, model.text(code), is_gone=code == 0)
+                return EmergencyMeaning(
+                    code, self._named(number, "error", code), is_gone=False, number=number
+                )
+        return EmergencyMeaning(code, model.text(code), is_gone=code == 0)
 
     def _has_number(self, code: int) -> bool:
         names = (f"{code:04X}", f"{code >> 8:02X}xx")

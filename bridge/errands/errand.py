@@ -1,4 +1,4 @@
-"""What a single command does on a bus: frames and time in, frames out. Sans-IO."""
+"""Work of a single command on a bus: frames and time in, frames out. Sans-IO."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Errand(ABC):
     def on_frame(self, frame: Frame) -> None: ...
 
     def on_time(self, now: float) -> None:
-        """Nothing is ever late: silence is an answer, too."""
+        """Do nothing: an errand takes silence for an answer."""
         del now
 
     @abstractmethod

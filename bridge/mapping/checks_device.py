@@ -21,7 +21,7 @@ _NEEDED: Final = ("process", "control_word", "status_word")
 
 
 def check_kind(family: Family, file: MergedFile) -> None:
-    """A file is of drives, which have slots, or of a device, which has inputs."""
+    """Check that the file describes drives, which have slots, or a device, which has inputs."""
     if family.slot:
         for key in _NEEDED:
             if key not in file.data:

@@ -52,11 +52,11 @@ class Repeated:
         """
         network = self._network
         changed = self._plant.take_changed(network.bus.name)
-        made_for = network.routings, network.nmt_state, network.charge.acts(), network.farewell.awaiting
+        made_for = network.routings, network.nmt_state, network.mastership.acts(), network.farewell.awaiting
         anew = anew or made_for != self._made_for
         if anew or changed:
             self._made_for = made_for
-            acts = network.charge.acts()
+            acts = network.mastership.acts()
             self._repetitions = self._make(None if anew else changed) if acts else self._make_last()
         return self._repetitions
 
@@ -102,7 +102,7 @@ class Repeated:
 
 
 @dataclass(slots=True)
-class Line:
+class BusLine:
     """One bus with its network. ``alarm`` notices a standstill while frames are handed to the bus."""
 
     bus: Bus

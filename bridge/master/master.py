@@ -20,7 +20,7 @@ from bridge.can.interface import Bus, ControllerState
 from bridge.command import Action, Event, Kind, Plant, Reply, Request
 from bridge.master.ending import Ending, end, waits_for
 from bridge.master.lateness import Lateness
-from bridge.master.line import RENEWALS, Line
+from bridge.master.line import RENEWALS, BusLine
 from bridge.master.network import Network
 from bridge.master.standstill import Alarm
 from bridge.master.suspend import SuspendWatch
@@ -63,7 +63,7 @@ class Master:
         suspended: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0),
     ) -> None:
         self._alarm = alarm or Alarm()
-        self._lines = [Line(bus, network, plant, clock, self._alarm) for bus, network in lines]
+        self._lines = [BusLine(bus, network, plant, clock, self._alarm) for bus, network in lines]
         self._plant = plant
         self._clock = clock
         self._alive = alive
@@ -284,7 +284,7 @@ class Master:
                     one.channel.on_bridge_gap(now)
                     one.refresh(now)
 
-    def _watch_bus(self, line: Line, now: float) -> None:
+    def _watch_bus(self, line: BusLine, now: float) -> None:
         status = line.bus.status
         is_up = status.state not in (ControllerState.DOWN, ControllerState.BUS_OFF)
         self._tell_state(line, now)
@@ -307,7 +307,7 @@ class Master:
         else:
             line.network.bus_is_gone(now)
 
-    def _tell_state(self, line: Line, now: float) -> None:
+    def _tell_state(self, line: BusLine, now: float) -> None:
         """The controller is in another state. A loose plug changes it a hundred times a second: the last
         one is told in any case, those before it no more often than the limit allows."""
         status = line.bus.status
@@ -321,7 +321,7 @@ class Master:
             said = Text.of("bus.state_after", bus=line.bus.name, state=state, error=error)
         self._plant.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], said))
 
-    def _tell_refusal(self, line: Line, now: float) -> None:
+    def _tell_refusal(self, line: BusLine, now: float) -> None:
         """The kernel no longer takes bursts, or takes them again."""
         refusal = line.bus.status.bursts_refused
         if refusal == line.shown_refusal or not line.limit.allows(now):

@@ -20,10 +20,10 @@ from bridge.command.messages.request import NODE_ACTIONS
 from bridge.config import BusTable
 from bridge.config.download import Download
 from bridge.master.bus_points import BusPoints
-from bridge.master.charge import Charge
 from bridge.master.farewell import Farewell
 from bridge.master.intruders import Intruders
 from bridge.master.listening import Listening
+from bridge.master.mastership import BusMastership
 from bridge.master.reach import Reach
 from bridge.master.schedule import Schedule
 from bridge.master.startup import StartGate
@@ -64,12 +64,12 @@ class Network:
         self._schedule = Schedule(self.nodes)
         own_id = bus.master_node_id if bus.heartbeat_ms else None
         known = {node.table.id: node.node.name for node in self.nodes}
-        self.charge = Charge(bus, self.nodes, plant, self._give_way, listening)
+        self.mastership = BusMastership(bus, self.nodes, plant, self._give_way, listening)
         self.farewell = Farewell(self.nodes)
-        self._reach = Reach(self.nodes, self.charge, self.farewell)
+        self._reach = Reach(self.nodes, self.mastership, self.farewell)
         self._reach.on_bus(plant.began)
-        self._watch = BusWatch(bus.name, own_id, self.charge.acts, known, plant)
-        self._intruders = Intruders(bus, self.nodes, plant, self.charge.acts, self._stop_nodes)
+        self._watch = BusWatch(bus.name, own_id, self.mastership.acts, known, plant)
+        self._intruders = Intruders(bus, self.nodes, plant, self.mastership.acts, self._stop_nodes)
         self.ours: frozenset[int] = frozenset()
         """Identifiers on which nobody else may send what we repeat; brought up to date by ``take_routes``."""
         self._has_booted = False
@@ -102,8 +102,8 @@ class Network:
         for frame in frames:
             if frame.can_id == cobid.ERROR_CONTROL + self.bus.master_node_id:
                 self._watch.on_own_id(now)
-            if self._intruders.is_sign(frame, acts=self.charge.acts()):
-                self.charge.heard(self._intruders.name(frame), now)
+            if self._intruders.is_sign(frame, acts=self.mastership.acts()):
+                self.mastership.heard(self._intruders.name(frame), now)
             self._intruders.on_frame(frame)
         self._pump(now)
 
@@ -119,13 +119,13 @@ class Network:
                     node.booting.pump(now)
                     self._schedule.touch(node)
             for node in touched:
-                self._frames += node.wire.take_frames(only_commands=not self.charge.acts())
+                self._frames += node.wire.take_frames(only_commands=not self.mastership.acts())
                 self._routes_changed |= node.wire.routes_changed
                 self._schedule.plan(node)
             self._reach.tell(touched, now)
 
     def on_time(self, now: float) -> None:
-        if not (self.charge.acts() or self._begins_to_act(now)):
+        if not (self.mastership.acts() or self._begins_to_act(now)):
             self.farewell.on_time(now)
             self._touch_all(self.farewell.told)
             self._pump(now)
@@ -145,17 +145,17 @@ class Network:
         if not self.routings:
             # The bus lets nothing in yet, so its silence proves nothing.
             return False
-        was_left = self.charge.is_left
-        self.charge.on_time(now)
+        was_passive = self.mastership.is_passive
+        self.mastership.on_time(now)
         self._reach.on_bus(now)
-        if was_left and self.charge.acts():
+        if was_passive and self.mastership.acts():
             # The other bridge may have started a node that was to stay stopped.
             self._return(now)
-        return self.charge.acts()
+        return self.mastership.acts()
 
     def next_deadline(self) -> float | None:
-        if not self.charge.acts():
-            times = (self.charge.next_deadline(), self.farewell.next_deadline())
+        if not self.mastership.acts():
+            times = (self.mastership.next_deadline(), self.farewell.next_deadline())
             return min((time for time in times if time is not None), default=None)
         time_at = self._time.next_deadline() if self._time else None
         times = (self._schedule.next_deadline(), time_at, self._intruders.next_deadline())
@@ -163,7 +163,7 @@ class Network:
 
     def came_back(self, now: float) -> None:
         """The bridge was away for longer than its bursts last."""
-        self.charge.came_back(now)
+        self.mastership.came_back(now)
 
     def _stop_nodes(self, nodes: Sequence[NodeCore], why: str, now: float) -> None:
         are_all = len(nodes) == len(self.nodes) > 1 and not self._takes_over(nodes)
@@ -214,8 +214,8 @@ class Network:
         nodes = [node for node in self.nodes if is_bus or node.node.name == request.target]
         if not (nodes or is_bus):
             return False
-        if self.charge.why_not:
-            reply(Outcome(Code.NOT_READY, self.charge.why_not, forwarded=False))
+        if self.mastership.why_not:
+            reply(Outcome(Code.NOT_READY, self.mastership.why_not, forwarded=False))
             return True
         name = self.bus.name if is_bus else request.target
         if node_commands.answer(request, name, nodes, self._plant, now, reply):
@@ -299,7 +299,7 @@ class Network:
         """Frames to be sent once, now."""
         self._has_news = False
         frames, self._frames = self._frames, []
-        if not self.charge.acts():
+        if not self.mastership.acts():
             self._nmt_for_all = None
             frames = frames if self.farewell.is_on else []
             self.farewell.on_sending(has_frames=bool(frames))
@@ -359,7 +359,7 @@ class Network:
 
     def say_farewell(self, now: float) -> None:
         """Send what is owed, where this bridge acts no more."""
-        if not self.charge.acts():
+        if not self.mastership.acts():
             self.farewell.begin(now)
             self._touch_all(self.nodes)
             self._pump(now)
@@ -369,7 +369,7 @@ class Network:
             self._schedule.touch(node)
 
     def bus_is_gone(self, now: float) -> None:
-        self.charge.bus_is_gone()
+        self.mastership.bus_is_gone()
         self._intruders.bus_is_gone()
         self.farewell.bus_is_gone()
         self._forget_bus(now)
@@ -387,8 +387,8 @@ class Network:
 
     def bus_is_back(self, now: float) -> None:
         """What was written while the bus was down must not be sent first."""
-        self.charge.bus_is_back(now)
-        if self.charge.acts():
+        self.mastership.bus_is_back(now)
+        if self.mastership.acts():
             self._return(now)
         self.say_farewell(now)
         self._reach.on_bus(now, is_up=True)
@@ -408,7 +408,7 @@ class Network:
         self._watch.refresh(now)
         self._plant.set(f"{top}/intruders", self._intruders.count, now)
         self._plant.set(f"{top}/last_intruder", render(self._intruders.last), now)
-        self._plant.set(f"{top}/passive", self.charge.is_left, now)
+        self._plant.set(f"{top}/passive", self.mastership.is_passive, now)
         for node in self.nodes:
             node.wire.refresh(now)
             if node.wire.habits.has_news:

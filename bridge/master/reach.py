@@ -8,8 +8,8 @@ from typing import Final
 from bridge.canopen import nmt
 from bridge.command import Drive
 from bridge.command.outputs import Outputs
-from bridge.master.charge import Charge
 from bridge.master.farewell import Farewell
+from bridge.master.mastership import BusMastership
 from bridge.node.node import NodeCore
 
 _BUS_IS_DOWN: Final = "the bus is down"
@@ -19,9 +19,9 @@ class Reach:
     """Tells each drive, and the outputs of each node, whether what it puts out is repeated on the bus; as
     ``Repeated`` does (``line.py``)."""
 
-    def __init__(self, nodes: Sequence[NodeCore], charge: Charge, farewell: Farewell) -> None:
+    def __init__(self, nodes: Sequence[NodeCore], mastership: BusMastership, farewell: Farewell) -> None:
         self._nodes = nodes
-        self._charge = charge
+        self._mastership = mastership
         self._farewell = farewell
         self._is_up = True
         self._of_bus: tuple[bool, bool, tuple[NodeCore, ...]] | None = None
@@ -29,7 +29,7 @@ class Reach:
     def on_bus(self, now: float, *, is_up: bool | None = None) -> None:
         """The state of the bus, or this bridge's part on it, may be another. ``is_up``: it takes frames."""
         self._is_up = self._is_up if is_up is None else is_up
-        of_bus = self._is_up, self._charge.acts(), self._farewell.awaiting
+        of_bus = self._is_up, self._mastership.acts(), self._farewell.awaiting
         if of_bus != self._of_bus:
             self._of_bus = of_bus
             self.tell(self._nodes, now)
@@ -44,8 +44,8 @@ class Reach:
         """Why no words go to this node; empty where they do."""
         if not self._is_up:
             return _BUS_IS_DOWN
-        if not self._charge.acts() and node not in self._farewell.awaiting:
-            return self._charge.why_not
+        if not self._mastership.acts() and node not in self._farewell.awaiting:
+            return self._mastership.why_not
         if node.sends_process_data:
             return ""
         sent = "no words are sent to it"

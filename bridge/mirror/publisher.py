@@ -19,7 +19,7 @@ from bridge.mirror import protocol
 from bridge.mirror.endpoint import LEASE_MS, close_to_others, prepare_folder
 from bridge.mirror.protocol import Answered, Changed, Connected, Delta, Malformed, Prompt, Rejected, Snapshot
 from bridge.text import Text
-from bridge.zenohlink import Asked, Message, Pace, ZenohLink, zenoh_config
+from bridge.zenohlink import IncomingQuery, Message, Pace, ZenohLink, zenoh_config
 
 _POINTS_PER_DELTA: Final = 500
 _HEARTBEAT_S: Final = 0.25
@@ -192,12 +192,12 @@ class MirrorPublisher:
 
     # in
 
-    def _on_snapshot(self, asked: Asked) -> None:
+    def _on_snapshot(self, asked: IncomingQuery) -> None:
         task = asyncio.get_running_loop().create_task(self._answer_snapshot(asked))
         self._snapshots.add(task)
         task.add_done_callback(self._snapshots.discard)
 
-    async def _answer_snapshot(self, asked: Asked) -> None:
+    async def _answer_snapshot(self, asked: IncomingQuery) -> None:
         """Everything, read a portion at a time: a large image must not hold up the bus.
 
         A reading that is newer than ``sequence`` does no harm: the deltas that follow lead to it again.
@@ -224,7 +224,7 @@ class MirrorPublisher:
         if told:
             self._view.count(told.leaf, told.by)
 
-    def _on_connection(self, asked: Asked) -> None:
+    def _on_connection(self, asked: IncomingQuery) -> None:
         """A query and no message: those are lost where a front is in a hurry, and the requests that follow
         overtake them."""
         try:
@@ -243,7 +243,7 @@ class MirrorPublisher:
             self.malformed += 1
             return None
 
-    def _on_request(self, asked: Asked) -> None:
+    def _on_request(self, asked: IncomingQuery) -> None:
         def reply(outcome: Outcome) -> None:
             if outcome.value is not None:
                 outcome = replace(outcome, time=self._view.epoch_ns(outcome.time) / 1e9)
@@ -267,7 +267,7 @@ class MirrorPublisher:
             request = replace(request, received_at=NEVER)
         self._view.submit(request, reply)
 
-    def _answer(self, asked: Asked, outcome: Outcome) -> None:
+    def _answer(self, asked: IncomingQuery, outcome: Outcome) -> None:
         answered = Answered(outcome, self._instance, self._sequence)
         asked.send([Message(asked.key, protocol.encode(answered))])
         asked.finish()

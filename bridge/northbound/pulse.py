@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from bridge.command.messages.freshness import HANG_MS, Look
+from bridge.command.messages.freshness import HANG_MS, LoopPulse
 
 PERIOD_S: Final = 0.01
 
@@ -18,11 +18,11 @@ class Pulse:
         self._clock = clock
         self._beat_at = clock()
         self._timer: asyncio.TimerHandle | None = None
-        self.look = Look(self._beat_at, float("-inf"))
+        self.look = LoopPulse(self._beat_at, float("-inf"))
 
     def start(self) -> None:
         self._beat_at = self._clock()
-        self.look = Look(self._beat_at, float("-inf"))
+        self.look = LoopPulse(self._beat_at, float("-inf"))
         self._timer = asyncio.get_running_loop().call_later(PERIOD_S, self._beat)
 
     def stop(self) -> None:
@@ -35,5 +35,5 @@ class Pulse:
         read later arrived after the first."""
         before, self._beat_at = self._beat_at, self._clock()
         has_hung = (self._beat_at - before) * 1000 > HANG_MS
-        self.look = Look(before, self._beat_at if has_hung else self.look.steady_since)
+        self.look = LoopPulse(before, self._beat_at if has_hung else self.look.steady_since)
         self._timer = asyncio.get_running_loop().call_later(PERIOD_S, self._beat)

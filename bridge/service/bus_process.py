@@ -37,7 +37,7 @@ from bridge.project import Project, count
 from bridge.service.audit_log import AuditLog
 from bridge.service.event_log import log_event
 from bridge.service.front_process import FRONTS, Front
-from bridge.service.parts import Parts, Ports, ServerPart
+from bridge.service.parts import Ports, ServerPart, Supervisor
 from bridge.service.plant_condition import PlantCondition
 from bridge.service.preflight import check_files
 from bridge.service.wear import WearKeeper
@@ -109,11 +109,11 @@ class Service:
         self._tasks: list[asyncio.Task[None]] = []
         self._ending: Ending | None = None
         drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")
-        self.parts = Parts(self.plant, self.notifier, clock.now, f"{drives} on {buses}")
+        self.supervisor = Supervisor(self.plant, self.notifier, clock.now, f"{drives} on {buses}")
         self._opened = Ports()
         self.fronts: list[Front] = []
         self._ports: dict[str, Port] = {}
-        """Of the fronts: a front that dies leaves its port to the next."""
+        """Listening sockets of the fronts; kept open, so that a restarted front serves at once."""
         if "opcua" in fronts and site.opcua:
             self._add_front("opcua", Port(site.opcua.listen, "opcua.listen"))
         if "page" in fronts and site.page:
@@ -208,14 +208,14 @@ class Service:
     async def _serve(self) -> None:
         """Until cancelled, or until a task ends: each runs for ever, or raises when its part has failed."""
         parts = [*self._servers(), *self.fronts]
-        self.parts.expect(parts)
+        self.supervisor.expect(parts)
         works = {
             "master": self.master.failed(),
             "EEPROM counts": self.wear.run(),
             "audit log": self.audit.run(),
             "condition": self.condition.run(),
             "start": self._start(),
-            **{part.name: self.parts.keep(part) for part in parts},
+            **{part.name: self.supervisor.keep(part) for part in parts},
         }
         self._tasks = [asyncio.create_task(work, name=name) for name, work in works.items()]
         done, _ = await asyncio.wait(self._tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -236,8 +236,8 @@ class Service:
     async def _start(self) -> None:
         """Ready is who serves what the site file says, or can say what it does not serve."""
         with suppress(TimeoutError):
-            await asyncio.wait_for(self.parts.all_known(), _START_S)
-        self.notifier.ready(self.parts.status)
+            await asyncio.wait_for(self.supervisor.all_known(), _START_S)
+        self.notifier.ready(self.supervisor.status)
         await asyncio.get_running_loop().create_future()
 
     async def _end_tasks(self) -> None:
@@ -260,7 +260,7 @@ class Service:
 
     async def _stop(self) -> None:
         self.halt()
-        passive = [network.bus.name for network in self._networks if network.charge.is_left]
+        passive = [network.bus.name for network in self._networks if network.mastership.is_passive]
         if passive:
             _log.info("passive on %s: another bridge is in charge, nothing is sent there", ", ".join(passive))
         if len(passive) < len(self._networks):

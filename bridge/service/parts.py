@@ -47,8 +47,8 @@ class Server(Protocol):
 
 
 class Ports:
-    """What can be opened at the start. One port that is taken, or an address that is not there yet, does not
-    keep a plant from being served on the others: it is tried again with the parts."""
+    """Ports that are opened at the start. One port that is taken, or an address that is not there yet, does
+    not keep a plant from being served on the others: it is tried again with the parts."""
 
     def __init__(self) -> None:
         self._opened: set[str] = set()
@@ -92,7 +92,7 @@ class ServerPart:
         return "has ended"
 
 
-class Parts:
+class Supervisor:
     """Keeps the parts going, and reports which fail: point, events, and systemd's status line.
 
     ``clock`` is the plant's; ``status`` is the rest of the status line.
@@ -120,7 +120,7 @@ class Parts:
         return "; ".join(f"{name}: {self._failing[name]}" for name in sorted(self._failing))
 
     def expect(self, parts: Sequence[Part]) -> None:
-        """Whom ``all_known`` waits for."""
+        """Set the parts that must have served or failed before ``all_known`` returns."""
         self._unknown = {part.name for part in parts}
         self._look()
 

@@ -27,7 +27,7 @@ from bridge.uaserver.library import (
     ua,
 )
 from bridge.uaserver.reading import checked_times, window
-from bridge.uaserver.shares import MOST_ON_ONE, Listening
+from bridge.uaserver.shares import MOST_ON_ONE, EventItemQuota
 from bridge.uaserver.subscription import Subscription
 
 _BATCH: Final = 50
@@ -43,13 +43,13 @@ class MonitoredItems:
         self._space = space
         self._numbers = count(1)
         self._watching: Counter[Hashable] = Counter()
-        self._listening = Listening()
+        self._event_items = EventItemQuota()
         self.event_types = EventTypes(space)
 
     @property
     def is_full(self) -> bool:
         """Items for events: there may be no more of them, whoever asks."""
-        return self._listening.is_full
+        return self._event_items.is_full
 
     async def create(
         self,
@@ -112,7 +112,7 @@ class MonitoredItems:
         filter_ = event_filter(get(asked, "Filter"), self.event_types)
         mode = get(wanted, "MonitoringMode")
         settings, share = event_settings(asked), source_of(subscription.owner.address)
-        self._listening.change(share, filter_.weight)
+        self._event_items.change(share, filter_.weight)
         return EventItem(next(self._numbers), node.nodeid, settings, filter_, mode, share)
 
     def _value_item(
@@ -178,7 +178,7 @@ class MonitoredItems:
             if isinstance(item, EventItem):
                 settings = event_settings(asked)
                 filter_ = event_filter(get(asked, "Filter"), self.event_types)
-                self._listening.change(item.share, filter_.weight - item.filter.weight)
+                self._event_items.change(item.share, filter_.weight - item.filter.weight)
                 item.modify(settings, filter_)
             else:
                 node = self._space[get(item.target, "NodeId")]
@@ -213,7 +213,7 @@ class MonitoredItems:
     def drop(self, subscription: Subscription, item: Item) -> None:
         subscription.drop(item)
         if isinstance(item, EventItem):
-            self._listening.change(item.share, -item.filter.weight)
+            self._event_items.change(item.share, -item.filter.weight)
         else:
             self._space.delete_datachange_callback(item.handle)
             self._watching[item.share] -= 1

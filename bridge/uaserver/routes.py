@@ -174,7 +174,7 @@ def _publish(session: Session, params: ua.PublishParameters, request: Request) -
 
     hint_ms: int = request.header.TimeoutHint
     expires_at = loop_time() + hint_ms / 1000 if hint_ms else float("inf")
-    # Half: one more notification may go beyond it.
+    # Half of what the client accepts: the last notification may go beyond the limit.
     most_bytes = min(MOST_BYTES, session.most_bytes // 2)
     waiting = PublishRequest(expires_at, request.is_open, answer, refuse, most_bytes)
     session.subscriptions.publish(session, acknowledged, waiting)

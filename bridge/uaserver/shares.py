@@ -70,7 +70,7 @@ def room_for_items(address: str, subscriptions: Iterable[Subscription]) -> int:
     return min(MOST_ITEMS - items.total(), MOST_ITEMS_OF_ADDRESS - items[source_of(address)])
 
 
-class Listening:
+class EventItemQuota:
     """Weight of the items for events, by whom they are counted for."""
 
     def __init__(self) -> None:

@@ -7,11 +7,11 @@ the loop in small portions. Every error of zenoh ends here: it is counted and lo
 It knows no key layout: both the zenoh server and the link between our processes use it.
 """
 
-from bridge.zenohlink.asked import Asked
+from bridge.zenohlink.incoming_query import IncomingQuery
 from bridge.zenohlink.link import ZenohLink
 from bridge.zenohlink.message import Answer, Message
 from bridge.zenohlink.pace import Pace
 from bridge.zenohlink.publishers import Value
 from bridge.zenohlink.settings import zenoh_config
 
-__all__ = ["Answer", "Asked", "Message", "Pace", "Value", "ZenohLink", "zenoh_config"]
+__all__ = ["Answer", "IncomingQuery", "Message", "Pace", "Value", "ZenohLink", "zenoh_config"]

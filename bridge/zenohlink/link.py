@@ -15,7 +15,7 @@ from typing import Final, TypeVar, cast
 import zenoh
 
 from bridge.base.errors import OperationFailed, Unavailable
-from bridge.zenohlink.asked import Asked
+from bridge.zenohlink.incoming_query import IncomingQuery
 from bridge.zenohlink.lane import LIMIT, Job, Lane
 from bridge.zenohlink.message import Answer, Message, sentence
 from bridge.zenohlink.publishers import Publishers, Readers, Value
@@ -223,7 +223,7 @@ class ZenohLink:
         self.submit(declare)
 
     def declare_queryable(
-        self, key: str, handler: Callable[[Asked], None], share: Share = _one_for_all
+        self, key: str, handler: Callable[[IncomingQuery], None], share: Share = _one_for_all
     ) -> None:
         """Answer queries on ``key``. A flood of them is cut off before it reaches the loop."""
 
@@ -236,7 +236,7 @@ class ZenohLink:
                 key, now = str(query.key_expr), time.monotonic()
                 lane = prompt if self._is_prompt(key) else other
                 source = _source(query.source_info)
-                asked = Asked(key, payload, attachment, parameters, now, source, query, self, lane)
+                asked = IncomingQuery(key, payload, attachment, parameters, now, source, query, self, lane)
                 if not self._inbox.take_in(partial(handler, asked), share(key, payload)):
                     # Not here: ending a query may wait for its client, and this thread reads for all others.
                     lane.do(lambda _: query.drop())

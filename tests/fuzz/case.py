@@ -1,4 +1,4 @@
-"""What is thrown: cases, the corpus of recorded messages, and files that repeat a failure."""
+"""Cases to be thrown, the corpus of recorded messages, and files that repeat a failure."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Recorded:
 
 
 class Corpus:
-    """What was recorded of one protocol, by the kind of its messages."""
+    """Recorded messages of one protocol, by their kind."""
 
     def __init__(self, recorded: Iterable[Recorded]) -> None:
         self.recorded = tuple(recorded)

@@ -58,7 +58,7 @@ _OF_A_WORD_MB: Final = 0.0016
 """Memory that zenoh keeps of each word of a key that somebody has named, at most."""
 _PAGE_MB: Final = 4096 / 2**20
 _FAMILIES: Final = {6: "lenze/8400-motec", 7: "stoeber/5000", 8: "cia402/velocity"}
-"""Of the nodes that nobody may move."""
+"""Families of the nodes that nobody may move."""
 _RPDOS: Final = (0x200, 0x300, 0x400, 0x500)
 _GOOD_TARGETS: Final = {f"conveyor/{slot}": slot for slot in GOOD_RPDOS.values()}
 _NODES: Final = ("pump", "lift", "fan")
@@ -85,18 +85,18 @@ class Tail:
 
 @dataclass(slots=True)
 class Figures:
-    """What was measured: milliseconds of each exchange by protocol, memory in MB by process, log lines."""
+    """Measurements: milliseconds of each exchange by protocol, memory in MB by process, log lines."""
 
     answers_ms: dict[str, list[float]] = field(default_factory=dict[str, list[float]])
     busy: dict[str, int] = field(default_factory=dict[str, int])
-    """How many of them were answered by "too late, try again"."""
+    """Number of them that were answered by "too late, try again"."""
     judged: dict[str, int] = field(default_factory=dict[str, int])
-    """How many began when the machine was not busy,"""
+    """Number that began when the machine was not busy."""
     late: dict[str, int] = field(default_factory=dict[str, int])
-    """and how many of those were told to try again, or took long."""
+    """Number of those that were told to try again, or took long."""
     memory_mb: dict[int, list[float]] = field(default_factory=dict[int, list[float]])
     peak_mb: dict[int, float] = field(default_factory=dict[int, float])
-    """What each has had at most at any moment."""
+    """Greatest memory of each at any moment, in MB."""
     lines: int = 0
 
     def told(self) -> list[str]:
@@ -145,7 +145,7 @@ class Judge:
         self._words.take()
 
     def look(self) -> list[str]:
-        """What is wrong now."""
+        """Faults now."""
         if self._waits.is_busy():
             self._busy_until = time.monotonic()
         faults = [*self._processes()]
@@ -155,7 +155,7 @@ class Judge:
         return faults + self._look_at_audit()
 
     def forgive(self, *names: str) -> None:
-        """How exchanges of these good clients end that have begun by now is no fault."""
+        """Forgive whatever end the exchanges of these good clients have that have begun by now."""
         self.look()
         self._serves_since = time.monotonic()
         self._forgiven_until |= dict.fromkeys(names, self._serves_since)
@@ -165,7 +165,7 @@ class Judge:
         return all(served > self._serves_since for served in self._served.values())
 
     def conclude(self) -> list[str]:
-        """What is wrong in the whole."""
+        """Faults in the whole."""
         faults = self.look()
         for name in PROTOCOLS:
             if not self.figures.answers_ms.get(name):
@@ -219,7 +219,7 @@ class Judge:
         return faults
 
     def _of_names_mb(self, pid: int) -> float:
-        """What zenoh keeps of each distinct key for ever; of no process but its own."""
+        """Memory in MB of the distinct keys that zenoh keeps for ever; of no process but its own."""
         with suppress(OSError):
             if b"--role\0zenoh\0" in Path(f"/proc/{pid}/cmdline").read_bytes():
                 return self._rig.named_words * _OF_A_WORD_MB
@@ -310,7 +310,7 @@ class Waits:
 
 
 def unrightful(line: dict[str, Any]) -> str:
-    """What is wrong with a line of the audit log; nothing with what was refused, or asked by who may."""
+    """Fault in a line of the audit log; nothing with what was refused, or asked by who may."""
     if line["code"] != "ok" or line["source"] in ("none", "local"):
         return ""
     owner = {"fu1": ("modbus", "127.0.0.1"), "fu2": ("opcua", GOOD), "fu3": ("zenoh", GOOD)}
@@ -324,7 +324,7 @@ def unrightful(line: dict[str, Any]) -> str:
 
 
 def peak_mb(pid: int) -> float:
-    """What a process has had at most; 0 where it has ended."""
+    """Greatest memory of a process so far in MB; 0 where it has ended."""
     for line in Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines():
         if line.startswith("VmHWM:"):
             return int(line.split()[1]) / 1024
@@ -339,7 +339,7 @@ def restart_peak_mb(pid: int) -> float:
 
 
 def growth_mb(samples: list[float]) -> float:
-    """How much more there is at the end than after the warm-up, spikes left out."""
+    """Growth in MB from the warm-up to the end, spikes left out."""
     if len(samples) < 10:
         return 0.0
     begin = int(len(samples) * WARM_UP)

@@ -200,7 +200,7 @@ class Mutator:
     # texts behind their length
 
     def texts_in(self, message: bytes) -> list[tuple[int, int]]:
-        """Where printable texts stand behind a length that fits: begin and end of each text."""
+        """Places of printable texts behind a length that fits: begin and end of each text."""
         found: list[tuple[int, int]] = []
         for place in range(min(len(message) - 4, _LOOKED_AT)):
             size = int.from_bytes(message[place : place + 4], self._order)

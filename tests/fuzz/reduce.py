@@ -8,7 +8,7 @@ from tests.fuzz.case import Case
 
 
 def reduced(cases: Sequence[Case], fails: Callable[[Sequence[Case]], bool]) -> list[Case]:
-    """As few of ``cases``, in their order, as still fail (Zeller's ddmin, without its last round of tries).
+    """Fewest of ``cases``, in their order, that still fail (Zeller's ddmin, without its last round of tries).
 
     ``cases`` themselves have to fail.
     """

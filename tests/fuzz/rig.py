@@ -1,4 +1,4 @@
-"""What is thrown at: the bridge as its user runs it, on simulated drives, with a good client per protocol.
+"""Rig of the fuzzers: the bridge as its user runs it, on simulated drives, with a good client per protocol.
 
 The good clients own fu1 (Modbus), fu2 (OPC UA) and fu3 (zenoh) and keep them turning. fu4 may be leased by
 whoever asks, the drive of the node ``spare`` belongs to whoever comes first by Modbus. The other nodes have
@@ -20,7 +20,7 @@ from tests.support.passwords import cheap_hash
 from tests.support.process import REPOSITORY, Process, free_port, running, until
 
 STRANGER: Final = "127.0.0.9"
-"""Where what is thrown comes from, as far as a protocol can tell."""
+"""Address of the thrower, as far as a protocol can tell."""
 GOOD, PASSWORD = "good", "good-password"
 GOOD_NODE: Final = 5
 GOOD_RPDOS: Final = {0x205: "fu1", 0x305: "fu2", 0x405: "fu3"}
@@ -57,7 +57,7 @@ class Rig:
 
     @property
     def exchanges(self) -> Path:
-        """What the good clients asked, and how it ended."""
+        """File of the good clients' requests, and how they ended."""
         return self.folder / "exchanges"
 
     @property

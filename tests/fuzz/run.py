@@ -27,12 +27,12 @@ _KEPT: Final = 400
 _LOOK_S: Final = 1.0
 _END_S: Final = 45.0
 _AFTER_S: Final = 2.0
-"""How long is looked on after the last throw."""
+"""Time in seconds to look on after the last throw."""
 
 
 @dataclass(slots=True)
 class Report:
-    """How a run was. ``faults`` is empty where the bridge has borne it."""
+    """Result of a run. ``faults`` is empty where the bridge has borne it."""
 
     seed: int
     seconds: float

@@ -16,7 +16,7 @@ from tests.fuzz.rig import Rig, running_rig
 from tests.fuzz.run import fuzz
 
 CASES: Final = ({"opcua": 1600, "can": 1800}, {"modbus": 1300, "zenoh": 18_000})
-"""What a machine of two cores throws in 20 s each."""
+"""Number of cases that a machine of two cores throws in 20 s each."""
 SEED: Final = 13
 """The same each time: a test suite that finds something new each day is no test of a change."""
 LIMIT_S: Final = 300.0

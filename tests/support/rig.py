@@ -8,7 +8,7 @@ from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.config import DriveTable
-from bridge.drive import EmergencyReader, LinearScale, Told
+from bridge.drive import EmergencyMeaning, EmergencyReader, LinearScale
 from bridge.image import Value
 from bridge.mapping import Family, load_family
 from tests.support.leg_words import HALF_SPEED, NORD_TU4, LegWords
@@ -31,7 +31,7 @@ _ROUNDING_S = 1e-9
 """0.15 + 0.05 may come out a little less than 0.2."""
 
 
-def emergency(code: int, vendor: bytes = bytes(5)) -> Told:
+def emergency(code: int, vendor: bytes = bytes(5)) -> EmergencyMeaning:
     """An emergency message of a NORD drive, read."""
     return EmergencyReader(NORD).read(code, vendor)
 

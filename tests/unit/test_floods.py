@@ -26,7 +26,7 @@ from bridge.northbound.modbus.session import Session
 from bridge.northbound.modbus.units import units_of
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.service.event_log import log_event
-from bridge.service.parts import Parts
+from bridge.service.parts import Supervisor
 from bridge.zenohlink import Message, zenoh_config
 from bridge.zenohlink.worker import Worker
 from tests.support import sites
@@ -360,7 +360,7 @@ async def test_a_part_that_fails_again_and_again(log: QuietLog, monkeypatch: pyt
     plant: Plant = sites.plant_of(SITE)
     plant.on_event(log_event)
     monkeypatch.setenv("NOTIFY_SOCKET", "")
-    parts = Parts(plant, Notifier(), lambda: log.now, "")
+    parts = Supervisor(plant, Notifier(), lambda: log.now, "")
     left = TIMES
 
     async def sleep(seconds: float) -> None:

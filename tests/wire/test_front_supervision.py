@@ -57,9 +57,9 @@ class Kept:
         self.plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "modbus", 1000)))))
         self.events: list[str] = []
         self.plant.on_event(lambda event: self.events.append(event.message))
-        self.parts = parts.Parts(self.plant, Notifier(), time.monotonic, "1 drive on 1 bus")
-        self.parts.expect([front])
-        self.running = asyncio.create_task(self.parts.keep(front))
+        self.supervisor = parts.Supervisor(self.plant, Notifier(), time.monotonic, "1 drive on 1 bus")
+        self.supervisor.expect([front])
+        self.running = asyncio.create_task(self.supervisor.keep(front))
 
     @property
     def failing(self) -> object:
@@ -92,12 +92,12 @@ async def test_a_front_that_fails_at_each_start_is_tried_again_and_comes_back(
     serves = "import os, sys, time; os.write(int(sys.argv[-1]), b'.'); time.sleep(60)"
     spawns = Spawns(monkeypatch, fails, fails, fails, serves)
     kept = Kept(monkeypatch, Front("opcua", [], watched=True))
-    await asyncio.wait_for(kept.parts.all_known(), 10)
+    await asyncio.wait_for(kept.supervisor.all_known(), 10)
     assert kept.failing == f"opcua: ended (exit status {code}): no room"
-    assert kept.parts.status == f"1 drive on 1 bus; not served: {kept.failing}"
+    assert kept.supervisor.status == f"1 drive on 1 bus; not served: {kept.failing}"
     await until_in_loop(lambda: not kept.failing, "it serves")
     assert spawns.count == 4
-    assert kept.parts.status == "1 drive on 1 bus"
+    assert kept.supervisor.status == "1 drive on 1 bus"
     await kept.end()
     assert len(kept.events) == 2, "told once a minute"
     assert kept.events[1] == "the opcua front serves again"

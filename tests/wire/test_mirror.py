@@ -43,7 +43,7 @@ from bridge.mirror import client as mirror_client
 from bridge.mirror.client import UNREACHABLE
 from bridge.mirror.endpoint import socket_path
 from bridge.northbound.view import View
-from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
+from bridge.zenohlink import IncomingQuery, Message, ZenohLink, zenoh_config
 from tests.support.outcomes import in_english
 from tests.support.views import view_of
 from tests.support.zenoh_peer import until
@@ -328,7 +328,7 @@ async def test_a_front_that_gets_no_snapshot_after_a_gap_passes_no_old_value_off
     plant = make_plant()
     async with publishing(endpoint, plant) as publisher, front(endpoint) as client:
 
-        async def no_answer(asked: Asked) -> None:
+        async def no_answer(asked: IncomingQuery) -> None:
             asked.finish()
 
         monkeypatch.setattr(publisher, "_answer_snapshot", no_answer)
@@ -430,13 +430,13 @@ class HalfOpen(MirrorPublisher):
         self._link.submit(look)
         return await found
 
-    def _on_snapshot(self, asked: Asked) -> None:
+    def _on_snapshot(self, asked: IncomingQuery) -> None:
         self._snapshots.add(asyncio.create_task(self._unless_before(asked, super()._on_snapshot)))
 
-    def _on_request(self, asked: Asked) -> None:
+    def _on_request(self, asked: IncomingQuery) -> None:
         self._snapshots.add(asyncio.create_task(self._unless_before(asked, super()._on_request)))
 
-    async def _unless_before(self, asked: Asked, answer: Callable[[Asked], None]) -> None:
+    async def _unless_before(self, asked: IncomingQuery, answer: Callable[[IncomingQuery], None]) -> None:
         if await self.peers() - self.unanswered:
             answer(asked)
         else:

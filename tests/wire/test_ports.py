@@ -77,11 +77,11 @@ async def test_one_port_that_is_taken_keeps_nothing_else_from_being_served(tmp_p
         async with serving(tmp_path, *tables, more=more, fronts=True) as (service, events):
             await until(service, "modbus: has failed: modbus.listen")
             assert answers(gateway)
-            await asyncio.wait_for(service.parts.all_known(), 20)
+            await asyncio.wait_for(service.supervisor.all_known(), 20)
             assert answers(zenoh)
             [told] = [event for event in events if event.kind is Kind.FRONT]
             assert "is taken by another program" in told.message and "it is started again" in told.message
-            assert "not served: modbus" in service.parts.status
+            assert "not served: modbus" in service.supervisor.status
 
 
 @pytest.mark.parametrize("what", ["modbus", "gateway", "zenoh"])

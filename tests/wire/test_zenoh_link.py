@@ -16,7 +16,7 @@ from bridge.can.virtual import VirtualWire
 from bridge.mirror import protocol
 from bridge.project import load_project
 from bridge.service.bus_process import Service
-from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
+from bridge.zenohlink import IncomingQuery, Message, ZenohLink, zenoh_config
 from bridge.zenohlink import link as link_module
 from bridge.zenohlink.publishers import Publishers
 from tests.support import sites
@@ -100,7 +100,7 @@ async def test_a_client_waits_for_its_router_and_can_be_closed_meanwhile() -> No
 async def test_queries_are_answered_from_the_loop() -> None:
     async with pair() as (server, client):
 
-        def answer(asked: Asked) -> None:
+        def answer(asked: IncomingQuery) -> None:
             if asked.payload == b"bad":
                 asked.fail(b"no", "text/plain")
             else:
@@ -122,7 +122,7 @@ async def test_queries_are_answered_from_the_loop() -> None:
 
 async def test_a_hundred_queries_wait_side_by_side() -> None:
     async with pair() as (server, client):
-        held: list[Asked] = []
+        held: list[IncomingQuery] = []
         server.declare_queryable("q", held.append)
         await server.settle()
         await asyncio.sleep(0.1)
@@ -238,7 +238,7 @@ async def test_a_stalled_subscriber_does_not_hold_up_the_loop() -> None:
 async def test_a_flood_of_queries_leaves_the_loop_its_time() -> None:
     handled = 0
 
-    def slow(asked: Asked) -> None:
+    def slow(asked: IncomingQuery) -> None:
         nonlocal handled
         handled += 1
         time.sleep(0.001)

@@ -55,7 +55,7 @@ class Event:
 
 
 REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))
-"""Kinds that somebody can cause at will."""
+"""Kinds that an outsider can trigger at will; rate-limited."""
 _MOST_A_SECOND: Final = 10
 
 

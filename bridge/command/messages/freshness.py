@@ -80,8 +80,8 @@ def is_stale(request: Request, now: float, timeout_ms: int) -> bool:
     return received_at is not None and now - received_at > limit_ms_of(request, timeout_ms) / 1000
 
 
-class Look(NamedTuple):
-    """What the event loop knows of itself (``bridge.northbound.pulse`` keeps it).
+class LoopPulse(NamedTuple):
+    """Knowledge of the event loop about itself (``bridge.northbound.pulse`` keeps it).
 
     ``at``: it has looked at every open connection since, and has read what it found, except what it is about
     to read. ``steady_since``: when it last went on after a hang or a stop of its process.
@@ -98,7 +98,7 @@ class Inflow:
     hang may have waited somewhere, and cannot be told from what has not.
     """
 
-    def __init__(self, now: float, look: Look, *, is_hidden: bool = False) -> None:
+    def __init__(self, now: float, look: LoopPulse, *, is_hidden: bool = False) -> None:
         # What comes first may have waited in the listening socket.
         self._empty_at = look.at
         self._open_since = now
@@ -129,7 +129,7 @@ class Inflow:
         self._calm_since = now
         self._came = 0
 
-    def arrive(self, now: float, look: Look, *, crowded: bool = False) -> float:
+    def arrive(self, now: float, look: LoopPulse, *, crowded: bool = False) -> float:
         """Something was read ``now``: when it can have arrived at the earliest, or ``NEVER``.
 
         ``crowded``: more may be left, or more is under way than there should be.
@@ -147,7 +147,7 @@ class Inflow:
             return NEVER
         return now if now - since <= _GRAIN_S else since
 
-    def _has_calmed(self, look: Look) -> bool:
+    def _has_calmed(self, look: LoopPulse) -> bool:
         """Judged over one span of ``CALM_S`` after the other, in which the loop has hung at no time."""
         begin = max(self._calm_since, look.steady_since)
         if look.at - begin < CALM_S:

@@ -90,7 +90,7 @@ Command = Read | Write | Nmt | Set | Version | Frames
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class CommandLine:
     """A command, and the net and node that its line names."""
 
     command: Command
@@ -119,7 +119,7 @@ def split_sequence(text: str) -> tuple[int, str]:
     return int(match[1]), text[match.end() :]
 
 
-def parse(text: str) -> Line:
+def parse(text: str) -> CommandLine:
     """The command in what follows the sequence number. Raises ``Refused``, also where there is none."""
     words = _words(text)
     places: list[int] = []
@@ -131,9 +131,9 @@ def parse(text: str) -> Line:
     if isinstance(command, Set) and places:
         if len(places) > 1:
             raise Refused(ErrorCode.SYNTAX)
-        return Line(command, net=places[0])
+        return CommandLine(command, net=places[0])
     node = places.pop() if places else None
-    return Line(command, places.pop() if places else None, node)
+    return CommandLine(command, places.pop() if places else None, node)
 
 
 def _words(text: str) -> list[str]:

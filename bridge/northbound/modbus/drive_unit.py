@@ -158,8 +158,7 @@ class DriveUnit(Unit):
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
 
     def _check_words(self, table: Table, start: int, end: int) -> None:
-        """Refuse a range that has only words which the drive does not have, its node does not carry, or never
-        came."""
+        """Refuse a range in which no word is available: not in the drive, not mapped, or not received yet."""
         if not start or end > PROCESS_WORDS + 1:
             return
         words = self._words[table]

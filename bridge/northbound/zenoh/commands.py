@@ -181,7 +181,7 @@ class Commands:
         drive, found, name = tail.partition(_PARAMETER)
         return (drive, unquote(name)) if found and drive in self._with_parameters else ("", "")
 
-    def meant(self, tail: str) -> tuple[str, Action]:
+    def addressee_of(self, tail: str) -> tuple[str, Action]:
         """For a key that is no command: the drive, node or bus it is about, or else the key itself; and the
         action."""
         drive, name = self.parameter(tail)

@@ -35,7 +35,7 @@ from bridge.northbound.zenoh.gets import Gets
 from bridge.northbound.zenoh.publication import Publication
 from bridge.northbound.zenoh.sessions import Sessions
 from bridge.northbound.zenoh.users import ANONYMOUS, Users, read_users
-from bridge.zenohlink import Asked, Message, ZenohLink, zenoh_config
+from bridge.zenohlink import IncomingQuery, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
 
@@ -146,7 +146,7 @@ class ZenohServer:
 
     # in
 
-    def _on_query(self, asked: Asked) -> None:
+    def _on_query(self, asked: IncomingQuery) -> None:
         is_pattern = "*" in asked.key
         owner, tail = ("", "") if is_pattern else self._users.owner(self._keys.tail(asked.key))
         if is_pattern and asked.payload is not None:
@@ -175,7 +175,7 @@ class ZenohServer:
                 ending.cancel()
             task.add_done_callback(self._gets.done)
 
-    async def _answer_get(self, asked: Asked) -> None:
+    async def _answer_get(self, asked: IncomingQuery) -> None:
         """The present values of all points that match, a portion at a time."""
         # A part of the answer must not look like all of it.
         end = partial(_refuse, asked, BadCommand("busy", "others wait and this is read slowly; ask for less"))
@@ -194,7 +194,7 @@ class ZenohServer:
         wanted, all_keys, at_zero_ns = zenoh.KeyExpr(pattern), self._keys.keys, self._view.epoch_ns(0.0)
         return [self._render(index, at_zero_ns) for index in indices if wanted.intersects(all_keys[index])]
 
-    def _command(self, asked: Asked, owner: str, tail: str) -> None:
+    def _command(self, asked: IncomingQuery, owner: str, tail: str) -> None:
         def reply(outcome: Outcome) -> None:
             payload = keys.outcome_json(outcome)
             if outcome.ok:
@@ -225,7 +225,7 @@ class ZenohServer:
         came_at = self._askers.arrival(request.identity.user, received_at, now, self._pulse.look)
         self._view.submit(replace(request, received_at=came_at), reply)
 
-    def _identity(self, owner: str, sent: Asked | Message) -> Identity:
+    def _identity(self, owner: str, sent: IncomingQuery | Message) -> Identity:
         """Raises ``BadCommand``."""
         if self._users.are_proved:
             who = owner or ANONYMOUS
@@ -235,7 +235,7 @@ class ZenohServer:
         identity = replace(identity, sets_parameters=self._settings.parameters == "write")
         return self._sessions.of(identity, sent.source)
 
-    def _read_parameter(self, asked: Asked, owner: str, tail: str) -> None:
+    def _read_parameter(self, asked: IncomingQuery, owner: str, tail: str) -> None:
         """A get on the key of a parameter: read from the drive, or with ``?cached`` as last read."""
         drive, name = self._commands.parameter(tail)
         cached = "cached" in re.split("[;&=]", asked.parameters)
@@ -260,13 +260,13 @@ class ZenohServer:
             return
         self._view.submit(request, reply)
 
-    def _note_refusal(self, owner: str, tail: str, sent: Asked | Message, bad: BadCommand) -> None:
+    def _note_refusal(self, owner: str, tail: str, sent: IncomingQuery | Message, bad: BadCommand) -> None:
         """A command that was refused before it became a request, for the audit log."""
         try:
             identity = self._identity(owner, sent)
         except BadCommand:
             identity = identity_of(None)
-        target, action = self._commands.meant(tail)
+        target, action = self._commands.addressee_of(tail)
         self._view.rejected(Rejection(identity, target, action, bad.code, bad.message))
 
     def _on_put(self, message: Message) -> None:
@@ -281,7 +281,7 @@ class ZenohServer:
         self._submit(request, message.received_at, lambda _: None)
 
 
-def _refuse(asked: Asked, bad: BadCommand) -> None:
+def _refuse(asked: IncomingQuery, bad: BadCommand) -> None:
     asked.fail(keys.refusal_json(bad.code, bad.message), keys.JSON)
 
 

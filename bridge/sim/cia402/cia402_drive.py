@@ -89,7 +89,7 @@ class Cia402Drive(SimulatedDevice):
 
     def rpdo_applied(self, number: int) -> None:
         del number
-        self.slave.news.is_there = True
+        self.slave.dirty.is_set = True
         self.axis.obey()
 
     def master_lost(self) -> None:
@@ -114,7 +114,7 @@ class Cia402Drive(SimulatedDevice):
 
     def _pass_time(self) -> None:
         if self.axis.advance(self._now):
-            self.slave.news.is_there = True
+            self.slave.dirty.is_set = True
         if self._consumer.expired(self._now):
             self.master_lost()
 

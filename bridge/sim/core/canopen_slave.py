@@ -81,7 +81,7 @@ class CanopenSlave:
         self._tpdos = tuple(Tpdo() for _ in store.current.tpdo)
         self._rpdos = tuple(Rpdo() for _ in store.current.rpdo)
         self._outbox: deque[Frame] = deque()
-        self.news = emcy.news
+        self.dirty = emcy.dirty
         self._present_plan: SlavePlan | None = None
 
     @property
@@ -96,7 +96,7 @@ class CanopenSlave:
     def touch(self) -> None:
         """Settings may have been changed, or anything else."""
         self._present_plan = None
-        self.news.is_there = True
+        self.dirty.is_set = True
 
     @property
     def dictionary(self) -> Dictionary:
@@ -178,7 +178,7 @@ class CanopenSlave:
         return frames
 
     def _on_guard_request(self, now: float) -> None:
-        self.news.is_there = True
+        self.dirty.is_set = True
         was_lost = self._error_control.life.tripped
         answer = self._error_control.on_guard_request(self.state, now)
         if answer is None:

@@ -30,7 +30,7 @@ class SimulatedDevice(Application):
         self._now = 0.0
         self._injected: list[Callable[[], None]] = []
         self._due: float | None = None
-        """Time at which ``_finish`` has something to do although there is no news."""
+        """Time at which ``_finish`` has something to do although nothing has changed."""
         self._is_steady = False
         """True if nothing has changed since time was last passed: a frame of the same moment need not do it
         again."""
@@ -64,7 +64,7 @@ class SimulatedDevice(Application):
         return self.slave.hears()
 
     def _finish_due(self) -> float | None:
-        """Time at which ``_finish`` has something to do although there is no news."""
+        """Time at which ``_finish`` has something to do although nothing has changed."""
         return self.slave.next_deadline()
 
     @property
@@ -91,7 +91,7 @@ class SimulatedDevice(Application):
             self._advance(now)
         if self.powered:
             self._hear(frame)
-            if self.slave.news.is_there or (self._due is not None and self._due <= self._now):
+            if self.slave.dirty.is_set or (self._due is not None and self._due <= self._now):
                 self._conclude()
         if self.slave.hears() is not self._slave_hears:
             self._listen()
@@ -147,8 +147,8 @@ class SimulatedDevice(Application):
 
     def _conclude(self) -> None:
         self._finish()
-        self._is_steady = not self.slave.news.is_there
-        self.slave.news.is_there = False
+        self._is_steady = not self.slave.dirty.is_set
+        self.slave.dirty.is_set = False
         self._due = self._finish_due()
 
     def _listen(self) -> None:

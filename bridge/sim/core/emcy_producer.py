@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
-from bridge.sim.core.news import News
+from bridge.sim.core.dirty_flag import DirtyFlag
 from bridge.sim.core.settings import CommunicationSettings, SlaveRules
 from bridge.sim.core.store import Store
 
@@ -22,7 +22,7 @@ class EmcyProducer:
         self._sent_at: float | None = None
         self._history: deque[int] = deque(maxlen=rules.error_entries)
         self.error_register = 0
-        self.news = News()
+        self.dirty = DirtyFlag()
 
     @property
     def history_size(self) -> int:
@@ -44,7 +44,7 @@ class EmcyProducer:
     def report(self, code: int, register: int, specific: bytes = b"") -> None:
         """Report an error, or with code 0000h that it is gone. ``specific`` is bytes 3…7."""
         self.error_register = register
-        self.news.is_there = True
+        self.dirty.is_set = True
         if code:
             self._history.appendleft(code | (specific[0] if specific else 0) << 16)
         if self._store.current.emcy.enabled:

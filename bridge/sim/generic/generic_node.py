@@ -124,7 +124,7 @@ class GenericNode(SimulatedDevice):
     def _move(self) -> None:
         tick = int(self._now / TICK_S + 0.5)
         self._moved_at = self._now
-        self.slave.news.is_there = True
+        self.slave.dirty.is_set = True
         for motion in self._motions:
             self._numbers.current.update(motion.values(tick))
 
@@ -162,7 +162,7 @@ class GenericNode(SimulatedDevice):
         """Actual values are what the set-points and the states make of them."""
         for axis in self.axes:
             if axis.obey():
-                self.slave.news.is_there = True
+                self.slave.dirty.is_set = True
         numbers = self._numbers.current
         before = [numbers.get(one.target) for one in self._copies()]
         for one in self._plan.mirrors:
@@ -171,7 +171,7 @@ class GenericNode(SimulatedDevice):
             for one in axis.plan.copies:
                 self._copy(one, is_on=axis.is_enabled)
         if before != [numbers.get(one.target) for one in self._copies()]:
-            self.slave.news.is_there = True
+            self.slave.dirty.is_set = True
 
     def _copies(self) -> list[Copy]:
         return [*self._plan.mirrors, *(one for axis in self._plan.axes for one in axis.copies)]

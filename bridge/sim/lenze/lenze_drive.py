@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Final
 
-from bridge.sim.core.news import News
+from bridge.sim.core.dirty_flag import DirtyFlag
 from bridge.sim.core.ramp import step
 from bridge.sim.core.ticks import next_tick
 from bridge.sim.lenze.lenze_settings import LenzeCodes
@@ -56,7 +56,7 @@ class LenzeDrive:
 
     def __init__(self, codes: Callable[[], LenzeCodes]) -> None:
         self._codes = codes
-        self.news = News()
+        self.dirty = DirtyFlag()
         self.state = DeviceState.INIT
         self.control_word = 0
         self.setpoint = 0
@@ -101,13 +101,13 @@ class LenzeDrive:
         self._causes.clear()
         self.speed_rpm = 0.0
         self.state, self._time, self._ready_at = DeviceState.INIT, now, now + INIT_S
-        self.news.is_there = True
+        self.dirty.is_set = True
 
     def on_words(self, words: Sequence[int]) -> None:
         """CAN1_IN: control word and speed setpoint; the other words are not connected."""
         if self.control_word == words[0] and self.setpoint == words[1]:
             return  # said again
-        self.news.is_there = True
+        self.dirty.is_set = True
         rising = words[0] & ~self.control_word
         self.control_word, self.setpoint = words[0], words[1]
         if rising & RESET_FAULT:
@@ -122,7 +122,7 @@ class LenzeDrive:
         if lasting or reaction is Reaction.TROUBLE:
             self._causes.add(number)
         self._errors[number] = reaction
-        self.news.is_there = True
+        self.dirty.is_set = True
         self._settle()
 
     def cause_gone(self, number: int) -> None:
@@ -130,7 +130,7 @@ class LenzeDrive:
         self._causes.discard(number)
         if self._errors.get(number) is Reaction.TROUBLE:
             del self._errors[number]
-            self.news.is_there = True
+            self.dirty.is_set = True
             self._settle()
 
     def advance(self, now: float) -> None:
@@ -140,7 +140,7 @@ class LenzeDrive:
         self._ramp(dt_s)
         self._settle()
         if before != (self.state, self.speed_rpm):
-            self.news.is_there = True
+            self.dirty.is_set = True
 
     def next_deadline(self) -> float | None:
         if self.state is DeviceState.INIT:

@@ -59,7 +59,7 @@ class LenzeMotec(SimulatedDevice):
         self._process = self._ports()
         servers = [SdoServer(self.objects, RULES.sdo_block_segments) for _ in self._stack.current.sdo]
         self.slave = CanopenSlave(node_id, self._stack, self._process, servers, emcy, self)
-        self.drive.news = self.slave.news
+        self.drive.dirty = self.slave.dirty
         self._fill(emcy)
         self.heard = self._hears()
 

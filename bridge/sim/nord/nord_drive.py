@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.sim.core.dictionary import DataType, Dictionary, Number
-from bridge.sim.core.news import News
+from bridge.sim.core.dirty_flag import DirtyFlag
 from bridge.sim.core.ramp import step
 from bridge.sim.core.ticks import next_tick
 from bridge.sim.nord.nord_faults import INTERFACE_MISSING
@@ -77,7 +77,7 @@ class NordDrive:
         self.last_faults: deque[int] = deque([0] * 5, maxlen=5)
         self.digital_inputs = 0
         self.telegrams_ignored = 0
-        self.news = News()
+        self.dirty = DirtyFlag()
         self._ripple = ripple
         self._random = random.Random(seed)
         self._ripple_now = 0.0
@@ -149,7 +149,7 @@ class NordDrive:
         self.fault_tenths, self._cause_present = 0, False
         self._output_off(now)
         self.state, self._until, self._time = State.NOT_READY, now + CHARGING_S, now
-        self.news.is_there = True
+        self.dirty.is_set = True
 
     def on_telegram(self, control_word: int, setpoints: Sequence[int]) -> bool:
         """Process data from the interface. Returns False for a telegram that is void by bit 10 (§6.5.1)."""
@@ -164,7 +164,7 @@ class NordDrive:
             words = self.setpoints
         if control_word == self.control_word and words == self.setpoints:
             return True  # said again: the drive has taken every transition that this word asks for
-        self.news.is_there = True
+        self.dirty.is_set = True
         acknowledge = bool(control_word & ~self.control_word & ACKNOWLEDGE)
         self.control_word, self.setpoints = control_word, words
         if acknowledge and self.state is State.FAULT and not self._cause_present:
@@ -177,7 +177,7 @@ class NordDrive:
         """Follow what the interface demands in the drive profile."""
         if demand != self.demand:
             self.demand = demand
-            self.news.is_there = True
+            self.dirty.is_set = True
 
     def trip(self, fault_tenths: int, *, lasting: bool = False) -> None:
         """Transition 13. A ``lasting`` cause blocks the acknowledge until ``cause_gone``."""
@@ -187,7 +187,7 @@ class NordDrive:
         self.last_faults.appendleft(fault_tenths)
         self._output_off(self._time)
         self.state, self._until = State.FAULT_REACTION, self._time + FAULT_REACTION_S
-        self.news.is_there = True
+        self.dirty.is_set = True
 
     def communication_lost(self, fault_tenths: int) -> None:
         """Field bus or system bus is lost: a fault, unless P513 (or for 10.9 also P120) lets the drive go
@@ -215,7 +215,7 @@ class NordDrive:
             self._ramp(dt_s)
         self._settle()
         if self.state is not before:
-            self.news.is_there = True
+            self.dirty.is_set = True
 
     def next_deadline(self) -> float | None:
         if self.state in (State.NOT_READY, State.FAULT_REACTION):
@@ -305,7 +305,7 @@ class NordDrive:
         if before_hz == target_hz and not self._accelerating and not self._ripple:
             self._turn(before_hz, dt_s)
             return
-        self.news.is_there = True
+        self.dirty.is_set = True
         if self.state is State.ENABLED and self.control_word & 0x11 == 0x01:
             self.output_hz = 0.0  # bit 4 = 0 sets the ramp generator to 0; the voltage stays on
         else:
@@ -322,7 +322,7 @@ class NordDrive:
         after = approach(*before, goal, self._positioning_hz(), (up, down), dt_s)
         self.position_increments, self.output_hz = after
         self._accelerating = abs(self.output_hz) > abs(before[1])
-        self.news.is_there |= after != before
+        self.dirty.is_set |= after != before
 
     def _turn(self, before_hz: float, dt_s: float) -> None:
         """The shaft turns on."""
@@ -331,7 +331,7 @@ class NordDrive:
         if self.position_increments != before:
             codes = (self.parameters.meaning(543, n, self._set) for n in range(1, SET_POINTS + 1))
             if self.has_encoder or any(code in _POSITION for code in codes):
-                self.news.is_there = True
+                self.dirty.is_set = True
 
     def _ramp_times_s(self) -> tuple[float, float]:
         """Up and down, between 0 and P105."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from bridge.sim.core.dictionary import DataType, Dictionary, Number, constant
-from bridge.sim.core.news import News
+from bridge.sim.core.dirty_flag import DirtyFlag
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_settings import (
     ACTUAL_VALUES,
@@ -35,14 +35,14 @@ class ProcessImage:
         self.setpoints = [0] * (DRIVES * self._per_drive)
         self.outputs = 0
         self.inputs = 0
-        self.news = News()
+        self.dirty = DirtyFlag()
 
     def clear(self) -> None:
         self.control = [0] * DRIVES
         self.setpoints = [0] * (DRIVES * self._per_drive)
         self.outputs = 0
         self._touched.clear()
-        self.news.is_there = True
+        self.dirty.is_set = True
 
     def take_touched(self) -> list[int]:
         touched = sorted(self._touched)
@@ -55,7 +55,7 @@ class ProcessImage:
 
     def set_outputs(self, value: int) -> None:
         self.outputs = value
-        self.news.is_there = True
+        self.dirty.is_set = True
 
     def setpoints_of(self, drive: int) -> list[int]:
         return self.setpoints[drive * self._per_drive : (drive + 1) * self._per_drive]
@@ -99,7 +99,7 @@ class ProcessImage:
             self._touched.add(drive)
             if self.control[drive] != value:
                 self.control[drive] = value
-                self.news.is_there = True
+                self.dirty.is_set = True
 
         return Number(DataType.UNSIGNED16, lambda: self.control[drive], write, in_rpdo=True, in_tpdo=True)
 
@@ -112,7 +112,7 @@ class ProcessImage:
             self._touched.add(place // self._per_drive)
             if self.setpoints[place] != value:
                 self.setpoints[place] = value
-                self.news.is_there = True
+                self.dirty.is_set = True
 
         # §6.5.8 maps a control word and a setpoint into 1A00h: an RW object can be mapped both ways.
         return Number(DataType.UNSIGNED16, lambda: self.setpoints[place], write, in_rpdo=True, in_tpdo=True)

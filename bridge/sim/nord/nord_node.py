@@ -49,7 +49,7 @@ class NordNode(SimulatedDevice):
             self.node_id, self._communication, dictionary, servers, emcy=self._emcy, application=self
         )
         for drive in self.drives:
-            drive.news = self.slave.news
+            drive.dirty = self.slave.dirty
 
     # To be defined by the family.
 

@@ -102,7 +102,7 @@ class VelocityMode:
             image.touch(place)
             if self._targets_rpm[place] != value:
                 self._targets_rpm[place] = value
-                image.news.is_there = True
+                image.dirty.is_set = True
 
         def error() -> int:
             fault = drive.fault_tenths if self._online(place) else 0

@@ -92,7 +92,7 @@ class NordSingle(NordNode):
 
     def rpdo_applied(self, number: int) -> None:
         del number  # the objects written tell which
-        self.slave.news.is_there = True
+        self.slave.dirty.is_set = True
         if 0 in self._written and self._control & VALID and self.linked:
             self._watch.on_telegram(self._now)
             self._causes_gone(TELEGRAM_DOWNTIME)

@@ -74,7 +74,7 @@ class NordTu4(NordNode):
             self._communication.save()
         self._interface.save()  # commissioned before it was connected to this bus
         self._build()
-        self.image.news = self.slave.news
+        self.image.dirty = self.slave.dirty
 
     # What a test or a demonstration does to its drives.
 

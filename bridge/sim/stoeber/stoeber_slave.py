@@ -129,7 +129,7 @@ class StoeberSlave(CanopenSlave):
     def _on_sync(self, now: float) -> None:
         self._sync.start(now)
         if self._sync.next_deadline() is not None:
-            self.news.is_there = True
+            self.dirty.is_set = True
         super()._on_sync(now)
 
     def _apply(self, rpdo: MappedRpdo, data: bytes) -> None:
@@ -137,6 +137,6 @@ class StoeberSlave(CanopenSlave):
         covered = [place for place in rpdo.places if place.end <= len(data)]
         self.rpdos_ignored += unpack(covered, data)
         self._application.rpdo_applied(rpdo.number)
-        self.news.is_there = True
+        self.dirty.is_set = True
         if rpdo.settings.transmission_type == ANSWERED:
             self._answers[rpdo.number].ask()

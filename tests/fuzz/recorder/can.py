@@ -1,4 +1,4 @@
-"""What nodes say: all that the simulated nodes of the rig send, from power-on to operational."""
+"""Recorder of nodes: all that the simulated nodes of the rig send, from power-on to operational."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What pymodbus and mbpoll say."""
+"""Recorder of the requests of pymodbus and mbpoll."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def record(rig: Rig) -> list[Path]:
 
 
 def _noted(proxy: Proxy, calls: list[tuple[str, Callable[[], object]]]) -> list[Recorded]:
-    """What each call sent."""
+    """Messages that each call sent."""
     recorded: list[Recorded] = []
     for what, call in calls:
         before = sum(len(link.sent) for link in proxy.links)

@@ -1,4 +1,4 @@
-"""What asyncua and node-opcua say."""
+"""Recorder of the messages of asyncua and node-opcua."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _case(message: bytes, known: dict[bytes, bytes]) -> tuple[str, Case]:
 
 
 def _known(link: Link) -> dict[bytes, bytes]:
-    """What the server has given in this connection, and the markers for it."""
+    """Bytes that the server has given in this connection, and the markers for them."""
     known: dict[bytes, bytes] = {}
     for message in _messages(link.received):
         body = message[HEAD.size :]

@@ -1,4 +1,5 @@
-"""What zenoh clients ask: the demo's controller the tables of the documentation, and a session's bytes."""
+"""Recorder of zenoh clients: the demo's controller, the tables of the documentation, and a session's
+bytes."""
 
 from __future__ import annotations
 

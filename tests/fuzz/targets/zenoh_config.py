@@ -1,4 +1,4 @@
-"""How the fuzzers' sessions of zenoh are configured."""
+"""Configuration of the fuzzers' sessions of zenoh."""
 
 from __future__ import annotations
 

@@ -22,8 +22,9 @@ _OF_THE_LIBRARY: Final = ("ZError", "PanicException")
 
 
 def declare_keys(port: int, mode: str, keys: Sequence[tuple[str, str, int]]) -> None:
-    """What to declare, the first word of the key, and how many it has. Whether the library itself bears it is
-    none of the bridge's; raises ``RuntimeError`` where nothing was declared for another reason."""
+    """Declare keys: what to declare, the first word of the key, and how many it has. Whether the library
+    itself bears it is none of the bridge's; raises ``RuntimeError`` where nothing was declared for another
+    reason."""
     arguments = [":".join(map(str, key)) for key in keys]
     command = [sys.executable, "-m", "tests.fuzz.targets.zenoh_keys", str(port), mode, *arguments]
     with contextlib.suppress(subprocess.TimeoutExpired):

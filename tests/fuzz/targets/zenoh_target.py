@@ -24,7 +24,7 @@ _MODES: Final = ("client", "peer", "router")
 _DEEPEST: Final = 9000
 """Words of a key. It fits into no message that the bridge takes, and ended its process when it did."""
 _MOST_WORDS: Final = 100_000
-"""Of all keys of a run that are taken: zenoh keeps each word of each for ever."""
+"""Limit for the words of all keys of a run: zenoh keeps each word of each for ever."""
 _ANSWER_S: Final = 0.3
 _MOST_ASKED: Final = 8
 _PATIENCE_S: Final = 10.0

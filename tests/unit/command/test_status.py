@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from bridge.command.status import DriveStatus
-from bridge.drive import DriveState, EmergencyReader, Explained, Told
+from bridge.drive import DriveState, EmergencyMeaning, EmergencyReader, Explained
 from bridge.mapping import load_family
 
 NORD = load_family("nord/sk-tu4-cao")
 FAULT, ENABLED = DriveState.FAULT, DriveState.OPERATION_ENABLED
 
 
-def emergency(code: int) -> Told:
+def emergency(code: int) -> EmergencyMeaning:
     return EmergencyReader(NORD).read(code, bytes(5))
 
 

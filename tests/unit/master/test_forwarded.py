@@ -187,17 +187,17 @@ def back(bench: Bench) -> None:
 
 
 def another_bridge_is_in_charge(bench: Bench) -> None:
-    bench.network.charge._listening.listen_s = LISTENS_S
+    bench.network.mastership._listening.listen_s = LISTENS_S
     bench.hang(0.15)
     bench.receive(TWIN)
     bench.run(0.02)
-    assert bench.network.charge.is_left
+    assert bench.network.mastership.is_passive
 
 
 def it_comes_back_to_the_bus(bench: Bench) -> None:
     """The other bridge has fallen silent."""
     another_bridge_is_in_charge(bench)
-    while bench.network.charge.is_left:
+    while bench.network.mastership.is_passive:
         bench.run(0.01)
 
 
@@ -215,7 +215,7 @@ def ask(bench: Bench, target: str, asked: Asked) -> tuple[Outcome, bool]:
     """Its outcome, and whether the bus repeats what it asks, while the node's state is one and the same."""
     core, begin = bench.network.nodes[0], len(bench.log)
     state = core.state
-    if bench.network.charge.is_left:
+    if bench.network.mastership.is_passive:
         bench.receive(TWIN)
     outcome = asked.ask(bench)
     bench.run(WINDOW_S)
@@ -249,7 +249,7 @@ def test_an_answer_says_forwarded_where_the_bus_says_what_was_asked(
 @pytest.mark.parametrize("target", RPDO)
 def test_while_the_bridge_listens_at_its_start_nothing_is_forwarded(tmp_path: Path, target: str) -> None:
     bench = bench_of(tmp_path, target)
-    bench.network.charge._listening = Listening(LISTENS_S)
+    bench.network.mastership._listening = Listening(LISTENS_S)
     bench.run(0.01)
     for asked in ASKED[target]:
         outcome = asked.ask(bench)

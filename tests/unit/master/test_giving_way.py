@@ -48,7 +48,7 @@ def stopped_and_left(bench: Bench, since: float) -> bool:
 
 def listens(bench: Bench) -> None:
     """Its bridge gives way as one on a real bus does."""
-    bench.network.charge._listening.listen_s = LISTENS_S
+    bench.network.mastership._listening.listen_s = LISTENS_S
 
 
 # what makes the bridge give way

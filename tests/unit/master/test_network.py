@@ -14,7 +14,7 @@ from bridge.command import Action, Code, Outcome, ReadParameter, Request
 from bridge.command.node import Enforce
 from bridge.image import Quality
 from bridge.mapping.model import IdentityRule
-from bridge.master.line import Line
+from bridge.master.line import BusLine
 from bridge.master.standstill import Alarm, StoodStill
 from tests.support.bench import NORD, PLC, Bench, write_site
 
@@ -252,9 +252,9 @@ def test_a_process_stopped_at_the_end_of_its_last_look_at_the_clock_sends_nothin
 ) -> None:
     """The time that it has read is right, and a second old."""
     running(bench)
-    alarm, look = Alarm(), Line.stood_still
+    alarm, look = Alarm(), BusLine.stood_still
 
-    def stand_still_after(line: Line, since: float) -> bool:
+    def stand_still_after(line: BusLine, since: float) -> bool:
         found = look(line, since)
         if alarm_is_set and not alarm.rang:
             bench.now += 1.0
@@ -267,7 +267,7 @@ def test_a_process_stopped_at_the_end_of_its_last_look_at_the_clock_sends_nothin
     with monkeypatch.context() as patched:
         patched.setattr(alarm, "set", alarm_is_set.append)
         patched.setattr(line, "alarm", alarm)
-        patched.setattr(Line, "stood_still", stand_still_after)
+        patched.setattr(BusLine, "stood_still", stand_still_after)
         bench.write(control_word=0x047F, setpoint_1=0x2100)
     assert alarm_is_set == [0.1], "the dead-man time"
     bench.run(0.5)

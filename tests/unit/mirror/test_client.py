@@ -15,7 +15,7 @@ from bridge.image import Point, Quality
 from bridge.mirror import MirrorClient, MirrorPublisher, protocol
 from bridge.mirror import client as mirror_client
 from bridge.mirror.protocol import Answered, Changed, Delta, Snapshot
-from bridge.zenohlink import Asked, Message
+from bridge.zenohlink import IncomingQuery, Message
 from tests.support.views import view_of
 from tests.support.zenoh_site import READY, drive_says, epoch, make_plant, node_is
 
@@ -65,7 +65,7 @@ class Bus:
     def ask(self, target: str, command: Command) -> Query:
         request = Request(SCADA, target, command, time.monotonic())
         query = Query(protocol.encode_request(request, time.monotonic() + 5))
-        self.publisher._on_request(cast("Asked", query))
+        self.publisher._on_request(cast("IncomingQuery", query))
         return query
 
     def names(self) -> list[str]:

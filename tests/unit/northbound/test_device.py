@@ -63,4 +63,4 @@ def test_zenoh_reads_and_writes_its_parameters_by_any_name(bench: Bench) -> None
     bench.view.submit(commands.reading("shaft", "6000:00", engineer, cached=False), outcomes.append)
     bench.run(0.5)
     assert [(one.ok, one.value) for one in outcomes] == [(True, 5), (True, 5)]
-    assert commands.meant("shaft/parameter/6000") == ("shaft", Action.WRITE_PARAMETER)
+    assert commands.addressee_of("shaft/parameter/6000") == ("shaft", Action.WRITE_PARAMETER)

@@ -10,7 +10,7 @@ import pytest
 from bridge.base.errors import OperationFailed, Unavailable
 from bridge.base.notify import Notifier
 from bridge.command import Event
-from bridge.service.parts import Parts, Ports, ServerPart
+from bridge.service.parts import Ports, ServerPart, Supervisor
 from tests.support import sites
 
 
@@ -42,7 +42,7 @@ class Case:
         self.events: list[Event] = []
         plant.on_event(self.events.append)
         self.now = 10.0
-        self.parts = Parts(plant, Notifier(), lambda: self.now, "1 drive")
+        self.supervisor = Supervisor(plant, Notifier(), lambda: self.now, "1 drive")
 
     @property
     def failing(self) -> object:
@@ -50,8 +50,8 @@ class Case:
 
     async def fails(self, part: Part) -> None:
         """As ``keep`` does it once, without its pause."""
-        how = await self.parts._run_once(part)
-        self.parts._fails(part, how, 0.2)
+        how = await self.supervisor._run_once(part)
+        self.supervisor._fails(part, how, 0.2)
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def case(monkeypatch: pytest.MonkeyPatch) -> Case:
 async def test_one_that_fails_is_told_with_its_reason_and_shown(case: Case) -> None:
     await case.fails(Part(OperationFailed("the port is taken")))
     assert case.failing == "modbus: has failed: the port is taken"
-    assert case.parts.status == "1 drive; not served: modbus: has failed: the port is taken"
+    assert case.supervisor.status == "1 drive; not served: modbus: has failed: the port is taken"
     (event,) = case.events
     assert event.message == "the Modbus server has failed: the port is taken; it is started again in 0.2 s"
 
@@ -81,30 +81,30 @@ async def test_it_is_told_once_a_minute_and_again_when_it_serves(case: Case) -> 
     await case.fails(part)
     await case.fails(part)
     assert len(case.events) == 1
-    case.parts._serves(part)
+    case.supervisor._serves(part)
     assert case.failing == ""
-    assert case.parts.status == "1 drive"
+    assert case.supervisor.status == "1 drive"
     assert case.events[-1].message == "the Modbus server serves again"
-    case.parts._serves(part)
+    case.supervisor._serves(part)
     assert len(case.events) == 2
 
 
 async def test_all_are_known_when_each_has_served_or_failed(case: Case) -> None:
     part = Part()
-    case.parts.expect([part])
-    waiting = asyncio.create_task(case.parts.all_known())
+    case.supervisor.expect([part])
+    waiting = asyncio.create_task(case.supervisor.all_known())
     await asyncio.sleep(0)
     assert not waiting.done()
-    case.parts._serves(part)
+    case.supervisor._serves(part)
     await asyncio.wait_for(waiting, 5)
-    case.parts.expect([])
-    await asyncio.wait_for(case.parts.all_known(), 5)
+    case.supervisor.expect([])
+    await asyncio.wait_for(case.supervisor.all_known(), 5)
 
 
 async def test_one_that_ends_is_started_again(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bridge.service.parts._FIRST_PAUSE_S", 0.0)
     part = Part("has ended", OperationFailed("no"))
-    keeping = asyncio.create_task(case.parts.keep(part))
+    keeping = asyncio.create_task(case.supervisor.keep(part))
     await asyncio.wait_for(part.serving.wait(), 5)
     assert part.turns == []
     keeping.cancel()

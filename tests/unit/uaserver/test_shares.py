@@ -12,7 +12,7 @@ from bridge.uaserver import shares
 from bridge.uaserver.eventfilter import EventFilter
 from bridge.uaserver.items import EventItem, Settings
 from bridge.uaserver.library import ServiceError
-from bridge.uaserver.shares import Listening, room_for_items
+from bridge.uaserver.shares import EventItemQuota, room_for_items
 from bridge.uaserver.subscription import Subscription, terms
 from bridge.uaserver.where import Where
 
@@ -53,7 +53,7 @@ def test_one_address_takes_no_more_than_its_share_of_items() -> None:
 
 
 def test_one_address_takes_no_more_than_its_share_of_items_for_events() -> None:
-    all_ = Listening()
+    all_ = EventItemQuota()
     for _ in range(6):
         all_.change(HERE, 10)
     with pytest.raises(ServiceError) as refused:

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Do, Identity, Request, Source, TakeControl, command_of
-from bridge.command.messages.freshness import BOUND_MS, GRAIN_MS, NEVER, Inflow, Look, is_stale
+from bridge.command.messages.freshness import BOUND_MS, GRAIN_MS, NEVER, Inflow, LoopPulse, is_stale
 from tests.support.rig import ACKNOWLEDGE, ENABLE, HALF_SPEED, OTHER_PLC, PLC, SHUT_DOWN, Rig
 
 STEP_S = 0.001
@@ -57,7 +57,7 @@ class Server:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.look = Look(0.0, 0.0)
+        self.look = LoopPulse(0.0, 0.0)
         self.beat_at = 0.0
         self.inflow = Inflow(0.0, self.look)
         self.waiting: deque[tuple[int, float]] = deque()
@@ -83,7 +83,7 @@ class Server:
             self.inflow.reopen(now)
         if now - self.beat_at >= BEAT_S:
             has_hung = now - self.beat_at > HANG_S
-            self.look = Look(self.beat_at, now if has_hung else self.look.steady_since)
+            self.look = LoopPulse(self.beat_at, now if has_hung else self.look.steady_since)
             self.beat_at = now
 
 
@@ -153,35 +153,35 @@ def test_after_a_flood_who_has_calmed_down_counts_again():
 
 
 def test_what_comes_first_may_have_waited_for_the_connection_to_be_taken():
-    inflow = Inflow(5.0, Look(1.0, 0.0))
-    assert inflow.arrive(5.02, Look(4.99, 4.99)) == 1.0
-    inflow = Inflow(5.0, Look(1.0, 0.0))
-    assert inflow.arrive(5.06, Look(5.05, 5.0)) == 5.06
+    inflow = Inflow(5.0, LoopPulse(1.0, 0.0))
+    assert inflow.arrive(5.02, LoopPulse(4.99, 4.99)) == 1.0
+    inflow = Inflow(5.0, LoopPulse(1.0, 0.0))
+    assert inflow.arrive(5.06, LoopPulse(5.05, 5.0)) == 5.06
 
 
 @pytest.mark.parametrize(("arrivals", "counts"), [(20, True), (60, False)])
 def test_calm_is_few_arrivals(arrivals: int, counts: bool):
-    inflow = Inflow(0.0, Look(0.0, 0.0))
-    inflow.arrive(1.0, Look(0.99, 0.0), crowded=True)
+    inflow = Inflow(0.0, LoopPulse(0.0, 0.0))
+    inflow.arrive(1.0, LoopPulse(0.99, 0.0), crowded=True)
     for n in range(arrivals):
         at = 1.0 + 0.1 * n / arrivals
-        assert inflow.arrive(at, Look(at - 0.01, 0.0)) == NEVER
-    assert (inflow.arrive(1.12, Look(1.11, 0.0)) != NEVER) is counts
+        assert inflow.arrive(at, LoopPulse(at - 0.01, 0.0)) == NEVER
+    assert (inflow.arrive(1.12, LoopPulse(1.11, 0.0)) != NEVER) is counts
 
 
 def test_what_comes_after_a_hang_where_nobody_sees_the_connections_waits_for_calm():
-    inflow = Inflow(0.0, Look(0.0, NEVER), is_hidden=True)
-    assert inflow.arrive(0.02, Look(0.01, NEVER)) == 0.02
-    assert inflow.arrive(1.03, Look(0.03, NEVER)) == 0.03
-    assert inflow.arrive(1.05, Look(1.03, 1.03)) == NEVER
-    assert inflow.arrive(1.20, Look(1.19, 1.03)) == 1.20
-    assert inflow.arrive(1.21, Look(1.20, 1.03)) == 1.21
+    inflow = Inflow(0.0, LoopPulse(0.0, NEVER), is_hidden=True)
+    assert inflow.arrive(0.02, LoopPulse(0.01, NEVER)) == 0.02
+    assert inflow.arrive(1.03, LoopPulse(0.03, NEVER)) == 0.03
+    assert inflow.arrive(1.05, LoopPulse(1.03, 1.03)) == NEVER
+    assert inflow.arrive(1.20, LoopPulse(1.19, 1.03)) == 1.20
+    assert inflow.arrive(1.21, LoopPulse(1.20, 1.03)) == 1.21
 
 
 def test_who_asks_for_the_first_time_after_a_hang_may_have_asked_before_it():
-    assert Inflow(5.5, Look(5.49, 5.0), is_hidden=True).arrive(5.5, Look(5.49, 5.0)) == NEVER
-    assert Inflow(6.5, Look(6.49, 5.0), is_hidden=True).arrive(6.5, Look(6.49, 5.0)) == 6.5
-    assert Inflow(5.5, Look(5.49, 5.0)).arrive(5.5, Look(5.49, 5.0)) == 5.5
+    assert Inflow(5.5, LoopPulse(5.49, 5.0), is_hidden=True).arrive(5.5, LoopPulse(5.49, 5.0)) == NEVER
+    assert Inflow(6.5, LoopPulse(6.49, 5.0), is_hidden=True).arrive(6.5, LoopPulse(6.49, 5.0)) == 6.5
+    assert Inflow(5.5, LoopPulse(5.49, 5.0)).arrive(5.5, LoopPulse(5.49, 5.0)) == 5.5
 
 
 # at the drive

@@ -148,7 +148,7 @@ def test_methods_are_told_from_values() -> None:
     ],
 )
 def test_what_is_no_command_may_still_be_about_somebody(tail: str, target: str, action: Action) -> None:
-    assert COMMANDS.meant(tail) == (target, action)
+    assert COMMANDS.addressee_of(tail) == (target, action)
 
 
 def test_the_controller_names_itself() -> None:

@@ -46,11 +46,11 @@ def test_words_of_a_drive_lie_at_its_place() -> None:
 def test_a_word_said_again_is_a_telegram_but_no_news() -> None:
     rig = Rig()
     rig.write(0x3000, 1, 7)
-    rig.image.news.is_there = False
+    rig.image.dirty.is_set = False
     rig.write(0x3000, 1, 7)
-    assert (rig.image.news.is_there, rig.image.take_touched()) == (False, [0])
+    assert (rig.image.dirty.is_set, rig.image.take_touched()) == (False, [0])
     rig.image.clear()
-    assert (rig.image.news.is_there, rig.image.control) == (True, [0] * 4)
+    assert (rig.image.dirty.is_set, rig.image.control) == (True, [0] * 4)
 
 
 @pytest.mark.parametrize("element", [1, 2, 3, 6])

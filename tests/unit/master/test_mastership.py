@@ -7,8 +7,8 @@ from typing import Any, cast
 import pytest
 
 from bridge.command import Event
-from bridge.master.charge import Charge
 from bridge.master.listening import Listening
+from bridge.master.mastership import BusMastership
 from bridge.node.node import NodeCore
 from tests.support import sites
 
@@ -24,7 +24,7 @@ class Channel:
 
 
 class Node:
-    """What charge needs of one: who is told, and its drives."""
+    """Node as mastership needs it: who is told, and its drives."""
 
     def __init__(self, *, is_out_of_service: bool = False) -> None:
         self.is_out_of_service = is_out_of_service
@@ -48,7 +48,7 @@ class Case:
         self.listening = Listening(0.0 if begins_acting else 1.0, lambda: 0.0)
         nodes = cast("list[NodeCore]", self.nodes)
         forget = self._forget
-        self.charge = Charge(plant.site.bus[0], nodes, plant, forget, self.listening)
+        self.mastership = BusMastership(plant.site.bus[0], nodes, plant, forget, self.listening)
 
     def _forget(self, now: float, why: str) -> None:
         self.forgotten.append(why)
@@ -58,23 +58,23 @@ class Case:
 def case() -> Case:
     """It has listened since 10 s, for a second."""
     case = Case()
-    case.charge.on_time(10.0)
+    case.mastership.on_time(10.0)
     return case
 
 
 def test_it_listens_before_it_acts(case: Case) -> None:
-    assert not case.charge.acts()
-    assert case.charge.why_not == "on can0 the bridge listens before it begins"
-    case.charge.on_time(11.0)
-    assert case.charge.acts()
-    assert case.charge.why_not == ""
+    assert not case.mastership.acts()
+    assert case.mastership.why_not == "on can0 the bridge listens before it begins"
+    case.mastership.on_time(11.0)
+    assert case.mastership.acts()
+    assert case.mastership.why_not == ""
     assert case.told == []
 
 
 def test_it_gives_way_to_one_that_is_there_and_says_so_once(case: Case) -> None:
-    case.charge.heard("SYNC", 10.5)
-    case.charge.heard("SYNC", 10.6)
-    assert case.charge.is_left
+    case.mastership.heard("SYNC", 10.5)
+    case.mastership.heard("SYNC", 10.6)
+    assert case.mastership.is_passive
     assert case.forgotten == ["another bridge is in charge of can0"]
     (event,) = case.told
     assert event.message == (
@@ -86,29 +86,29 @@ def test_it_gives_way_to_one_that_is_there_and_says_so_once(case: Case) -> None:
 
 
 def test_it_takes_over_when_the_other_has_been_silent_and_begins_with_all_stopped(case: Case) -> None:
-    case.charge.heard("SYNC", 10.5)
-    case.charge.on_time(13.4)
-    assert case.charge.is_left
-    case.charge.on_time(13.5)
-    assert case.charge.acts()
+    case.mastership.heard("SYNC", 10.5)
+    case.mastership.on_time(13.4)
+    assert case.mastership.is_passive
+    case.mastership.on_time(13.5)
+    assert case.mastership.acts()
     assert case.told[-1].message == "the other bridge has been silent for 3000 ms: this one takes over"
     assert case.nodes[0].said[-1] == "waiting"
     assert [node.drive.gaps for node in case.nodes] == [[13.5], [13.5]]
 
 
 def test_one_that_has_acted_for_longer_than_it_listens_stays(case: Case) -> None:
-    case.charge.on_time(11.0)
-    case.charge.heard("SYNC", 13.0)
-    assert case.charge.acts()
+    case.mastership.on_time(11.0)
+    case.mastership.heard("SYNC", 13.0)
+    assert case.mastership.acts()
     assert case.forgotten == []
 
 
 def test_a_bus_that_is_back_is_still_the_others() -> None:
     case = Case()
-    case.charge.on_time(10.0)
-    case.charge.heard("SYNC", 10.5)
+    case.mastership.on_time(10.0)
+    case.mastership.heard("SYNC", 10.5)
     case.nodes[0].said.clear()
-    case.charge.bus_is_gone()
-    case.charge.bus_is_back(20.0)
-    assert case.charge.is_left
+    case.mastership.bus_is_gone()
+    case.mastership.bus_is_back(20.0)
+    assert case.mastership.is_passive
     assert case.nodes[0].said == ["passive: another bridge is in charge of can0"]

@@ -1,4 +1,4 @@
-"""Who is in charge of a bus, this bridge or another one, and how that is reported. Sans-IO."""
+"""Mastership of a bus: whether this bridge or another one is in charge, and how that is reported. Sans-IO."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from bridge.node.node import NodeCore
 from bridge.text import Text
 
 
-class Charge:
-    """Knows by ``listening`` whether this bridge acts. ``forget`` drops all that is known of the bus: now,
+class BusMastership:
+    """Mastership of one bus, by ``listening``. ``forget`` drops all that is known of the bus: now,
     and why."""
 
     def __init__(
@@ -30,17 +30,17 @@ class Charge:
         self._listening = listening or Listening(listen_s(bus))
 
     def acts(self) -> bool:
-        """Whether this bridge acts: otherwise nothing is sent."""
+        """True if this bridge acts: otherwise nothing is sent."""
         return self._listening.part is Part.ACTING
 
     @property
-    def is_left(self) -> bool:
-        """Whether another bridge is in charge."""
+    def is_passive(self) -> bool:
+        """True if another bridge is in charge."""
         return self._listening.is_passive
 
     @property
     def why_not(self) -> str:
-        """Why nothing is sent; empty where this bridge acts."""
+        """Reason why nothing is sent; empty where this bridge acts."""
         return "" if self.acts() else f"on {self._bus.name} the bridge {self._listening.part.value}"
 
     def heard(self, sign: str, now: float) -> None:
@@ -54,8 +54,8 @@ class Charge:
 
     def on_time(self, now: float) -> None:
         """Begin to act when it is time: as at any start, with everything stopped."""
-        was_left = self.is_left
-        if not self._listening.on_time(now) or not was_left:
+        was_passive = self.is_passive
+        if not self._listening.on_time(now) or not was_passive:
             return
         silent_ms = self._listening.silence_s * 1000
         self._tell(Text.of("bus.takes_over", silent_ms=silent_ms), now)
@@ -78,7 +78,7 @@ class Charge:
 
     def bus_is_back(self, now: float) -> None:
         self._listening.bus_is_back(now)
-        if self.is_left:
+        if self.is_passive:
             self._say_passive(now)
 
     def _say_passive(self, now: float) -> None:

@@ -25,7 +25,7 @@ class Lanes(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class IncomingQuery:
     """A query, to be answered from the loop: any number of ``send``, then ``finish`` or ``fail``.
 
     If it is not finished, the client waits until its own time-out.
@@ -45,7 +45,7 @@ class Asked:
     _lane: Lane
     _is_apart: bool = False
 
-    def apart(self) -> Asked:
+    def apart(self) -> IncomingQuery:
         """The same, answered on a thread of its own, which ``finish`` ends. For long answers: replies wait
         for a client that does not read."""
         return replace(self, _lane=self._link.own_lane(self._lane), _is_apart=True)

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import zenoh
 
-from bridge.zenohlink.asked import Asked, Lanes
+from bridge.zenohlink.incoming_query import IncomingQuery, Lanes
 from bridge.zenohlink.lane import Lane
 from bridge.zenohlink.message import Message
 
@@ -59,9 +59,9 @@ class Link:
     async def settle(self, lane: Lane | None = None) -> None: ...
 
 
-def asked(line: Line, link: Link, query: Query) -> Asked:
+def asked(line: Line, link: Link, query: Query) -> IncomingQuery:
     of_zenoh = cast("zenoh.Query", query)
-    return Asked("a/b", None, None, "", 10.0, "", of_zenoh, cast("Lanes", link), cast("Lane", line))
+    return IncomingQuery("a/b", None, None, "", 10.0, "", of_zenoh, cast("Lanes", link), cast("Lane", line))
 
 
 def test_all_replies_of_a_call_have_one_time_stamp() -> None:

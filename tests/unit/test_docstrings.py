@@ -1,0 +1,61 @@
+"""Docstrings begin with the noun, or with the verb of what is done: not with "What", "How" or "Of"."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.support.process import REPOSITORY
+
+ROOMS = (
+    "can",
+    "canclient",
+    "canopen",
+    "cli",
+    "dbc",
+    "derive",
+    "dictionary",
+    "eds",
+    "northbound/modbus",
+    "northbound/zenoh",
+    "parameter",
+    "sim",
+    "uaserver",
+    "zenohlink",
+)
+HEADLESS = frozenset(
+    ("As", "By", "How", "Of", "Those", "What", "Whatever", "When", "Where", "Which", "Who", "Whose", "Why")
+)
+
+
+def docstrings(source: str) -> Iterator[str]:
+    """Docstrings of modules, classes and functions, and those below attributes."""
+    for node in ast.walk(ast.parse(source)):
+        body = getattr(node, "body", None)
+        for statement in body if isinstance(body, list) else []:
+            value = statement.value if isinstance(statement, ast.Expr) else None
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                yield value.value
+
+
+def headless(folder: Path) -> list[str]:
+    """Docstrings of the modules in ``folder`` that begin with a headless clause, with their files."""
+    return [
+        f"{file.relative_to(folder)}: {text}"
+        for file in sorted(folder.rglob("*.py"))
+        for text in docstrings(file.read_text(encoding="utf-8"))
+        if text.split(None, 1)[:1] and text.split(None, 1)[0] in HEADLESS
+    ]
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_docstrings_begin_with_the_noun(room: str) -> None:
+    assert headless(REPOSITORY / "bridge" / room) == []
+
+
+def test_a_headless_docstring_is_found(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text('class Tap:\n    x = 1\n    """What has come."""\n')
+    assert headless(tmp_path) == ["module.py: What has come."]

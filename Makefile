@@ -62,6 +62,11 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 test: compiled packages clients ## all tests: unit, foreign, wire, docs, browser, a minute of fuzzing, lab
 	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "foreign unit" "pages browser fuzz-short"
 
+# One after the other, so that nobody disturbs who measures times; and all of them even if one fails.
+nightly: export NIGHTLY := 1
+nightly: compiled packages clients ## the same, with all examples and with what takes long: an hour, for a timer
+	@$(MAKE) --no-print-directory -k unit foreign wire lab pages browser fuzz-short
+
 # Beside the others they get what these leave of the CPUs.
 unit: $(VENV)/dev.stamp ## tests of the code alone
 	@echo "== unit tests"
@@ -223,5 +228,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
+.PHONY: demo test nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
   check-imports format docs setup lock wheel clean help

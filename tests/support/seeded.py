@@ -24,11 +24,16 @@ from typing import Final
 import pytest
 from _pytest.runner import runtestprotocol
 
+from bridge import mapping
+from bridge.mapping.loader import family_names
 from tests.proof.mutants import Edit
 from tests.support.process import REPOSITORY
 
-_MOST_S: Final = 20
-"""Processor time; tests that need more with a fault have noticed it: it is in a loop without an end."""
+_MOST_S: Final = 5
+"""Processor time; tests that need more with a fault have noticed it: it is in a loop without an end. With any
+other fault they are done within a second."""
+_OPTIONS: Final = ("-q", "-s", "-p", "no:cacheprovider", "-p", "no:xdist", "--tb=native", "--assert=plain")
+"""Nobody reads what a test says that fails as it should, and that would take longer than the test."""
 _PLAIN: Final = (bool, int, float, str, tuple, frozenset)
 _FAILED, _BROKEN, _SAME = 1, 98, 99
 _FOUND: Final = (_FAILED, -signal.SIGXCPU, -signal.SIGKILL)
@@ -110,6 +115,8 @@ class _Loop:
         self.lives: list[str] = []
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        for family in family_names():  # kept (conftest.py), so that not every process reads them
+            mapping.load_family(family)
         every = tuple({test for fault in self._faults for test in fault.tests})
         if code := self._run(_chosen(session, every), None):
             self.lives.append(f"the tests end with {code} on the program as it is")
@@ -167,7 +174,7 @@ def main() -> int:
     loop = _Loop(faults)
     tests = sorted({test.partition("::")[0] for fault in faults for test in fault.tests})
     with redirect_stdout(StringIO()):
-        code = pytest.main(["-q", "-s", "-p", "no:cacheprovider", "-p", "no:xdist", *tests], [loop])
+        code = pytest.main([*_OPTIONS, *tests], [loop])
     if code:
         loop.lives.append(f"the tests cannot be collected: {code}")
     print("\n".join(loop.lives), end="\n" if loop.lives else "")

@@ -14,6 +14,7 @@ from bridge.can.kernelbursts import KernelBursts
 from bridge.can.softbursts import SoftBursts
 from bridge.canopen.frame import Frame
 from tests.support.broadcast_manager import BroadcastManager
+from tests.support.nightly import examples
 
 RUN, STOP = Frame(0x205, b"\x7f\x04"), Frame(0x205, b"\x7e\x04")
 PERIOD_S = 0.01
@@ -157,7 +158,7 @@ RENEWALS = st.tuples(
 )
 
 
-@settings(max_examples=1000)
+@settings(max_examples=examples(1000))
 @given(steps=st.lists(RENEWALS, min_size=1, max_size=3), silent=st.booleans())
 def test_who_renews_a_burst_has_it_on_the_bus_wherever_the_bridge_stood_still(
     steps: list[tuple[float, float, bool, list[float]]], *, silent: bool

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from bridge.command import Action, Kind
 from bridge.command.link import NodeState
+from tests.support.nightly import examples
 from tests.support.rig import (
     ACKNOWLEDGE,
     ENABLE,
@@ -108,7 +109,7 @@ class _Watch:
         return rises or (was_tripped and not self.rig.channel.is_tripped)
 
 
-@settings(max_examples=400, deadline=None, derandomize=True)
+@settings(max_examples=examples(400), deadline=None, derandomize=True)
 @given(
     profile=st.sampled_from(_PROFILES),
     begins_low=st.booleans(),

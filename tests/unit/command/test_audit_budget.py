@@ -17,6 +17,7 @@ from bridge.command.audit import AT_ONCE, DONE_EVERY_S, REFUSED_EVERY_S, SUMMARY
 from bridge.command.link import NodeState
 from bridge.image import Value
 from tests.support import sites
+from tests.support.nightly import examples
 from tests.support.rig import ENABLE, SHUT_DOWN
 from tests.support.views import dispatcher_of
 
@@ -186,7 +187,7 @@ STEPS = st.one_of(
 )
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(st.lists(STEPS, max_size=20))
 def test_what_is_done_is_told_as_if_nothing_had_been_refused(steps: list[tuple[str, int]]) -> None:
     flooded, calm = Hall(), Hall()

@@ -18,6 +18,7 @@ from bridge.command.drive_channel import DriveChannel
 from bridge.command.link import NodeState
 from bridge.drive import DriveState
 from bridge.image import Value
+from tests.support.nightly import examples
 from tests.support.rig import (
     ACKNOWLEDGE,
     ENABLE,
@@ -346,7 +347,7 @@ def test_whatever_happens(reaction: str, control: str):
     Profile.control = control
     Profile.__name__ = f"Drive_{reaction}_{control}"
     profile = settings(
-        max_examples=100,
+        max_examples=examples(100),
         stateful_step_count=50,
         deadline=None,
         derandomize=True,

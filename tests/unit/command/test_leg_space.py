@@ -14,6 +14,7 @@ from tests.support.leg_cells import NEVER
 from tests.support.leg_profiles import MOST, ROWS, explored, space
 from tests.support.leg_recorded import Cells
 from tests.support.leg_words import LENZE, POSITION
+from tests.support.nightly import by_night_of
 from tools import exploration
 
 # All of a CPU for up to half a minute each: with a fifth of one that takes its time.
@@ -31,15 +32,39 @@ def is_as_printed(row: str) -> Cells:
     return found.cells
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("row", [row for row in ROWS if row not in _NORD])
 def test_whatever_happens_in_the_words_of_every_family(row: str) -> None:
     assert not is_as_printed(row) & NEVER.keys()
 
 
+@pytest.mark.nightly
 def test_whatever_happens_and_every_cell_that_can() -> None:
     """In NORD's words with all settings. A cell that cannot occur is named with the reason."""
     reached = {cell for row in _NORD for cell in is_as_printed(row)}
     assert reached == TABLE.keys() - NEVER.keys()
+
+
+_EVERY_CELL: Final = {
+    "nord/sk-tu4-cao": ("quick_stop", "silence", "hold", "started"),
+    "nord/sk-tu4-cao, other settings": (
+        *("started, quick_stop", "started, stop", "started, silence", "started, hold"),
+        *("quick_stop, then silence", "errors ignored, started", "life sign, started"),
+        *("two connections, started", "lease"),
+    ),
+}
+"""A quarter of what happens at night, with every cell."""
+
+
+def test_every_cell_that_can_by_day() -> None:
+    reached = {cell for row, profiles in _EVERY_CELL.items() for cell in explored(row, profiles).cells}
+    assert not reached & NEVER.keys()
+    assert not TABLE.keys() - NEVER.keys() - reached, "name a profile that reaches them: _EVERY_CELL"
+
+
+@pytest.mark.parametrize("row", [row for row in ROWS if row not in _NORD])
+def test_one_reaction_in_the_words_of_every_family(row: str) -> None:
+    assert not explored(row, ("quick_stop",)).cells & NEVER.keys()
 
 
 def test_every_row_is_printed() -> None:
@@ -97,7 +122,7 @@ _FORGETFUL: Final[dict[str, dict[str, Any]]] = {
 }
 
 
-@pytest.mark.parametrize("profile", _FORGETFUL)
+@pytest.mark.parametrize("profile", by_night_of(_FORGETFUL, 1))
 def test_what_the_walk_forgets_decides_nothing(profile: str) -> None:
     explored_all = space(**_FORGETFUL[profile])
     forgets, explored_all.forgets = explored_all.forgets, lambda leg, seen: (leg, seen)

@@ -11,6 +11,7 @@ from bridge.condition.findings import Rank
 from bridge.image import Quality
 from tests.support import sites
 from tests.support.condition import Watched
+from tests.support.nightly import examples
 
 BUS = "bus/can0"
 NODES = ("belt", "press", "hoist")
@@ -336,7 +337,7 @@ _ACTS = {
 }
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(sorted(_ACTS)), st.sampled_from(NODES)), max_size=8))
 def test_no_place_is_said_to_be_better_than_its_worst_part(acts: list[tuple[str, str]]) -> None:
     plant = Watched(_SITE)

@@ -17,6 +17,7 @@ from bridge.eds.model import Report
 from bridge.eds.text import decode
 from bridge.mapping.loader import mappings_dir, read_family
 from tests.support.invented_eds import FIXED, SPIN, eds
+from tests.support.nightly import examples
 
 FILES: Final = [
     decode(content, Report()).splitlines()
@@ -52,7 +53,7 @@ def mutants(draw: st.DrawFn) -> str:
 
 
 @given(mutants())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 def test_a_mapping_is_whole_or_not_there(text: str) -> None:
     with TemporaryDirectory() as folder:
         file, output = Path(folder) / "wild.eds", Path(folder) / "wild.toml"

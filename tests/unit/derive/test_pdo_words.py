@@ -32,6 +32,7 @@ from tests.support.invented_eds import (
     pdo,
     var,
 )
+from tests.support.nightly import examples
 
 MODE, TORQUE_LIMIT, RAMP = "0x60600008", "0x60720010", "0x20070020"
 CURRENT, TEMPERATURE, ENERGY = "0x20100010", "0x20110008", "0x20120020"
@@ -82,7 +83,7 @@ WORDS = {
 """Bytes, and what has to be in each frame."""
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(12), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     further=st.lists(st.sampled_from([MODE, TORQUE_LIMIT]), unique=True, max_size=2),
     told=st.lists(st.sampled_from([CURRENT, TEMPERATURE]), unique=True, max_size=2),

@@ -19,6 +19,7 @@ from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_interface import DriveAccess
 from bridge.sim.nord.nord_parameters import PARAMETER_BASE, sub_index
 from tests.support.bench import PLC
+from tests.support.nightly import examples
 from tests.support.nord_words import (
     ACTUAL,
     DRIVE,
@@ -156,7 +157,7 @@ CODES = st.lists(st.sampled_from([0, 1, 2, 3, 4, 5, 10, 15, 23, 24, 57]), min_si
 UNREADABLE = st.sets(st.tuples(st.sampled_from([ACTUAL, SETPOINT]), st.integers(1, 3), st.integers(1, 4)))
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(40), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(actual=CODES, setpoints=CODES, unreadable=UNREADABLE, active=st.integers(1, 4))
 def test_no_point_is_good_unless_its_meaning_was_read(
     tmp_path: Path,
@@ -207,7 +208,7 @@ def test_no_point_is_good_unless_its_meaning_was_read(
             assert refused.code is Code.NOT_CONFIGURED, (value.leaf, refused)
 
 
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(20), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     full_hz=st.lists(st.integers(300, 2000).map(lambda tenths: tenths / 10), min_size=4, max_size=4),
     codes=st.lists(st.permutations([1, 2, 0]), min_size=4, max_size=4),

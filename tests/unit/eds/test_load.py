@@ -16,6 +16,7 @@ from bridge.cli.app import make_app
 from bridge.eds import configuration, read_device
 from bridge.eds.pdos import pdos
 from bridge.mapping.loader import mappings_dir
+from tests.support.nightly import examples
 from tests.unit.eds.test_configuration import DCF
 from tests.unit.eds.test_xdd import XDD
 
@@ -49,19 +50,19 @@ def use(content: bytes) -> None:
 
 
 @given(st.binary(max_size=400))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_random_bytes(content: bytes) -> None:
     use(content)
 
 
 @given(mutated())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_mutated_files(content: bytes) -> None:
     use(content)
 
 
 @given(mutated())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 def test_the_command_prints_what_it_read(content: bytes) -> None:
     with TemporaryDirectory() as folder:
         file = Path(folder) / "wild.eds"

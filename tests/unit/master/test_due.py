@@ -18,6 +18,7 @@ from bridge.image import Reading
 from bridge.master.line import Repeated
 from tests.support import sites
 from tests.support.bench import PLC, Bench
+from tests.support.nightly import by_night_of
 
 SEEDS = 24
 MOVES = 150
@@ -212,7 +213,7 @@ def outcome_of(play: Play) -> SimpleNamespace:
     return SimpleNamespace(log=bench.log, events=events, image=image)
 
 
-@pytest.mark.parametrize("seed", range(SEEDS))
+@pytest.mark.parametrize("seed", by_night_of(range(SEEDS), 4))
 def test_nothing_is_missed_and_the_same_comes_of_it(tmp_path: Path, seed: int) -> None:
     play, other = Play(tmp_path, seed), Play(tmp_path, seed)
     other.bench.plant._deadlines = Everything(other.drives)  # type: ignore[assignment]

@@ -23,6 +23,7 @@ from bridge.sim.nord.nord_tu4 import NordTu4
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from tests.support import sites
 from tests.support.bench import PLC, Bench
+from tests.support.nightly import by_night
 from tests.unit.node.test_booting import Restart
 
 FAMILIES: Final = (
@@ -182,7 +183,7 @@ def leaves_at(bench: Bench) -> list[float]:
     return [frame.time for frame in told if frame.data[0] in (0x02, 0x80)]
 
 
-@pytest.mark.parametrize(("mapping", "kind", "caller"), CASES)
+@pytest.mark.parametrize(("mapping", "kind", "caller"), by_night(CASES))
 def test_a_drive_that_hears_us_stops(tmp_path: Path, mapping: str, kind: int, caller: str) -> None:
     bench = moving(tmp_path, mapping, kind, node=LOSS if caller.startswith("lost") else "")
     begin = bench.now
@@ -195,7 +196,7 @@ def test_a_drive_that_hears_us_stops(tmp_path: Path, mapping: str, kind: int, ca
     assert speed(bench.node) == 0
 
 
-@pytest.mark.parametrize(("mapping", "kind", "caller"), CASES)
+@pytest.mark.parametrize(("mapping", "kind", "caller"), by_night(CASES))
 def test_a_deaf_drive_stops_by_the_command_or_is_named(
     tmp_path: Path, mapping: str, kind: int, caller: str
 ) -> None:

@@ -3,6 +3,7 @@ the frames on the wire, in every state of the node, of its bus and of this bridg
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ from bridge.master.listening import Listening
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from tests.support.bench import Bench, write_site
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
+from tests.support.nightly import by_night
 from tests.unit.node.test_stoeber_posi import DRIVE as LIFT
 from tests.unit.node.test_stoeber_posi import bench_with
 from tests.unit.northbound.page.test_said import BOOK
@@ -226,9 +228,7 @@ def ask(bench: Bench, target: str, asked: Asked) -> tuple[Outcome, bool]:
     return outcome, sum(asked.is_said(frame.data) for frame in sent) >= 2
 
 
-@pytest.mark.parametrize("bus", BUSES)
-@pytest.mark.parametrize("node", NODES)
-@pytest.mark.parametrize("target", RPDO)
+@pytest.mark.parametrize(("target", "node", "bus"), by_night(itertools.product(RPDO, NODES, BUSES), 4))
 def test_an_answer_says_forwarded_where_the_bus_says_what_was_asked(
     tmp_path: Path, target: str, node: str, bus: str
 ) -> None:

@@ -5,6 +5,7 @@ Judged by the simulated drive's own motion, and by the frames on the wire.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
@@ -16,6 +17,7 @@ from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Request, Role, Source, Start
 from bridge.sim.core.nmt_slave import NmtState
 from tests.support.bench import Bench, write_site
+from tests.support.nightly import by_night
 from tests.unit.master.test_farewell import FAMILIES, SLACK_S, SYNC_S, TYPES, moving, speed
 
 TWIN: Final = Frame(0x77F, b"\x05")
@@ -150,7 +152,7 @@ CASES: Final = [
 """All causes where NMT stop does nothing to the drive."""
 
 
-@pytest.mark.parametrize(("mapping", "kind", "cause", "goes_on"), CASES)
+@pytest.mark.parametrize(("mapping", "kind", "cause", "goes_on"), by_night(CASES))
 def test_what_runs_is_stopped_before_the_bus_is_left_to_another(
     tmp_path: Path, mapping: str, kind: int, cause: str, goes_on: bool
 ) -> None:
@@ -233,8 +235,7 @@ STAGES: Final[dict[str, tuple[str, Callable[[Bench], None]]]] = {
 }
 
 
-@pytest.mark.parametrize("cause", CAUSES)
-@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize(("stage", "cause"), by_night(itertools.product(STAGES, CAUSES)))
 def test_in_every_stage_the_drive_is_stopped_first(tmp_path: Path, stage: str, cause: str) -> None:
     keys, enter = STAGES[stage]
     bench = running(tmp_path, keys)
@@ -303,12 +304,17 @@ def down(bench: Bench) -> None:
     bench.run(0.02)
 
 
-@pytest.mark.parametrize("target", ["n", "bus/can0"])
 @pytest.mark.parametrize(
-    "when", ["while it is down", "in the round in which it goes", "before a short outage"]
+    ("mapping", "kind", "when", "target"),
+    by_night(
+        itertools.product(
+            ["lenze/8400-motec", "cia402/velocity"],
+            [1, 255],
+            ["while it is down", "in the round in which it goes", "before a short outage"],
+            ["n", "bus/can0"],
+        )
+    ),
 )
-@pytest.mark.parametrize("kind", [1, 255])
-@pytest.mark.parametrize("mapping", ["lenze/8400-motec", "cia402/velocity"])
 def test_a_node_that_is_to_stop_is_stopped_when_the_bus_is_back(
     tmp_path: Path, mapping: str, kind: int, when: str, target: str
 ) -> None:
@@ -335,9 +341,10 @@ def test_a_node_that_is_to_stop_is_stopped_when_the_bus_is_back(
 # a boot-up
 
 
-@pytest.mark.parametrize("kind", TYPES)
-@pytest.mark.parametrize("how", ["none", "communication", "node"])
-@pytest.mark.parametrize("mapping", FAMILIES)
+@pytest.mark.parametrize(
+    ("mapping", "how", "kind"),
+    by_night(itertools.product(FAMILIES, ["none", "communication", "node"], TYPES)),
+)
 def test_a_reset_at_the_start_leaves_the_stopped_words_their_sync(
     tmp_path: Path, mapping: str, how: str, kind: int
 ) -> None:

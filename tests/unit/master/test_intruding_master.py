@@ -14,6 +14,7 @@ from bridge.command import Action, Identity, Kind, Role, Source
 from bridge.drive import DriveState, StatusWords
 from bridge.master.answers import SHARE, Answers, answer_bits
 from tests.support.bench import Bench
+from tests.support.nightly import by_night
 from tests.support.quick import Quick, quick_site
 from tests.unit.master.test_farewell import FAMILIES, LastWords, moving, speed
 
@@ -84,7 +85,7 @@ CASES: Final = [
 ]
 
 
-@pytest.mark.parametrize(("mapping", "kind", "start_every_s"), CASES)
+@pytest.mark.parametrize(("mapping", "kind", "start_every_s"), by_night(CASES))
 def test_an_intruder_that_is_a_master_keeps_no_drive_running(
     tmp_path: Path, mapping: str, kind: int, start_every_s: float
 ) -> None:

@@ -16,9 +16,10 @@ from bridge.canopen.frame import Frame
 from bridge.command import Action
 from bridge.command.link import NodeState
 from bridge.command.messages.request import NODE_ACTIONS
+from tests.support.nightly import examples
 from tests.support.quick import Quick, quick_site
 
-STEPS = 20_000
+STEPS = examples(20_000, 1_000)
 LONGEST_BACK_OFF_S = 301.0
 MOST_EVENTS_A_SECOND = 100
 NODES = (
@@ -194,7 +195,7 @@ def test_random_frames_losses_and_times() -> None:
     run_state_machine_as_test(
         MasterMachine,
         settings=settings(
-            max_examples=120,
+            max_examples=examples(120),
             stateful_step_count=16,
             deadline=None,
             derandomize=True,

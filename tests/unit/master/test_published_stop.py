@@ -26,11 +26,12 @@ from bridge.config import Site, load_site
 from bridge.node.process.held import held_s
 from tests.support import sites
 from tests.support.broadcast_manager import LATE_S
+from tests.support.nightly import examples
 from tests.support.pausing_bench import MAPPING, DeadError, Pause, PausingBench
 
 RPDO1, RPDO2, HEARTBEAT = 0x205, 0x305, 0x77F
 OPERATIONAL = 5
-EXAMPLES = 80
+EXAMPLES = examples(80)
 POINT = "conveyor/fu1/supervision/worst_case_stop_ms"
 DEADMEN_MS = [10, 40, 100, 101, 250, 400, 1000, 10_000]
 ON_ITS_WAY_S = 0.001

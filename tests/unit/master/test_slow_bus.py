@@ -3,6 +3,7 @@ to the bus: the kernel goes on with its bursts meanwhile."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from bridge.canopen.frame import Frame
 from bridge.command import Action
 from bridge.config import load_site
 from tests.support import sites
+from tests.support.nightly import by_night
 from tests.support.pausing_bench import MAPPING, KernelBus, PausingBench
 
 RPDO = 0x205
@@ -87,8 +89,7 @@ WAYS |= {
 }
 
 
-@pytest.mark.parametrize("phase", range(PHASES))
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("way", "phase"), by_night(itertools.product(WAYS, range(PHASES)), 4))
 def test_nothing_enables_a_drive_after_its_stop(way: str, phase: int, tmp_path: Path) -> None:
     node = sites.node(sites.drive("drive", "modbus", 500, f'name = "fu1"\n{sites.SCALED}'), mapping=MAPPING)
     bench = SlowBench(load_site(sites.write(tmp_path, sites.bus(node), sites.modbus(), name="bench")))

@@ -19,6 +19,7 @@ from bridge.mapping.loader import family_names, mapping_folders
 from bridge.sim.catalogue import simulate_node
 from tests.support import sites
 from tests.support.bench import Bench
+from tests.support.nightly import by_night
 
 ENGINEER = Identity(Source.OPCUA, "eve", Role.ENGINEER)
 FAMILIES = list(family_names(mapping_folders(Path("site.toml"))))
@@ -85,8 +86,10 @@ class Silent(Bench):
         return point.value
 
 
-@pytest.mark.parametrize("drive", [SILENCE, THEN_SILENCE])
-@pytest.mark.parametrize(("mapping", "slot", "node"), NODES)
+@pytest.mark.parametrize(
+    ("mapping", "slot", "node", "drive"),
+    by_night((*node, drive) for node in NODES for drive in (SILENCE, THEN_SILENCE)),
+)
 def test_who_does_not_watch_its_process_data_is_told_to_stop(
     tmp_path: Path, mapping: str, slot: str, node: str, drive: str
 ) -> None:

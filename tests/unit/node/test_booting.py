@@ -27,6 +27,7 @@ from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from bridge.sim.stoeber.stoeber_axis import AxisState
 from tests.support import sites
 from tests.support.bench import PLC, Bench
+from tests.support.nightly import by_night
 
 SOME: Final = (
     "cia402/profile-velocity",
@@ -189,7 +190,7 @@ CASES: Final = [
 ]
 
 
-@pytest.mark.parametrize(("mapping", "failure", "place"), list(dict.fromkeys(CASES)))
+@pytest.mark.parametrize(("mapping", "failure", "place"), by_night(dict.fromkeys(CASES)))
 def test_a_drive_that_was_running_is_stopped_by_a_bridge_that_cannot_boot_it(
     tmp_path: Path, mapping: str, failure: str, place: str
 ) -> None:

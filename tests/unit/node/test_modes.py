@@ -15,6 +15,7 @@ from bridge.mapping import load_family
 from bridge.sim.cia402.cia402_drive import Cia402Drive
 from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
 from tests.support.bench import Bench
+from tests.support.nightly import examples
 
 DRIVE = "axis/drive"
 SITE = """
@@ -102,7 +103,7 @@ def test_in_another_mode_a_setpoint_is_refused_and_its_bits_are_not_served(tmp_p
     assert point(bench, "command/position").quality is Quality.GOOD
 
 
-@settings(max_examples=25, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(25), suppress_health_check=list(HealthCheck))
 @given(
     mapping=st.sampled_from(list(OF_MODE)),
     modes=st.lists(st.sampled_from(list(Mode)), min_size=1, max_size=4),

@@ -22,12 +22,13 @@ from bridge.sim.nord.nord_single import NordSingle
 from bridge.sim.nord.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
 from bridge.sim.nord.nord_tu4 import NordTu4
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
+from tests.support.nightly import examples
 
 Deed = Callable[[Any, float], object]
 """Done to a node at a time."""
 
 START: Final = Frame(0, b"\x01\x05")
-EXAMPLES: Final = 100
+EXAMPLES: Final = examples(100)
 
 
 def sdo(*words: int) -> list[bytes]:

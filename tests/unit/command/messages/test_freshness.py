@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Do, Identity, Request, Source, TakeControl, command_of
 from bridge.command.messages.freshness import BOUND_MS, GRAIN_MS, NEVER, Inflow, LoopPulse, is_stale
+from tests.support.nightly import examples
 from tests.support.rig import ACKNOWLEDGE, ENABLE, HALF_SPEED, OTHER_PLC, PLC, SHUT_DOWN, Rig
 
 STEP_S = 0.001
@@ -112,7 +113,7 @@ def play(latency: int, bursts: list[tuple[int, int]], hangs: list[tuple[int, int
     return server
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(
     st.integers(0, 40),
     st.lists(st.tuples(st.integers(0, 60), st.integers(1, 400)), min_size=1, max_size=12),

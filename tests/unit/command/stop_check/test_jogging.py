@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, Verdict
 from tests.support.judge import Judge
+from tests.support.nightly import examples
 
 PAUSE_S = 0.1
 WAY_S = 0.02
@@ -246,7 +247,7 @@ motors = st.builds(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(
     motors,
     st.sampled_from([0.01, 0.02, 0.05, 0.1]),
@@ -273,7 +274,7 @@ def test_a_drive_that_obeys_is_never_named_however_its_owner_jogs(
     assert not jogged.ignored
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(
     st.sampled_from([Sent.RAMP, Sent.OFF]),
     st.floats(0.3, 3.0),

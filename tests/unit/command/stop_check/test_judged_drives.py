@@ -13,6 +13,7 @@ from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, Verdic
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import Watch
 from tests.support.judge import Judge
+from tests.support.nightly import examples
 from tests.support.rig import Rig
 
 BOUNDS = Bounds(off_s=0.5, ramp_s=5.0, silence_s=6.0)
@@ -522,7 +523,7 @@ def played(bus: Bus, plan: list[tuple[tuple[str, Sent | float], float]]) -> None
         bus.run(seconds)
 
 
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 @given(drives, st.floats(0, WAY_S), plans)
 def test_a_drive_that_follows_in_time_is_never_named(
     drive: Drive, way_s: float, plan: list[tuple[tuple[str, Sent | float], float]]
@@ -536,7 +537,7 @@ def test_a_drive_that_follows_in_time_is_never_named(
         assert bus.follow.state is LastStop.FOLLOWED
 
 
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 @given(drives, st.floats(0, WAY_S), plans, st.sampled_from([Sent.RAMP, Sent.OFF]))
 def test_a_drive_that_does_not_follow_is_named_within_the_bound(
     drive: Drive, way_s: float, plan: list[tuple[tuple[str, Sent | float], float]], stop: Sent
@@ -558,7 +559,7 @@ def test_a_drive_that_does_not_follow_is_named_within_the_bound(
     assert not bus.follow.follows
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(drives, st.floats(0, WAY_S), plans)
 def test_a_drive_that_somebody_else_enables_is_named(
     drive: Drive, way_s: float, plan: list[tuple[tuple[str, Sent | float], float]]

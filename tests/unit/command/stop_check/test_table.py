@@ -15,6 +15,7 @@ from bridge.command.stop_check import step as judge
 from bridge.command.stop_check.state import LastStop, Place
 from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Finding, News, PlaceDeed
 from tests.support import stop_rules
+from tests.support.nightly import by_night_of
 from tests.support.stop_profiles import ON_CHANGE, PROFILES
 from tests.support.stop_space import RecordedTable, StopSpace
 from tests.unit.command.stop_check import test_jogging, test_step
@@ -25,6 +26,11 @@ pytestmark = pytest.mark.timeout(900)
 MOST: Final = 150_000
 _FEW: Final = ("asked when it is due", "nodes that leave, on change")
 """The smallest ones."""
+_BIG: Final = (
+    *("words and reports", "silence and pauses", "nodes that leave", "nodes that leave on a ramp"),
+    "words and reports, on change",
+)
+"""Each takes ten seconds and more."""
 _PLACES, _OUTCOMES = "PLACE_TABLE", "OUTCOME_TABLE"
 _EVERY: Final = {**PROFILES, **ON_CHANGE}
 
@@ -33,7 +39,7 @@ def space(name: str) -> StopSpace:
     return StopSpace(PROFILES[name]) if name in PROFILES else StopSpace(ON_CHANGE[name], pause=None)
 
 
-@pytest.mark.parametrize("name", _EVERY)
+@pytest.mark.parametrize("name", by_night_of(sorted(_EVERY, key=_BIG.__contains__), len(_EVERY) - len(_BIG)))
 def test_whatever_happens_keeps_the_rules(name: str) -> None:
     explored = space(name)
     explored.explore(MOST)

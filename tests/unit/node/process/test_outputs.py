@@ -14,6 +14,7 @@ from bridge.command.messages.request import STOP_ACTIONS
 from bridge.image import Quality, Value
 from tests.support.bench import PLC, Bench
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
+from tests.support.nightly import examples
 
 SAFE = {"valves": 0, "speed": 5.0, "lamp": 77}
 OTHER = Identity(Source.MODBUS, "10.0.0.9")
@@ -202,7 +203,7 @@ _STEPS = st.lists(
 )
 
 
-@settings(max_examples=60, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(60), suppress_health_check=list(HealthCheck))
 @given(steps=_STEPS)
 def test_whatever_happens_no_output_is_active_without_its_owner(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[str, int]]

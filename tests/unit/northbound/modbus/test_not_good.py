@@ -21,6 +21,7 @@ from bridge.northbound.modbus.registers import DriveMap
 from tests.support import sites
 from tests.support.invented import SPIN, spin_bench, spindle
 from tests.support.modbus_site import PLC
+from tests.support.nightly import examples
 from tests.support.views import dispatcher_of
 
 UNIT = 1
@@ -158,7 +159,7 @@ STEPS = st.one_of(st.integers(0, 3), st.sampled_from((0.01, 0.06, 0.11)))
 
 
 @pytest.mark.parametrize("mapping", family_names())
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 @given(
     spread=st.lists(st.integers(0, 3), min_size=8, max_size=8),
     deadlines=st.lists(st.sampled_from((None, DEADLINE_S)), min_size=3, max_size=3),

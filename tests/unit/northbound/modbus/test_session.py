@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from bridge.northbound.modbus.session import Conversation
 from tests.support.modbus_site import PLC, READY, Rig
+from tests.support.nightly import examples
 
 
 def adu(transaction: int, unit: int, pdu: bytes) -> bytes:
@@ -80,7 +81,7 @@ def test_every_cut_of_the_stream_gives_the_same_answers():
     assert talk([STREAM], turn=1)[0] == whole
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 @given(st.lists(st.integers(1, len(STREAM) - 1), max_size=8))
 def test_random_cuts(cuts: list[int]):
     edges = [0, *sorted(cuts), len(STREAM)]
@@ -160,7 +161,7 @@ def pdus(draw: st.DrawFn) -> bytes:
     return struct.pack(">BH", function, start) + tail
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([0, 1, 2, 9, 33, 255]), pdus()), max_size=12))
 def test_any_request_gets_one_well_formed_answer(requests: list[tuple[int, bytes]]):
     rig = Rig()
@@ -176,7 +177,7 @@ def test_any_request_gets_one_well_formed_answer(requests: list[tuple[int, bytes
         rig.now += 0.05
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.lists(st.binary(max_size=300), max_size=5))
 def test_any_bytes_give_well_formed_answers_or_the_end(chunks: list[bytes]):
     answers, _ = talk(chunks)

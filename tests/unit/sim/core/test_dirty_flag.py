@@ -19,6 +19,7 @@ from bridge.sim.nord.nord_single import NordSingle
 from bridge.sim.nord.nord_single_settings import RJ45_5XX, TU3, Variant
 from bridge.sim.nord.nord_tu4 import NordTu4
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
+from tests.support.nightly import by_night_of
 
 TURNS = 250
 RPDOS: tuple[int, ...] = (0x205, 0x305, 0x405, 0x505)
@@ -203,7 +204,7 @@ class Traffic:
         return Frame(0x605, struct.pack("<BHBI", *what, random.choice(VALUES)))
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", by_night_of(range(12), 4))
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 def test_who_looks_at_everything_sends_the_same_at_the_same_time(family: Family, seed: int) -> None:
     random = Random(seed)

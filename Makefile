@@ -57,10 +57,10 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 	@exec $(IN) -m bridge demo $(ARGS)
 
 ##@ Test
-# Wire tests and the lab wait most of their time, and mind when they have to wait for a CPU; unit tests know no
-# time. The commands of the docs, a browser and fuzzing want their share of the CPUs: they begin when these are done.
-test: compiled packages clients ## all tests: unit, foreign, wire, docs, browser, a minute of fuzzing, lab
-	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "foreign unit" "pages browser fuzz-short"
+# What measures times, or has a browser that gives up waiting, minds when it has to wait for a CPU: one after the
+# other, and never two at a time. Unit tests know no time.
+test: compiled packages clients ## all tests: unit, foreign, wire, lab, docs, browser, some fuzzing; less of what takes long
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab pages browser fuzz-short" "foreign unit"
 
 # One after the other, so that nobody disturbs who measures times; and all of them even if one fails.
 nightly: export NIGHTLY := 1
@@ -123,7 +123,7 @@ endif
 compiled: $(VENV)/dev.stamp
 	@$(IN) -m compileall -q bridge tests/peers tests/support
 
-fuzz-short: compiled ## a minute of fuzzing, always the same cases
+fuzz-short: compiled ## half a minute of fuzzing, always the same cases
 	@echo "== fuzzing, two protocols at a time"
 	@$(PYTEST) -p no:cacheprovider -rs tests/fuzz $(ARGS)
 

@@ -1,11 +1,10 @@
 """Run lanes of make targets side by side: ``make test``.
 
-    python -m tools.side_by_side MAKE "TARGET ..." "TARGET ..." "TARGET ..."
+    python -m tools.side_by_side MAKE "TARGET ..." "TARGET ..."
 
 The targets of a lane run one after the other. The first lane measures times; its output is shown as it comes.
-The second gets what the first leaves of the CPUs. The third begins when the second has ended, and gives way
-to nobody. The output of both comes after that of the first. When a lane fails, or this process is told to
-end, all that runs is ended.
+The second gets what the first leaves of the CPUs; its output comes after that of the first. When a lane
+fails, or this process is told to end, all that runs is ended.
 """
 
 from __future__ import annotations
@@ -65,16 +64,14 @@ def end(lanes: Sequence[subprocess.Popen[bytes]]) -> None:
 
 
 def main() -> int:
-    make, first, second, third = sys.argv[1:]
+    make, first, second = sys.argv[1:]
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     # In the background a shell has it ignored, by all that is started from there.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     with tempfile.NamedTemporaryFile() as told, Path(told.name).open("rb") as kept:
-        lanes, waiting = [begin(make, first), begin(make, second, told, behind=True)], [third]
+        lanes = [begin(make, first), begin(make, second, told, behind=True)]
         try:
-            while not any(status := [lane.poll() for lane in lanes]) and (waiting or None in status):
-                if status[1] == 0 and waiting:
-                    lanes.append(begin(make, waiting.pop(), told))
+            while not any(status := [lane.poll() for lane in lanes]) and None in status:
                 if status[0] == 0:
                     shutil.copyfileobj(kept, sys.stdout.buffer)
                     sys.stdout.flush()

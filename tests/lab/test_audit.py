@@ -15,6 +15,8 @@ from tests.support import sites
 from tests.support.process import drivebridge, drivebridge_called
 from tests.support.sniffer import sniffing
 
+pytestmark = pytest.mark.nightly
+
 NODES = (
     sites.node(
         sites.drive("fu1", "modbus", 1000, "parameters = { P105 = 50.0 }"),

@@ -15,6 +15,8 @@ from tests.support.process import drivebridge, peer, until
 from tests.support.process import drivebridge_called as call
 from tests.support.sniffer import sniffing
 
+pytestmark = pytest.mark.nightly
+
 DIRECT = ("--interface", "socketcan", "--channel", "vcan0", "--bitrate", "1000000")
 SCAN_LIMIT_S = 2.0
 

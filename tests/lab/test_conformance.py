@@ -7,10 +7,14 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from tests.lab.test_exchange import NODES
 from tests.support import sites
 from tests.support.process import drivebridge, drivebridge_called, peer, until
 from tests.support.sniffer import sniffing
+
+pytestmark = pytest.mark.nightly
 
 
 def report_of(site: Path, node: str, *options: str, status: int = 0) -> dict[str, Any]:

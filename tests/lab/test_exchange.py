@@ -14,6 +14,8 @@ import pytest
 from tests.support import sites
 from tests.support.process import drivebridge, drivebridge_called
 
+pytestmark = pytest.mark.nightly
+
 NODES = (
     sites.node(
         sites.drive("fu1", "none", 0),

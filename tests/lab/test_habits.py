@@ -6,11 +6,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 from tests.support import sites
 from tests.support.process import drivebridge, free_port
 from tests.support.process import drivebridge_called as call
 from tests.support.sniffer import Sniffer, sniffing
 from tests.unit.sim.generic.test_generic_node import LIGHT
+
+pytestmark = pytest.mark.nightly
 
 NAME = "acme/light"
 TAG = "a rather long name " * 20

@@ -11,6 +11,8 @@ import pytest
 
 from tests.support.process import Process, drivebridge_called, peer
 
+pytestmark = pytest.mark.nightly
+
 ON_VCAN0 = ("--interface", "socketcan", "--channel", "vcan0")
 ONE, OTHER = "00000038:00010203:00000007:00000A01", "00000038:00010203:00000007:80000B02"
 

@@ -14,6 +14,8 @@ from tests.lab.sites import LabSite, ask, lab_site
 from tests.support.process import drivebridge, until
 from tests.support.sniffer import Sniffer, sniffing, words_of
 
+pytestmark = pytest.mark.nightly
+
 RPDO = {"fu1": 0x205, "fu2": 0x305, "fu3": 0x405}
 TPDO = {"fu1": 0x185, "fu2": 0x285, "fu3": 0x385}
 

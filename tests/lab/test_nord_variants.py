@@ -15,6 +15,8 @@ import pytest
 from tests.support.process import Process, drivebridge, free_port, until
 from tests.support.sniffer import Sniffer, sniffing
 
+pytestmark = pytest.mark.nightly
+
 NOISE_S = 1.0
 DEADMAN_S, P513_S, P151_S = 0.4, 1.0, 0.8
 _SITE = """

@@ -14,6 +14,8 @@ from bridge.parameter.ledger_file import LedgerFile
 from tests.lab.sites import LabSite, lab_site
 from tests.support.process import drivebridge, drivebridge_called
 
+pytestmark = pytest.mark.nightly
+
 FU1 = "conveyor/fu1"
 
 

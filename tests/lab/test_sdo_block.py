@@ -11,6 +11,8 @@ from tests.lab.test_bus_commands import DIRECT, answer
 from tests.support.process import peer
 from tests.support.sniffer import Sniffer, sniffing
 
+pytestmark = pytest.mark.nightly
+
 DATA = bytes(range(256)) * 4
 
 

@@ -14,6 +14,8 @@ from tests.lab.sites import LabSite, lab_site
 from tests.support.process import drivebridge, drivebridge_called
 from tests.support.sniffer import Sniffer, sniffing
 
+pytestmark = pytest.mark.nightly
+
 CHANNELS = {2: (0x345, 0x2C5), 3: (0x445, 0x3C5), 4: (0x545, 0x4C5)}
 READ_P105 = bytes.fromhex("40692001")
 """2069h:1, the drive's maximum frequency."""

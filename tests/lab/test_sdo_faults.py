@@ -10,6 +10,8 @@ import pytest
 from tests.support.process import drivebridge_called, peer
 from tests.support.sniffer import Sniffer, sniffing
 
+pytestmark = pytest.mark.nightly
+
 DIRECT = ("--interface", "socketcan", "--channel", "vcan0")
 TIMED_OUT, CRC = "05040000", "05040004"
 

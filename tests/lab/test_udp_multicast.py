@@ -15,6 +15,8 @@ from pymodbus.client import ModbusTcpClient
 from tests.support import sites
 from tests.support.process import Process, drivebridge, free_port, until
 
+pytestmark = pytest.mark.nightly
+
 GROUP = "239.74.163.2"
 HEARTBEAT = 0x77F
 PREOPERATIONAL = b"\x7f"

@@ -3,8 +3,8 @@
 
     .venv/bin/python -m tools.exploration
 
-What stands between the two marks is replaced; a test fails where the numbers, but for the seconds, are not up
-to date.
+What stands between the two marks is replaced; a test of ``make nightly`` fails where the numbers, but for the
+seconds, are not up to date.
 """
 
 from __future__ import annotations

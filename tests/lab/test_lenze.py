@@ -15,8 +15,6 @@ import pytest
 from tests.support.process import Process, drivebridge, free_port, until
 from tests.support.sniffer import Sniffer, sniffing
 
-pytestmark = pytest.mark.nightly
-
 RPDO1, TPDO1, EMCY, HEARTBEAT = 0x205, 0x185, 0x085, 0x705
 NODE_PARAMETER = 0x605
 STOP, RUN, RESET = 0x0001, 0x0009, 0x0081

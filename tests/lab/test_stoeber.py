@@ -16,8 +16,6 @@ from pymodbus.exceptions import ModbusException
 from tests.support.process import Process, drivebridge, free_port, peer, until
 from tests.support.sniffer import Sniffer, sniffing
 
-pytestmark = pytest.mark.nightly
-
 NODE = 7
 RPDO, TPDO, EMCY, GUARD = 0x207, 0x187, 0x087, 0x707
 REMOTE = 1 << 30

@@ -12,8 +12,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
-from bridge.command.leg.state import ANY_TRIP, MEANING, NORMAL, STARTING, Stage
+from bridge.command.leg.state import ANY_TRIP, MEANING, NORMAL, STARTING, Motion, Stage
 from bridge.command.leg.table import TABLE, Deed, Stimulus
+from bridge.command.leg.words import REACTION_STOPS, WORD_TABLE
 from bridge.command.stop_check import table as judge
 from bridge.command.stop_check.state import PLACES, LastStop, Place
 from tools.marks import replaced
@@ -21,6 +22,8 @@ from tools.marks import replaced
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "dead-man-chain.md"
 BEGIN: Final = "<!-- drawn by tools/state_table.py: begin -->"
 END: Final = "<!-- drawn by tools/state_table.py: end -->"
+WORDS_BEGIN: Final = "<!-- words drawn by tools/state_table.py: begin -->"
+WORDS_END: Final = "<!-- words drawn by tools/state_table.py: end -->"
 JUDGE_BEGIN: Final = "<!-- judge drawn by tools/state_table.py: begin -->"
 JUDGE_END: Final = "<!-- judge drawn by tools/state_table.py: end -->"
 PARTS: Final = {
@@ -40,6 +43,35 @@ def tables() -> str:
         happens = [row for row in rows if set(row[1:]) != {Deed.NOTHING.value}]
         parts += [f"### {heading}", _table([["event", *stages], *happens])]
     return "\n\n".join(parts)
+
+
+def word_tables() -> str:
+    """Words that are sent in each stage, by what the drive has reported of its motion; then the stop of each
+    reaction. Stages and motions with the same words share a row and a column."""
+    columns = _alike((motion.value, [_words(stage, motion) for stage in Stage]) for motion in Motion)
+    shown = list(columns.values())
+    rows = _alike((f"**{stage}**", [words[at] for words in shown]) for at, stage in enumerate(Stage))
+    table = [["stage", *columns], *([stages, *words] for stages, words in rows.items())]
+    stops = [[f"`{reaction}`", *kinds] for reaction, kinds in REACTION_STOPS.items() if reaction != "hold"]
+    return "\n\n".join(
+        (
+            _table(table),
+            _table([["reaction", "its stop", "once the ramp is over"], *stops]),
+        )
+    )
+
+
+def _alike(lines: Iterable[tuple[str, list[str]]]) -> dict[str, list[str]]:
+    """``lines``, those with the same cells under the names of all."""
+    names: dict[tuple[str, ...], list[str]] = {}
+    for name, cells in lines:
+        names.setdefault(tuple(cells), []).append(name)
+    return {"; ".join(alike): list(cells) for cells, alike in names.items()}
+
+
+def _words(stage: Stage, motion: Motion) -> str:
+    word, may_hold = WORD_TABLE[stage, motion]
+    return word.value if may_hold else f"{word}, *not holding*"
 
 
 def judge_tables() -> str:
@@ -83,7 +115,13 @@ def _cell(stage: Stage, stimulus: Stimulus) -> str:
 
 def drawn(text: str) -> str:
     """``text`` of a page with the tables as they are now. Raises ValueError where the page has no marks."""
-    return replaced(replaced(text, BEGIN, END, tables()), JUDGE_BEGIN, JUDGE_END, judge_tables())
+    for begin, end, drawn_now in (
+        (BEGIN, END, tables()),
+        (WORDS_BEGIN, WORDS_END, word_tables()),
+        (JUDGE_BEGIN, JUDGE_END, judge_tables()),
+    ):
+        text = replaced(text, begin, end, drawn_now)
+    return text
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from bridge.command.leg import event
 from bridge.command.leg.effect import Tripped
 from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import AWAITS_REPORT
-from bridge.command.leg.turn import control_word
+from bridge.command.leg.words import control_word
 from bridge.command.link import Link, NodeState
 from bridge.command.messages.event import Event, Kind
 from bridge.command.messages.telegram import TelegramDecoder
@@ -65,7 +65,7 @@ class DriveChannel(Channel):
 
     @property
     def control_word(self) -> int:
-        """As if it were the owner's (``bridge.command.leg.turn``)."""
+        """As if it were the owner's (``bridge.command.leg.words``)."""
         return control_word(self.words, self.leg)
 
     @property

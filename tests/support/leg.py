@@ -11,6 +11,7 @@ from bridge.command.leg.outlook import next_deadline
 from bridge.command.leg.settings import LegSettings, leg_settings
 from bridge.command.leg.state import WANTS_STOP_WORD, Way
 from bridge.command.leg.step import initial, step
+from bridge.command.leg.turn import Turn
 from bridge.command.messages.life_sign import LifeSign
 from bridge.command.messages.telegram import TelegramDecoder
 from bridge.config import DriveTable
@@ -22,6 +23,8 @@ from bridge.text import render
 PLC = Identity(Source.MODBUS, "192.168.1.10")
 TOKENS = LifeSign(start=4711, step=20_002)
 OPEN = Way(is_open=True, why="", is_heard=True)
+SHUT_DOWN, RUN, DISABLE, ACKNOWLEDGE = 0x047E, 0x047F, 0x0000, 0x0080
+"""NORD's (BU 2500 §6.5.1, §6.8)."""
 SHUT = Way(is_open=False, why="the drive's node is lost", is_heard=True)
 
 
@@ -128,6 +131,20 @@ class Leg:
     @property
     def is_interlocked(self) -> bool:
         return self.state.stage in WANTS_STOP_WORD
+
+
+def running_nord(**given: object) -> Leg:
+    """A NORD that runs at half its speed, watched with 200 ms."""
+    leg = Leg(settings_of("nord/sk-tu4-cao", **{"fieldbus_timeout_ms": 200, **given}))
+    leg.writes(SHUT_DOWN)
+    leg.writes(RUN, setpoint_1=0x2000)
+    leg.says(DriveState.OPERATION_ENABLED)
+    assert leg.enables
+    return leg
+
+
+def turn_of(leg: Leg, at: float | None = None) -> Turn:
+    return Turn(leg.settings, leg.state, leg.now if at is None else at)
 
 
 def told(effects: list[Effect]) -> list[Any]:

@@ -13,18 +13,29 @@ from bridge.command.leg.table import Stimulus
 
 _S, _E = Stage, Stimulus
 _IDLE: Final = frozenset(Stage) - STARTING
+_REACTING: Final = frozenset((_S.RAMPING, _S.TRIPPED, _S.SILENCED, _S.BURST))
 _LED: Final = frozenset((_S.SETTLING, _S.BRAKING, _S.LEAVING, _S.LEADING))
 _EXPIRED: Final = (_E.EXPIRED_DISABLE, _E.EXPIRED_QUICK_STOP, _E.EXPIRED_SILENCE, _E.EXPIRED_HOLD)
-_STARTS: Final = (_E.START, _E.START_STOPPING, _E.START_UNHEARD, _E.START_BRAKING)
+_STARTS: Final = (_E.START_REFUSED, _E.START_ENABLED, _E.START_STOPPING, _E.START_UNHEARD, _E.START_BRAKING)
 
 _REASONS: Final[tuple[tuple[str, Iterable[Stimulus], Iterable[Stage]], ...]] = (
     ("a watchdog that has tripped does not trip again", _EXPIRED, ANY_TRIP),
     (
-        "a start is refused while the way is closed or until a trip is acknowledged",
+        "any start is refused while the way is closed or until a trip is acknowledged",
         _STARTS,
         {_S.CLOSED, *ANY_TRIP},
     ),
     ("a drive in fault is not started, and a fault ends a start", [_E.ACKNOWLEDGE_FAULT], STARTING),
+    (
+        "a drive that is enabled ends its start, and is else stopped or was told nothing yet",
+        [_E.START_ENABLED],
+        {*Stage} - {_S.ENABLED, _S.CLOSED, *ANY_TRIP},
+    ),
+    (
+        "only an output block goes on by an acknowledge alone, and only from its interlock",
+        [_E.RESUME],
+        Stage,
+    ),
     ("an enabling word is on the bus, so no stop is on its way", [_E.START_STOPPING], [_S.ENABLED, _S.BLIND]),
     ("the drive has been heard, and a node that is back ends the start", [_E.START_UNHEARD], _LED),
     ("what was held is let go as soon as its node is gone", [_E.NODE_BACK], [_S.HELD]),
@@ -34,11 +45,14 @@ _REASONS: Final[tuple[tuple[str, Iterable[Stimulus], Iterable[Stage]], ...]] = (
     (
         "a quick stop is waited for only until the drive is led on",
         [_E.BRAKING_OVERDUE],
-        {*_IDLE, _S.PREPARED, _S.BLIND, _S.LEADING},
+        {*_IDLE, _S.PREPARED, _S.BLIND, _S.LEADING, _S.LEAVING},
     ),
     ("without a start nobody waits for it", [_E.SAYS_ENABLED, _E.SAYS_BRAKING], _IDLE),
-    ("a ramp is waited for, and nothing else", [_E.SAYS_AT_REST, _E.SAYS_FAULT], _IDLE - {_S.RAMPING}),
-    ("a drive that is led is not waited for", [_E.SAYS_BRAKING], [_S.LEADING]),
+    (
+        "only a reaction or a start asks whether the drive stands",
+        [_E.SAYS_AT_REST, _E.SAYS_FAULT],
+        _IDLE - _REACTING,
+    ),
     (
         "a ramp has a limit only as the reaction, and only until the drive rests",
         [_E.RAMP_OVERDUE],

@@ -63,11 +63,6 @@ class Done:
         return self.after.start is not None and not self.enables
 
 
-def _reacts(done: Done) -> bool:
-    """True at the trip, or where a reaction that goes on turns into the next."""
-    return done.has_tripped or (done.stage is Stage.RAMPING and not done.enables)
-
-
 def _is_stopped(done: Done) -> bool:
     return not done.enables and done.after.start is None
 
@@ -87,13 +82,19 @@ HOLDS: Final[dict[Deed, Callable[[Done], bool]]] = {
     Deed.TAKE: lambda done: done.answers(forwarded=False),
     Deed.REFUSE: lambda done: done.is_refused,
     Deed.STOP: _is_stopped,
+    Deed.STOP_AS_ASKED: _is_stopped,
+    Deed.BLOCK: _is_stopped,
     Deed.CLEAR: _clears,
     Deed.CLEAR_STOP: lambda done: not done.enables and any(isinstance(one, Answer) for one in done.effects),
-    Deed.REACT: _reacts,
+    Deed.REACT: lambda done: done.has_tripped and not done.enables,
+    Deed.HOLD: lambda done: done.has_tripped,
+    Deed.END_RAMP: lambda done: done.after.trip.ramps_until is None and not done.enables,
     Deed.SILENCE: lambda done: done.after.sent.silent or not done.after.silence_stops,
     Deed.KEEP_SILENT: lambda done: done.after.sent.silent and done.is_kept,
     Deed.WAIT: lambda done: done.waits,
+    Deed.AWAIT_REST: lambda done: done.waits,
     Deed.READY: lambda done: done.waits,
+    Deed.BEGIN: _goes_on,
     Deed.GO_ON: _goes_on,
     Deed.ENABLE: lambda done: done.enables and done.after.start is not None,
     Deed.LEAVE: lambda done: done.waits,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from bridge.command.leg.state import BLOCKED, REACTING, RESTS, LegState, Motion
-from bridge.command.leg.turn import at_rest
+from bridge.command.leg.words import at_rest
 from bridge.drive import ControlWords, DriveState
 from tests.support.leg_seen import Seen
 from tests.support.leg_time import State

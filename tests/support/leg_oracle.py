@@ -76,6 +76,8 @@ class Oracle(Model):
         is_commanded = self.says == "enabled" and self.is_heard
         if words.place and not (is_commanded or self.is_held):
             assert self._are_at_rest(setpoints), "enabling moves nothing"
+        if not (words.place or self.has_set or self.is_held):
+            assert self._are_at_rest(setpoints), "nobody's setpoints outlast a stop by somebody else"
         if words.begin:
             assert bool(word & words.begin) is self.has_begun, "it begins when the drive is enabled"
 
@@ -109,7 +111,7 @@ class Oracle(Model):
             # A sign of life asks nothing of the drive.
             return
         words, word = self.rules.words, sent[0]
-        says = not silent
+        says = not silent and not self.is_unsent
         if action == "write":
             says = says and self._carries(values, sent)
             wanted = values.get("control_word", words.enable)

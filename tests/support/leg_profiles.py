@@ -285,6 +285,28 @@ _SETTINGS: Final[dict[str, Profile]] = {
     "silence, own watch off": {"names": _LEAN | _WATCH, "on_expiry": "silence"},
     "lease": {"names": _LEASE, "control": "lease", "after_hang": {"owner keeps alive", "owner enables"}},
     "lease, hold": {"names": _LEASE, "control": "lease", "on_expiry": "hold"},
+    "started, then silent": {
+        "names": {
+            "owner starts the drive",
+            "stranger stops the drive",
+            "owner resets the fault",
+            "drive follows",
+            "drive says: fault",
+            "everything is due",
+        },
+        "on_expiry": "silence",
+    },
+    "words that do not reach the bus": {
+        "names": _SHORT_START - {"owner's control data are not valid", "owner writes a setpoint"}
+        | {
+            "words do not reach the bus",
+            "words reach the bus",
+            "owner enables",
+            "owner resets the fault",
+            "stranger stops the drive",
+            "drive says: fault",
+        },
+    },
     "errors ignored": {"names": _BASE - {"node lost"}, "telegram_downtime_s": -0.1},
     "errors ignored, started": {
         "names": _SHORT_START - {"node lost"}

@@ -13,7 +13,8 @@ Cells = set[tuple[Stage, Stimulus]]
 
 class RecordedTable(dict[tuple[Stage, Stimulus], Cell]):
     """Takes each cell from ``table`` when it is looked up; ``last`` is the last one that has a deed. A cell
-    without one stays, so that it is found in C when it is looked up again: each step does that."""
+    without one stays, or that only goes on with its deed, so that it is found in C when it is looked up
+    again: each step does that."""
 
     def __init__(self, table: Mapping[tuple[Stage, Stimulus], Cell]) -> None:
         super().__init__()
@@ -24,7 +25,7 @@ class RecordedTable(dict[tuple[Stage, Stimulus], Cell]):
     def __missing__(self, key: tuple[Stage, Stimulus]) -> Cell:
         self.seen.add(key)
         cell = self.table[key]
-        if cell[1] is Deed.NOTHING:
+        if cell[1] is Deed.NOTHING or cell == (key[0], Deed.BLOCK):
             self[key] = cell
         else:
             self.last = key[0], cell[1]

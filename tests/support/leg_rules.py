@@ -110,7 +110,7 @@ class Model(Memory):
         if rules.reaction == "hold":
             self.is_held = self.missing is Missing.NOTHING and self.sends
         else:
-            self._forget()
+            self.drop()
             self.mute_at = None if rules.mutes_after_s is None else now + rules.mutes_after_s
         if rules.reaction == "quick_stop":
             self.coasts_at = now + RAMP_S
@@ -121,11 +121,17 @@ class Model(Memory):
         """All that is due."""
         self.judge()
         if self.start_until is not None and self.now >= self.start_until:
+            self.drop()
             self.stop()
         elif self.news_until is not None and self.now >= self.news_until:
             self._no_news()
 
     # what the owner and others do
+
+    def drop(self) -> None:
+        """Setpoints go to rest, and are not gone back to."""
+        self.has_set = False
+        self._forget()
 
     def stop(self, kind: str = "") -> None:
         """Note a stop: whatever was enabled has to be enabled anew."""
@@ -142,10 +148,12 @@ class Model(Memory):
                 self.gone_at = self.now + GONE_S
         elif not is_late and self.lives(who):
             self.telegram(who)
+        self.drop()
         self.stop(kind)
         self.asks = True
 
     def leave(self) -> None:
+        self.drop()
         self.stop()
         self.owner = self.deadline = self.heard_at = self.lease_until = self.bit = None
         self.absent_at = self.gone_at = self.quiet_at = self.dead_at = None
@@ -207,6 +215,7 @@ class Model(Memory):
             self.is_tripped = False
             self.mute_at = self.coasts_at = self.speaks_until = self.said = None
             self.stop_kind = ""
+            self.drop()
             self.stop()
             self.missing = Missing.STOP_WORD
 
@@ -230,6 +239,7 @@ class Model(Memory):
 
     def late_stop(self) -> None:
         """A word of the owner's that does not enable and has waited too long for a telegram."""
+        self.drop()
         self.stop()
 
     # a start
@@ -304,6 +314,7 @@ class Model(Memory):
             return
         self.is_plain = self.is_plain and says in LED
         if says in FAULTED:
+            self.drop()
             self.stop()
         elif self.missing is Missing.ENABLE and says != "unknown":
             is_early = self.news_from is not None and self.now < self.news_from

@@ -106,6 +106,10 @@ class Seen(NamedTuple):
     """The same bit as it was on the bus."""
     is_taken: bool = False
     was_commanded: bool = False
+    is_unsent: bool = False
+    """No words to the drive are on the bus."""
+    has_set: bool = False
+    """The owner has written setpoints since the last stop that was not its own."""
     at: tuple[int, ...] = ()
     """The setpoints of a drive that nobody commands, where they are not zero: its own position."""
 
@@ -178,6 +182,8 @@ class Memory:
             self.was_up,
             self.is_taken,
             self.was_commanded,
+            self.is_unsent,
+            self.has_set,
             self.at,
         ) = seen
 

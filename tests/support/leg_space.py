@@ -21,8 +21,8 @@ from bridge.command import (
     TakeControl,
     Write,
 )
-from bridge.command.leg import turn
-from bridge.command.leg.effect import Answer, Effect, StartBegun, StartEnded
+from bridge.command.leg import deeds
+from bridge.command.leg.effect import Answer, Effect, StartBegun, StartEnded, Tripped
 from bridge.command.leg.event import (
     ActualWords,
     BridgeGap,
@@ -84,7 +84,7 @@ class Space:
         self.forgets: Callable[[LegState, Seen], State] = Forgetting(settings.words, {*names, *after_hang})
         self.first = timeless(*self.forgets(leg, first(rules)))
         self.walked = Walked()
-        self._table = RecordedTable(turn.TABLE)
+        self._table = RecordedTable(deeds.TABLE)
         self.states = [self.first]
         every = self._every(requests_of(rules, ttl_ms))
         unknown = {*names, *after_hang} - every.keys()
@@ -112,6 +112,8 @@ class Space:
             "node operational, not heard": lambda state: self._node_back(state, _UNHEARD),
             "position not known": lambda state: self._way(state, _UNPLACED),
             "position known": lambda state: self._way(state, _OPEN),
+            "words do not reach the bus": lambda state: self._sends(state, "the kernel refuses them"),
+            "words reach the bus": lambda state: self._sends(state, ""),
             "bus back": self._bus_back,
             "bridge gap": self._gap,
             "everything is due": lambda state: self._round(come(state, ahead(state))),
@@ -148,7 +150,10 @@ class Space:
         after, effects = self._step(leg, request)
         oracle = Oracle(self.rules, seen, NOW)
         oracle.judge()
-        answer = next((effect for effect in effects if isinstance(effect, Answer)), None)
+        answers = [effect for effect in effects if isinstance(effect, Answer)]
+        begun = sum(isinstance(effect, StartBegun) for effect in effects)
+        assert len(answers) + begun == 1, "a request is answered, once"
+        answer = answers[0] if answers else None
         may = self._may(oracle, request)
         if answer is not None and answer.is_refused:
             assert not answer.outcome.forwarded
@@ -196,7 +201,8 @@ class Space:
                 return is_valid and (not is_late or (is_stop and oracle.owns(who)))
             case Start():
                 is_late = is_late or not oracle.lives(who)
-                return not (is_late or oracle.is_tripped or oracle.says in FAULTED) and oracle.is_open
+                is_refused = is_late or oracle.is_tripped or oracle.says in FAULTED or oracle.is_unsent
+                return not is_refused and oracle.is_open
             case SetTimeout():
                 return self.rules.is_writable and oracle.owns(who)
             case Do(action=Action.KEEP_ALIVE | Action.RESET_FAULT):
@@ -218,6 +224,7 @@ class Space:
                     oracle.word(who, word, values.get("life_sign"))
                 else:
                     oracle.telegram(who, values.get("life_sign"))
+                oracle.has_set |= bool(values.keys() - {"control_word", "life_sign"})
                 if "position" in values:
                     oracle.order(values["position"])
             case Start():
@@ -301,12 +308,19 @@ class Space:
 
     def _way(self, state: State, way: Way) -> State:
         leg, seen = state
-        way = way._replace(is_heard=leg.way.is_heard)
+        way = way._replace(is_heard=leg.way.is_heard, why_unsent=leg.way.why_unsent)
         if leg.way == way or (way.is_open and not leg.way.is_open):
             return state
         oracle = Oracle(self.rules, seen, NOW)
         after, effects = self._step(leg, way)
         oracle.way(is_there=way.is_open, is_placed=not way.why_unplaced, is_heard=way.is_heard)
+        return self._time(leg, after, oracle, effects)
+
+    def _sends(self, state: State, why_not: str) -> State:
+        leg, seen = state
+        oracle = Oracle(self.rules, seen, NOW)
+        after, effects = self._step(leg, leg.way._replace(why_unsent=why_not))
+        oracle.is_unsent = bool(why_not)
         return self._time(leg, after, oracle, effects)
 
     def _node_back(self, state: State, way: Way) -> State:
@@ -315,7 +329,7 @@ class Space:
             return state
         oracle = Oracle(self.rules, seen, NOW)
         back, effects = self._step(leg, NodeBack())
-        after, more = self._step(back, way)
+        after, more = self._step(back, way._replace(why_unsent=leg.way.why_unsent))
         oracle.stop()
         oracle.way(is_there=True, is_heard=way.is_heard)
         return self._time(leg, after, oracle, [*effects, *more])
@@ -324,6 +338,7 @@ class Space:
         leg, seen = state
         oracle = Oracle(self.rules, seen, NOW)
         after, effects = self._step(leg, StartAnew())
+        oracle.drop()
         oracle.stop()
         oracle.followed = True
         oracle.said = None
@@ -335,6 +350,7 @@ class Space:
         after, effects = self._step(leg, BridgeGap())
         oracle.judge()
         if oracle.is_tripped:
+            oracle.drop()
             oracle.stop()
         else:
             oracle.leave()
@@ -356,6 +372,9 @@ class Space:
     def _check(self, leg: LegState, oracle: Oracle, before: LegState, effects: list[Effect]) -> None:
         ended = [effect.outcome for effect in effects if isinstance(effect, StartEnded)]
         begun = sum(isinstance(effect, StartBegun) for effect in effects)
+        trips = sum(isinstance(effect, Tripped) for effect in effects)
+        assert trips <= 1, "a trip is told once"
+        assert trips or before.stage.is_tripped or not leg.stage.is_tripped, "a trip is told"
         was, is_going_on = before.start is not None, leg.start is not None
         assert was + begun == is_going_on + len(ended), "a start has one outcome"
         for number, outcome in enumerate(ended):
@@ -380,8 +399,8 @@ class Space:
 
     def explore(self, most: int, table: dict[tuple[Stage, Stimulus], Cell] | None = None) -> Walked:
         """Every state there is; fails with the shortest sequence that breaks a rule."""
-        self._table = RecordedTable(turn.TABLE if table is None else table)
-        with patch.object(turn, "TABLE", self._table):
+        self._table = RecordedTable(deeds.TABLE if table is None else table)
+        with patch.object(deeds, "TABLE", self._table):
             self._explore(most)
         self.walked.cells = self._table.seen
         return self.walked

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from bridge.command.leg import start
+from bridge.command.leg.due import judge
 from bridge.command.leg.settings import LegSettings
+from bridge.command.leg.settle import settle
 from bridge.command.leg.state import LegState, Output, WatchdogState
 from bridge.command.leg.turn import Turn
 
@@ -37,8 +39,8 @@ def output_then(settings: LegSettings, state: LegState) -> Output:
     if at is None:
         return state.sent
     then = Turn(settings, state, at)
-    then.judge()
-    then.settle()
+    judge(then)
+    settle(then)
     return then.sent
 
 

@@ -12,8 +12,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.command.leg.deeds import About, happen
 from bridge.command.leg.event import Connection
 from bridge.command.leg.state import Owner, Timer
+from bridge.command.leg.table import Stimulus
 from bridge.command.leg.turn import Turn
 from bridge.command.messages.event import Kind
 from bridge.command.messages.freshness import arrival_of
@@ -137,13 +139,24 @@ def _hand_over(turn: Turn, identity: Identity, lease_s: float | None = None) -> 
     before = turn.owner.identity
     changes = not identity.goes_on_as(before)
     if changes and before is not None:
-        turn.leave()
+        leave(turn)
     if lease_s is None or turn.settings.control != "lease":
         lease_s = turn.owner.lease_s
     turn.owner = Owner(identity, lease_s, alive_until=None if changes else turn.owner.alive_until)
     _renew(turn, turn.now)
     if changes:
         turn.tell(Kind.OWNER, 200, Text.of("owner.controls", who=identity.named_beside(before)))
+
+
+def leave(turn: Turn) -> None:
+    """The owner goes; the drive is stopped first."""
+    site_ms = turn.settings.timeout_ms
+    if turn.timer.timeout_ms != site_ms:
+        turn.tell(Kind.CONFIGURATION, 400, Text.of("owner.timeout_of_site", timeout_ms=site_ms))
+    turn.timer = Timer(site_ms)
+    happen(turn, Stimulus.LEFT, About(Outcome(Code.CANCELLED, Text.of("start.owner_changed"))))
+    turn.owner = Owner(lease_s=turn.owner.lease_s)
+    turn.edges = turn.edges._replace(bit=None)
 
 
 def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
@@ -161,7 +174,7 @@ def release(turn: Turn, identity: Identity) -> Outcome:
     if not identity.goes_on_as(turn.owner.identity):
         return Outcome(Code.OK, Text.of("request.not_in_control"))
     turn.tell(Kind.OWNER, 200, Text.of("owner.released", who=str(turn.owner.identity)))
-    turn.leave()
+    leave(turn)
     return DONE
 
 

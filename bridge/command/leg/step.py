@@ -1,14 +1,21 @@
 """The leg's one verb: ``step(settings, state, event, now)`` gives the next state and what has come of it.
 
 Pure: times are monotonic seconds, given from outside. A state that is the same afterwards is the same object.
+
+Each step goes one way: first it is found out what happens (here, in ``reports``, ``start``, ``due`` and
+``owners``); the table says the next stage and the deed, which is done (``deeds``); and then the other table
+says what is sent (``settle``, ``words``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
 
-from bridge.command.leg import alive, order, owners, start
+from bridge.command.leg import alive, order, owners, reports, start
+from bridge.command.leg.deeds import About, happen
+from bridge.command.leg.due import judge, run_out
 from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.event import (
     ActualWords,
@@ -21,22 +28,19 @@ from bridge.command.leg.event import (
     StartAnew,
     Time,
 )
-from bridge.command.leg.forwarded import SENT_BEFORE, Edge, Stop, Words, judged
+from bridge.command.leg.forwarded import Edge, Stop, Words, judged
 from bridge.command.leg.settings import LegSettings
-from bridge.command.leg.state import (
-    LegState,
-    Motion,
-    Output,
-    Timer,
-    Way,
-)
-from bridge.command.leg.table import Deed, Stimulus
-from bridge.command.leg.turn import Turn, control_word
+from bridge.command.leg.settle import look_at_way, settle
+from bridge.command.leg.state import LegState, Output, Stage, Timer, Way
+from bridge.command.leg.table import Stimulus
+from bridge.command.leg.turn import Turn
+from bridge.command.leg.words import at_rest, control_word
 from bridge.command.messages.event import Kind
 from bridge.command.messages.freshness import TAKEN_LATE, arrival_of, is_stale, limit_ms_of
 from bridge.command.messages.life_sign import LEAF
 from bridge.command.messages.request import (
     DONE,
+    STOP_ACTIONS,
     Action,
     Code,
     Do,
@@ -49,14 +53,20 @@ from bridge.command.messages.request import (
     refused,
 )
 from bridge.command.messages.telegram import Refusal
-from bridge.drive import FAULTED
+from bridge.drive import FAULTED, ControlWords
 from bridge.image import Value
 from bridge.text import Text
 
+_PULSE_S: Final = 0.1
+"""How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
 _OVERWRITTEN: Final = Outcome(Code.CANCELLED, Text.of("start.overwritten"))
-
 _CAME_LATE: Final = Text.of("request.came_late")
 _IS_LIFELESS: Final = Text.of("request.came_lifeless")
+_STOPS: Final[Mapping[Action, Callable[[ControlWords, int], int]]] = {
+    Action.STOP: ControlWords.stop,
+    Action.QUICK_STOP: ControlWords.quick_stop,
+    Action.DISABLE_VOLTAGE: ControlWords.disable_voltage,
+}
 
 
 def initial(settings: LegSettings) -> LegState:
@@ -72,92 +82,70 @@ def initial(settings: LegSettings) -> LegState:
 def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tuple[LegState, list[Effect]]:
     """Let ``event`` happen ``now``."""
     turn = Turn(settings, state, now)
-    match event:
-        case Request():
-            _handle(turn, event)
-        case Time(way=way):
-            turn.judge()
-            if way is not None:
-                turn.way = way
-            start.on_time(turn)
-        case Report():
-            _report(turn, event)
-        case Way():
-            turn.way = event
-        case ActualWords(words=words):
-            _follow(turn, words)
-        case NodeBack():
-            turn.happens(Stimulus.NODE_BACK, Outcome(Code.CANCELLED, Text.of("node.restarted")))
-        case StartAnew():
-            _start_anew(turn)
-        case BridgeGap():
-            _gap(turn)
-        case OwnWatch(stops=stops):
-            turn.silence_stops = stops
-        case Connection():
-            owners.on_connection(turn, event)
-            return turn.end(), turn.effects
-    turn.settle()
+    if isinstance(event, Connection):
+        owners.on_connection(turn, event)
+        return turn.end(), turn.effects
+    _ON[type(event)](turn, event)
+    settle(turn)
     effects = judged(settings, turn.asked, turn.way, turn.sent, turn.effects)
     if isinstance(event, StartAnew):
-        # What the drive says from now on is from after all that it was told.
-        if turn.motion is Motion.EXPECTED:
-            turn.motion = Motion.SEEN
-        elif turn.motion is Motion.FAULTED:
-            turn.motion = Motion.ENDED
+        reports.on_told_anew(turn)
     after = turn.end()
     return (state if after == state else after), effects
 
 
-def _report(turn: Turn, report: Report) -> None:
-    is_news = report.state is not turn.drive
-    turn.is_taken = report.is_taken
-    turn.reported(report.state)
-    if not turn.way.is_heard:
-        turn.way = turn.way._replace(is_heard=True)
-    start.on_report(turn, report, is_news=is_news)
+def _on_time(turn: Turn, event: Time) -> None:
+    judge(turn)
+    if event.way is not None:
+        turn.way = event.way
+    start.on_time(turn)
 
 
-def _follow(turn: Turn, actual: tuple[int, ...]) -> None:
-    rest = list(turn.rest)
-    for place, source in turn.settings.follows:
-        rest[place] = actual[source]
-    turn.rest = tuple(rest)
-    turn.keep_at_rest()
+def _on_way(turn: Turn, event: Way) -> None:
+    turn.way = event
 
 
-def _start_anew(turn: Turn) -> None:
-    turn.happens(Stimulus.ANEW, Outcome(Code.CANCELLED, Text.of("start.enable_anew")))
+def _on_actual_words(turn: Turn, event: ActualWords) -> None:
+    reports.on_actual_words(turn, event.words)
+
+
+def _on_node_back(turn: Turn, event: NodeBack) -> None:
+    happen(turn, Stimulus.NODE_BACK, About(Outcome(Code.CANCELLED, Text.of("node.restarted"))))
+
+
+def _on_start_anew(turn: Turn, event: StartAnew) -> None:
+    happen(turn, Stimulus.ANEW, About(Outcome(Code.CANCELLED, Text.of("start.enable_anew"))))
     turn.trip = turn.trip._replace(burst=None)
-    turn.stop(turn.settings.words.stop(turn.sent.words[0]))
 
 
-def _gap(turn: Turn) -> None:
-    turn.judge()
+def _on_gap(turn: Turn, event: BridgeGap) -> None:
+    judge(turn)
     if turn.is_tripped:
         # Still tripped; but a "hold" does not outlive the one who held.
-        turn.happens(Stimulus.LEFT)
-        turn.stop(turn.settings.words.stop(turn.sent.words[0]))
+        happen(turn, Stimulus.LEFT)
     else:
-        turn.leave()
+        owners.leave(turn)
 
 
-# what a request makes of the leg
+def _on_own_watch(turn: Turn, event: OwnWatch) -> None:
+    turn.silence_stops = event.stops
+
+
+# requests
 
 
 def _handle(turn: Turn, request: Request) -> None:
-    """Do what ``request`` asks, or refuse it and change nothing."""
-    turn.judge()
+    """Do what ``request`` asks and answer it, or refuse it and change nothing."""
+    judge(turn)
+    before, effects = turn.end(), len(turn.effects)
     try:
         owners.check_authority(turn, request)
         if request.action not in TAKEN_LATE and _is_stale(turn, request):
             raise _stale(turn, request)
         alive.check(turn, request)
-        if isinstance(request.command, Start):
-            _start(turn, request, request.command.direction)
-        else:
-            turn.effects.append(Answer(_carry_out(turn, request)))
+        _carry_out(turn, request)
     except Refusal as refusal:
+        turn.take_back(before, effects)
         who = request.identity.named_beside(turn.owner.identity)
         turn.tell(Kind.REFUSED, 300, refused(request.action, who, refusal.said))
         outcome = Outcome(refusal.code, refusal.said, forwarded=False)
@@ -174,33 +162,36 @@ def _stale(turn: Turn, request: Request) -> Refusal:
     return Refusal(Code.STALE, Text.of("request.may_be_old", limit_ms=limit_ms))
 
 
-def _carry_out(turn: Turn, request: Request) -> Outcome:
-    """What is done at once. Raises ``Refusal`` before anything has changed."""
+def _carry_out(turn: Turn, request: Request) -> None:
     match request.command:
         case Write(values=values):
-            return _write(turn, request, values)
+            _write(turn, request, values)
         case Do(action=Action.KEEP_ALIVE):
             owners.hear(turn, request)
+            turn.answer(DONE)
         case Do(action=Action.RESET_FAULT):
-            return _reset_fault(turn, request)
-        case Do(action=Action.STOP | Action.QUICK_STOP | Action.DISABLE_VOLTAGE):
-            return _stop(turn, request)
+            _reset_fault(turn, request)
+        case Do(action=action) if action in STOP_ACTIONS:
+            _stop(turn, request)
+        case Start(direction=direction):
+            _start(turn, request, direction)
         case TakeControl(ttl_ms=ttl_ms):
             owners.take_control(turn, request.identity, ttl_ms)
+            turn.answer(DONE)
         case Do(action=Action.RELEASE_CONTROL):
-            return owners.release(turn, request.identity)
+            turn.answer(owners.release(turn, request.identity))
         case SetTimeout(timeout_ms=timeout_ms):
             owners.set_timeout(turn, request.identity, timeout_ms)
+            turn.answer(DONE)
         case _:
             action = Text.word("action", request.action)
             raise Refusal(Code.UNKNOWN_POINT, Text.of("request.unknown_action", action=action))
-    return DONE
 
 
 # telegrams
 
 
-def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome:
+def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> None:
     words = turn.settings.words
     is_owner = request.identity.goes_on_as(turn.owner.identity)
     # A new owner inherits no setpoints.
@@ -211,13 +202,14 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
     telegram = turn.settings.decode(values, kept, control_word(words, turn))
     word = telegram.control_word
     if word is not None and not words.is_valid(word):
-        turn.happens(Stimulus.INVALID)
-        raise Refusal(Code.NOT_VALID, Text.of("request.data_not_valid", word=word))
+        why = Refusal(Code.NOT_VALID, Text.of("request.data_not_valid", word=word))
+        happen(turn, Stimulus.INVALID, About(refusal=why))
     is_late = _is_stale(turn, request)
     if is_late or alive.is_missing(turn, alive_until):
         if word is None or not is_owner or words.enables(word):
             raise _stale(turn, request) if is_late else alive.refusal()
-        return _take_stale_stop(turn, word, _CAME_LATE if is_late else _IS_LIFELESS)
+        _take_stale_stop(turn, word, _CAME_LATE if is_late else _IS_LIFELESS)
+        return
     owners.own(turn, request)
     alive.note(turn, alive_until)
     if word is not None:
@@ -231,21 +223,19 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> Outcome
             # The edge itself goes on to the drive; whatever else the word asks has to be asked anew.
             turn.word |= mask
             turn.asked = Words(word, telegram.setpoints)
-            return Outcome(Code.OK, Text.of("request.acknowledged"))
+            turn.answer(Outcome(Code.OK, Text.of("request.acknowledged")))
+            return
         if not is_edge and not turn.word & mask:
             word &= ~mask  # what was sent meanwhile would make an edge of a bit that never fell
     turn.hear(arrival_of(request, turn.now), tuple(values))
-    if _take(turn, word, telegram.setpoints, values) is Deed.FORWARD:
-        turn.asked = Words(word, telegram.setpoints)
-        return DONE
-    return Outcome(Code.OK, turn.why_blocked, forwarded=False)
+    _take(turn, Words(word, telegram.setpoints), values)
 
 
-def _take(turn: Turn, word: int | None, setpoints: tuple[int, ...], values: Mapping[str, Value]) -> Deed:
+def _take(turn: Turn, asked: Words, values: Mapping[str, Value]) -> None:
     """The words of a valid telegram. With one that does not enable, what was ordered before it is not gone to
     any more, nor what comes with a stop of a running drive."""
-    turn.look_at_way()
-    turn.setpoints = setpoints
+    look_at_way(turn)
+    word, turn.setpoints = asked
     turn.keep_at_rest()
     is_stop = word is not None and not turn.settings.words.enables(word)
     handshake = turn.settings.handshake
@@ -256,79 +246,88 @@ def _take(turn: Turn, word: int | None, setpoints: tuple[int, ...], values: Mapp
         if handshake.value in values and not stops_it and not turn.is_tripped:
             position = tuple(turn.setpoints[place] for place in handshake.places)
             turn.order = order.ordered(turn.order, position)
+    about = About(_OVERWRITTEN, asked)
     if word is None:
-        return turn.happens(Stimulus.SETPOINTS)
+        happen(turn, Stimulus.SETPOINTS, about)
+        return
     turn.word, turn.is_ours = word, False
     if is_stop and turn.settings.acknowledge_resumes and not turn.is_tripped:
         turn.is_asked = False
-    return turn.happens(Stimulus.STOP_WORD if is_stop else Stimulus.ENABLING_WORD, _OVERWRITTEN)
+    happen(turn, Stimulus.STOP_WORD if is_stop else Stimulus.ENABLING_WORD, about)
 
 
-def _take_stale_stop(turn: Turn, word: int, why: Text) -> Outcome:
+def _take_stale_stop(turn: Turn, word: int, why: Text) -> None:
     """The owner's stop, however long it has waited, or by a program that may be dead; ``why``. It is no sign
     of life, acknowledges nothing and brings no setpoints."""
     acknowledge = turn.settings.words.acknowledge_mask
     turn.stop(word & ~acknowledge | turn.word & acknowledge, is_asked=True)
-    if turn.happens(Stimulus.LATE_STOP, _OVERWRITTEN) is Deed.TAKE:
-        return Outcome(Code.OK, turn.why_blocked, forwarded=False)
-    turn.asked = Words(word, turn.rest)
-    return Outcome(Code.OK, why)
+    about = About(_OVERWRITTEN, Words(word, turn.rest), done=Outcome(Code.OK, why))
+    happen(turn, Stimulus.LATE_STOP, about)
 
 
 # acknowledge, stop, start
 
 
-def _reset_fault(turn: Turn, request: Request) -> Outcome:
+def _reset_fault(turn: Turn, request: Request) -> None:
     """A method is an order each time; a register acknowledges where the telegram before it did not."""
     if request.pressed:
         was_pressed = request.identity.goes_on_as(turn.edges.pressed_by)
         turn.edges = turn.edges._replace(pressed_by=request.identity)
         if was_pressed:
             owners.hear(turn, request)
-            return Outcome(Code.OK, Text.of("request.no_edge"), forwarded=False)
+            turn.answer(Outcome(Code.OK, Text.of("request.no_edge"), forwarded=False))
+            return
     owners.own(turn, request)
     _acknowledge(turn, request, pulse=True)
     turn.asked = Edge()
-    return DONE
+    turn.answer(DONE)
 
 
 def _acknowledge(turn: Turn, request: Request, *, pulse: bool) -> None:
+    """Leave the trip, and stop what would go on after a fault of the drive itself. With ``pulse`` an
+    acknowledge edge is sent to the drive."""
     was_tripped = turn.is_tripped
     turn.hear(arrival_of(request, turn.now))
-    turn.clear(pulse=pulse)
+    is_reset = pulse and turn.drive in FAULTED
+    word = at_rest(turn.settings.words, turn.sent.words[0])
+    if turn.settings.reaction == "silence" and was_tripped and turn.trip.burst is None:
+        # Nobody has asked for a ramp.
+        word = turn.settings.words.disable_voltage(word)
+    happen(turn, Stimulus.ACKNOWLEDGE_FAULT if is_reset else Stimulus.ACKNOWLEDGE, About(word=word))
+    if turn.settings.acknowledge_resumes and turn.stage is Stage.INTERLOCKED and not turn.is_asked:
+        # Whoever acknowledges means to go on: nothing is active by that.
+        happen(turn, Stimulus.RESUME)
+    if pulse:
+        turn.pulse_until = turn.now + _PULSE_S
     if was_tripped:
         by = str(turn.owner.identity)
         turn.tell(Kind.WATCHDOG, 200, Text.of("watchdog.acknowledged", who=by))
 
 
-def _stop(turn: Turn, request: Request) -> Outcome:
+def _stop(turn: Turn, request: Request) -> None:
     """Stop, by whoever asks. The owner's telegrams go on counting, its old enable does not."""
-    who, action, words = request.identity, request.action, turn.settings.words
-    owner = turn.owner
+    who, owner = request.identity, turn.owner
+    action = Text.word("action", request.action)
     if who.goes_on_as(owner.identity):
         if not _is_stale(turn, request) and alive.is_there(turn, who):
             owners.hear(turn, request)
     else:
         named = who.named_beside(owner.identity)
-        turn.tell(Kind.OWNER, 400, Text.of("request.by", action=Text.word("action", action), who=named))
+        turn.tell(Kind.OWNER, 400, Text.of("request.by", action=action, who=named))
         if turn.timer.timeout_ms == 0 and owner.identity is not None and owner.stopped_until is None:
             # Whoever is there answers to a stop of its drive.
             turn.owner = owner._replace(stopped_until=turn.now + owners.GONE_S)
-    changes = {
-        Action.STOP: words.stop,
-        Action.QUICK_STOP: words.quick_stop,
-        Action.DISABLE_VOLTAGE: words.disable_voltage,
-    }
-    turn.run_out()  # what is silent by now has to be broken
-    word = changes[action](turn.sent.words[0])
-    if turn.has_been_sent(word):
-        turn.happens(Stimulus.STOP_AGAIN)
-        return Outcome(Code.OK, SENT_BEFORE, forwarded=False)
-    by = Text.of("request.by", action=Text.word("action", action), who=str(who))
-    turn.happens(Stimulus.STOP, Outcome(Code.CANCELLED, by))
-    turn.stop_as_asked(word)
-    turn.asked = Stop(changes[action])
-    return DONE
+    run_out(turn)  # what is silent by now has to be broken
+    stop = Stop(partial(_STOPS[request.action], turn.settings.words))
+    ends = Outcome(Code.CANCELLED, Text.of("request.by", action=action, who=str(who)))
+    was_sent = _has_been_sent(turn, stop.of(turn.sent.words[0]))
+    happen(turn, Stimulus.STOP_AGAIN if was_sent else Stimulus.STOP, About(ends, stop))
+
+
+def _has_been_sent(turn: Turn, word: int) -> bool:
+    """This stop has broken the silence before, and nothing is sent any more."""
+    is_silent = turn.stage is Stage.SILENCED and turn.silence_stops
+    return is_silent and word == turn.trip.burst
 
 
 def _start(turn: Turn, request: Request, direction: int) -> None:
@@ -339,11 +338,27 @@ def _start(turn: Turn, request: Request, direction: int) -> None:
     if direction < 0 and not bits:
         # Forward is what such a drive does with a positive setpoint: that needs no bit.
         raise Refusal(Code.OUT_OF_RANGE, Text.of("request.direction_by_sign"))
-    if turn.is_tripped or turn.drive in FAULTED:
-        raise Refusal(Code.ACKNOWLEDGE_FIRST, Text.of("request.acknowledge_first"))
-    if not turn.may_enable:
-        raise Refusal(Code.NOT_READY, turn.why_blocked)
-    if turn.way.why_unsent:
-        raise Refusal(Code.NOT_READY, turn.way.why_unsent)
+    look_at_way(turn)
+    refusal = _why_not_started(turn)
     owners.hear(turn, request)
-    start.begin(turn, words.run | bits)
+    start.begin(turn, words.run | bits, refusal)
+
+
+def _why_not_started(turn: Turn) -> Refusal:
+    """Told where the table refuses the start."""
+    if turn.is_tripped or turn.drive in FAULTED:
+        return Refusal(Code.ACKNOWLEDGE_FIRST, Text.of("request.acknowledge_first"))
+    return Refusal(Code.NOT_READY, turn.way.why_unsent if turn.may_enable else turn.why_blocked)
+
+
+_ON: Final[dict[type[Event], Callable[[Turn, Any], None]]] = {
+    Request: _handle,
+    Time: _on_time,
+    Report: reports.on_report,
+    Way: _on_way,
+    ActualWords: _on_actual_words,
+    NodeBack: _on_node_back,
+    StartAnew: _on_start_anew,
+    BridgeGap: _on_gap,
+    OwnWatch: _on_own_watch,
+}

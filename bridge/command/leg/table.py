@@ -1,7 +1,8 @@
 """The leg as a table: what each event makes of each stage, and what is done about it.
 
-The code asks this table and nothing else for the next stage; ``docs/explanation/dead-man-chain.md`` has it
-printed. What an event is, and what has to hold for it, is decided where it comes in.
+The next stage and the deed come from this table and from nowhere else (``bridge.command.leg.deeds``);
+``docs/explanation/dead-man-chain.md`` has it printed. What an event is, and what has to hold for it, is
+decided where it comes in. Which word a drive gets then is a table of its own (``bridge.command.leg.words``).
 """
 
 from __future__ import annotations
@@ -26,12 +27,15 @@ class Stimulus(StrEnum):
     LATE_STOP = "owner's control word that stops, but is too old for a telegram"
     ACKNOWLEDGE = "acknowledge"
     ACKNOWLEDGE_FAULT = "acknowledge of a fault of the drive"
+    RESUME = "acknowledge that stands for a word that does not enable"
     LEFT = "owner releases, loses its lease or is replaced; the bridge hung"
     # anybody
     STOP = "stop by a command"
     STOP_AGAIN = "stop by a command that was sent in this silence already"
     # a start
-    START = "start of a drive that stands"
+    START_REFUSED = "start of a drive with a fault, or that gets no words"
+    START = "start"
+    START_ENABLED = "start of a drive that is enabled"
     START_STOPPING = "start while a stop is on its way"
     START_UNHEARD = "start of a drive that has not reported yet"
     START_BRAKING = "start of a drive in its quick stop"
@@ -59,19 +63,30 @@ class Stimulus(StrEnum):
 
 
 class Deed(StrEnum):
+    __hash__ = str.__hash__
+
     NOTHING = "–"
+    # what the owner and others ask
     FORWARD = "forward"
     TAKE = "take, do not forward"
     REFUSE = "refuse"
-    STOP = "stop"
+    STOP_AS_ASKED = "stop as asked"
+    KEEP_SILENT = "go on sending nothing"
     CLEAR = "clear the fault"
     CLEAR_STOP = "clear the fault, stop"
+    # what the bridge does by itself
+    STOP = "stop"
+    BLOCK = "a stop in place of the owner's word"
     REACT = "reaction, fault"
+    HOLD = "fault, go on sending"
+    END_RAMP = "the ramp is over"
     SILENCE = "send nothing"
-    KEEP_SILENT = "go on sending nothing"
+    # a start
     WAIT = "hold the stop, wait"
+    AWAIT_REST = "wait for the end of the quick stop"
     READY = "send READY"
-    GO_ON = "answer with the next word"
+    BEGIN = "send READY, or the next word"
+    GO_ON = "send the next word"
     ENABLE = "send the enabling word"
     LEAVE = "send disable voltage"
     DONE = "the start is done"
@@ -80,6 +95,7 @@ class Deed(StrEnum):
 
 Cell = tuple[Stage, Deed]
 _Row = Mapping[Iterable[Stage], tuple[Stage | None, Deed]]
+"""None: the stage stays."""
 
 _OPEN: Final = (_S.READY, _S.ENABLED)
 _SHUT: Final = (_S.CLOSED,)
@@ -101,16 +117,20 @@ def _stops(deed: Deed = Deed.STOP) -> _Row:
 
 def _starts(after: Stage, deed: Deed, kept: Iterable[Stage] = ()) -> _Row:
     """``kept``: stages of a start that the next one goes on with."""
+    return {_FREE: (after, deed), tuple(kept): (None, deed)}
+
+
+def _expires(after: Stage, deed: Deed = Deed.REACT) -> _Row:
+    return {_NOT_TRIPPED: (after, deed)}
+
+
+def _rests(in_start: Cell) -> _Row:
+    """The drive is not enabled: a ramp is over, also while nothing is sent."""
     return {
-        _SHUT: (None, Deed.REFUSE),
-        _FREE: (after, deed),
-        tuple(kept): (None, deed),
-        tuple(ANY_TRIP): (None, Deed.REFUSE),
+        tuple(STARTING): in_start,
+        (_S.RAMPING,): (_S.TRIPPED, Deed.END_RAMP),
+        (_S.SILENCED, _S.BURST): (None, Deed.END_RAMP),
     }
-
-
-def _expires(after: Stage) -> _Row:
-    return {_NOT_TRIPPED: (after, Deed.REACT)}
 
 
 _ROWS: Final[dict[Stimulus, _Row]] = {
@@ -129,7 +149,7 @@ _ROWS: Final[dict[Stimulus, _Row]] = {
         (*_OPEN, *STARTING): (None, Deed.FORWARD),
     },
     Stimulus.INVALID: {tuple(Stage): (None, Deed.REFUSE)},
-    Stimulus.LATE_STOP: {**_stops(), _REACTING: (None, Deed.TAKE)},
+    Stimulus.LATE_STOP: {**_stops(Deed.FORWARD), _REACTING: (None, Deed.TAKE)},
     Stimulus.ACKNOWLEDGE: {
         _NOT_TRIPPED: (None, Deed.CLEAR),
         tuple(ANY_TRIP): (_S.INTERLOCKED, Deed.CLEAR_STOP),
@@ -138,10 +158,16 @@ _ROWS: Final[dict[Stimulus, _Row]] = {
         _SHUT: (None, Deed.CLEAR_STOP),
         (*_FREE, *ANY_TRIP): (_S.INTERLOCKED, Deed.CLEAR_STOP),
     },
+    Stimulus.RESUME: {_LOCKED: (_S.READY, Deed.NOTHING)},
     Stimulus.LEFT: _stops(),
-    Stimulus.STOP: {**_stops(), (_S.SILENCED,): (_S.BURST, Deed.STOP)},
+    Stimulus.STOP: {**_stops(Deed.STOP_AS_ASKED), (_S.SILENCED,): (_S.BURST, Deed.STOP_AS_ASKED)},
     Stimulus.STOP_AGAIN: {(_S.SILENCED,): (None, Deed.KEEP_SILENT)},
-    Stimulus.START: _starts(_S.LEADING, Deed.GO_ON),
+    Stimulus.START_REFUSED: {_FREE: (None, Deed.REFUSE)},
+    Stimulus.START: {
+        (*_SHUT, *ANY_TRIP): (None, Deed.REFUSE),
+        **_starts(_S.LEADING, Deed.BEGIN),
+    },
+    Stimulus.START_ENABLED: _starts(_S.ENABLED, Deed.DONE),
     Stimulus.START_STOPPING: _starts(_S.SETTLING, Deed.WAIT),
     Stimulus.START_UNHEARD: {
         **_starts(_S.ASKING, Deed.WAIT, kept=(_S.ASKING, _S.PREPARED)),
@@ -151,7 +177,7 @@ _ROWS: Final[dict[Stimulus, _Row]] = {
     Stimulus.EXPIRED_DISABLE: _expires(_S.TRIPPED),
     Stimulus.EXPIRED_QUICK_STOP: _expires(_S.RAMPING),
     Stimulus.EXPIRED_SILENCE: _expires(_S.SILENCED),
-    Stimulus.EXPIRED_HOLD: _expires(_S.HELD),
+    Stimulus.EXPIRED_HOLD: _expires(_S.HELD, Deed.HOLD),
     Stimulus.REPORT_OVERDUE: {
         (_S.ASKING,): (_S.PREPARED, Deed.READY),
         (_S.PREPARED,): (_S.BLIND, Deed.ENABLE),
@@ -161,25 +187,26 @@ _ROWS: Final[dict[Stimulus, _Row]] = {
         (_S.SETTLING,): (None, Deed.LEAVE),
     },
     Stimulus.START_OVERDUE: {tuple(STARTING): (_S.INTERLOCKED, Deed.GIVE_UP)},
-    Stimulus.RAMP_OVERDUE: {(_S.RAMPING,): (_S.TRIPPED, Deed.REACT)},
+    Stimulus.RAMP_OVERDUE: {
+        (_S.RAMPING,): (_S.TRIPPED, Deed.END_RAMP),
+        (_S.SILENCED, _S.BURST): (None, Deed.END_RAMP),
+    },
     Stimulus.SILENCE_DUE: {(_S.RAMPING, _S.TRIPPED): (_S.SILENCED, Deed.SILENCE)},
     Stimulus.BURST_OVER: {(_S.BURST,): (_S.SILENCED, Deed.SILENCE)},
     Stimulus.SAYS_ENABLED: {tuple(STARTING): (_S.ENABLED, Deed.DONE)},
-    Stimulus.SAYS_BRAKING: {tuple(AWAITS_REPORT): (_S.BRAKING, Deed.WAIT)},
+    Stimulus.SAYS_BRAKING: {tuple(AWAITS_REPORT): (_S.BRAKING, Deed.AWAIT_REST)},
     Stimulus.SAYS_AT_REST: {
-        tuple(STARTING): (_S.LEADING, Deed.GO_ON),
-        (_S.RAMPING,): (_S.TRIPPED, Deed.REACT),
+        **_rests((_S.LEADING, Deed.BEGIN)),
+        (_S.LEADING,): (None, Deed.GO_ON),
     },
-    Stimulus.SAYS_FAULT: {
-        tuple(STARTING): (_S.INTERLOCKED, Deed.GIVE_UP),
-        (_S.RAMPING,): (_S.TRIPPED, Deed.REACT),
-    },
+    Stimulus.SAYS_FAULT: _rests((_S.INTERLOCKED, Deed.GIVE_UP)),
     Stimulus.WAY_CLOSED: {
-        _FREE: (_S.CLOSED, Deed.STOP),
-        _HOLDING: (_S.LET_GO, Deed.STOP),
+        _SHUT: (None, Deed.BLOCK),
+        _FREE: (_S.CLOSED, Deed.BLOCK),
+        _HOLDING: (_S.LET_GO, Deed.BLOCK),
     },
     Stimulus.WAY_OPEN: {_SHUT: (_S.INTERLOCKED, Deed.NOTHING)},
-    Stimulus.NODE_BACK: {_FREE: (_S.INTERLOCKED, Deed.STOP)},
+    Stimulus.NODE_BACK: {_FREE: (_S.INTERLOCKED, Deed.BLOCK)},
     Stimulus.ANEW: _stops(),
 }
 

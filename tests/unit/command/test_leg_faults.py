@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, Final
+from unittest.mock import patch
 
 import pytest
 
-from bridge.command.leg import order, owners, start, step, turn
+from bridge.command.leg import deeds, due, order, owners, reports, start, step, words
 from bridge.command.leg.effect import Heard
+from bridge.command.leg.event import BridgeGap, Event
 from bridge.command.leg.state import Output, Stage
 from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
 from bridge.command.leg.turn import Turn
+from bridge.command.leg.words import Word
 from bridge.command.messages.request import Identity
 from tests.support import leg_space
 from tests.support.leg_profiles import CYCLIC, MOST, space
@@ -95,14 +98,14 @@ CELLS: Final[dict[str, tuple[str, Stage, Stimulus, Cell]]] = {
     "the timer does nothing": ("telegrams", _S.ENABLED, _E.EXPIRED_DISABLE, (_S.ENABLED, _D.NOTHING)),
     "an acknowledge does nothing": ("telegrams", _S.TRIPPED, _E.ACKNOWLEDGE, (_S.TRIPPED, _D.CLEAR_STOP)),
     "it ends the interlock, too": ("telegrams", _S.TRIPPED, _E.ACKNOWLEDGE, (_S.READY, _D.CLEAR_STOP)),
-    "a stop needs no stop word after it": ("telegrams", _S.ENABLED, _E.STOP, (_S.READY, _D.STOP)),
+    "a stop needs no stop word after it": ("telegrams", _S.ENABLED, _E.STOP, (_S.READY, _D.STOP_AS_ASKED)),
     "nor does a change of owners": ("telegrams", _S.ENABLED, _E.LEFT, (_S.READY, _D.STOP)),
-    "nor a late stop": ("late", _S.ENABLED, _E.LATE_STOP, (_S.READY, _D.STOP)),
-    "and is told as sent while tripped": ("late, stop", _S.TRIPPED, _E.LATE_STOP, (_S.TRIPPED, _D.STOP)),
+    "nor a late stop": ("late", _S.ENABLED, _E.LATE_STOP, (_S.READY, _D.FORWARD)),
+    "and is told as sent while tripped": ("late, stop", _S.TRIPPED, _E.LATE_STOP, (_S.TRIPPED, _D.FORWARD)),
     "nor a bus that was gone": ("way", _S.ENABLED, _E.ANEW, (_S.READY, _D.STOP)),
     "nor a node that was gone": ("way", _S.CLOSED, _E.WAY_OPEN, (_S.READY, _D.NOTHING)),
     "a lost node does nothing": ("way", _S.ENABLED, _E.WAY_CLOSED, (_S.ENABLED, _D.NOTHING)),
-    "a stop does not break the silence": ("silence", _S.SILENCED, _E.STOP, (_S.SILENCED, _D.STOP)),
+    "a stop does not break the silence": ("silence", _S.SILENCED, _E.STOP, (_S.SILENCED, _D.STOP_AS_ASKED)),
     "and one that does has no end": ("silence", _S.BURST, _E.BURST_OVER, (_S.BURST, _D.NOTHING)),
     "silence does not come": (
         "stop, then silence",
@@ -170,16 +173,16 @@ def _counts(leg: Turn, *_: Any) -> None:
         leg.effects.append(Heard())
 
 
-def _speaks(leg: Turn, of: Callable[[Turn], Output] = turn._reaction) -> Output:
-    return Output(of(leg).words)
+def _speaks(leg: Turn, may_hold: bool, of: Callable[[Turn, bool], Output] = words._silence) -> Output:
+    return Output(of(leg, may_hold).words)
 
 
-def _moves(leg: Turn, of: Callable[[Turn], Output] = turn._reaction) -> Output:
-    word, *_ = of(leg).words
-    return Output((word, 1, *leg.rest[1:]), of(leg).silent)
+def _moves(leg: Turn, may_hold: bool, of: Callable[[Turn, bool], Output] = words._reaction) -> Output:
+    word, *_ = of(leg, may_hold).words
+    return Output((word, 1, *leg.rest[1:]))
 
 
-def _weak(leg: Turn) -> int:
+def _weak(leg: Turn, may_hold: bool) -> int:
     return leg.settings.words.stop(leg.sent.words[0])
 
 
@@ -192,14 +195,17 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
         _before(owners.check_authority, _counts),
     ),
     "the owner is refused": ("telegrams", owners, "refusal", lambda *_, **__: "no"),
-    "a word lifts the interlock": ("telegrams", turn, "at_rest", lambda words, word: words.run),
-    "a quick stop is a ramp": ("quick_stop", turn, "_reaction_word", _weak),
-    "a quick stop has no end": ("quick_stop", turn, "_RAMP_LIMIT_S", 20.0),
+    "a word lifts the interlock": ("telegrams", words, "at_rest", lambda words, word: words.run),
+    "a quick stop is a ramp": ("quick_stop", words, "_reaction_word", _weak),
+    "a quick stop has no end": ("quick_stop", deeds, "_RAMP_LIMIT_S", 20.0),
     "what is asked is told as sent": ("moved", step, "judged", lambda *given: given[-1]),
-    "who asks again breaks the silence again": ("silence", Turn, "has_been_sent", lambda leg, word: False),
-    "silence speaks": ("silence", turn, "_reaction", _speaks),
-    "a reaction keeps setpoints": ("telegrams", turn, "_reaction", _moves),
-    "a lease has no end": ("lease", Turn, "judge", _before(Turn.judge, _loses_its_lease)),
+    "who asks again breaks the silence again": (
+        "silence",
+        step,
+        "_has_been_sent",
+        lambda leg, word: False,
+    ),
+    "a lease has no end": ("lease", step, "judge", _before(due.judge, _loses_its_lease)),
     "connections of one address are one owner": ("twins", Identity, "goes_on_as", Identity.is_same),
     "an owner's next connection is somebody else": (
         "twins",
@@ -216,14 +222,13 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
     ),
     "two connections press one register": ("twins' registers", owners, "_hand_over", _presses),
     "an owner is never gone": ("off", owners, "GONE_S", 20.0),
-    "a gap is not noticed": ("way", step, "_gap", lambda leg: None),
     "every acknowledge bit is an edge": ("edges", step, "_write", _before(step._write, _edge)),
     "a late telegram counts": ("late", step, "_is_stale", lambda leg, request: False),
     "the kernel goes on": ("telegrams", leg_space, "until", lambda settings, leg: None),
     "nobody wakes the leg": ("telegrams", leg_space, "next_deadline", lambda leg: None),
     "a start does not wait for a stop": ("starts", start, "_may_be_old", lambda *_, **__: False),
     "a start takes longer": ("starts", start, "_LIMIT_S", 5.0),
-    "a fault is no reason": ("starts", step, "FAULTED", frozenset[Any]()),
+    "a fault is no reason": ("starts", start, "FAULTED", frozenset[Any]()),
     "a position is handed over twice": (
         "positions",
         order,
@@ -232,8 +237,29 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
     ),
     "a stop forgets no position": ("positions", order, "dropped", lambda order: order),
     "an axis jumps when it is enabled": ("moved", Turn, "keep_at_rest", lambda leg: None),
-    "a fault reaction follows an enable": ("states", turn, "MAY_FOLLOW_LATE", frozenset[Any]()),
+    "a fault reaction follows an enable": ("states", reports, "MAY_FOLLOW_LATE", frozenset[Any]()),
 }
+
+
+WORDS: Final[dict[str, tuple[str, Word, Callable[[Turn, bool], Output]]]] = {
+    "silence speaks": ("silence", Word.SILENCE, _speaks),
+    "a reaction keeps setpoints": ("telegrams", Word.REACTION, _moves),
+}
+EVENTS: Final[dict[str, tuple[str, type[Event]]]] = {"a gap is not noticed": ("way", BridgeGap)}
+
+
+@pytest.mark.parametrize("fault", WORDS)
+def test_wrong_words_are_found(fault: str) -> None:
+    profile, word, wrong = WORDS[fault]
+    with patch.dict(words._MADE, {word: wrong}), pytest.raises(AssertionError, match="\nafter "):
+        space(**PROFILES[profile]).explore(MOST)
+
+
+@pytest.mark.parametrize("fault", EVENTS)
+def test_an_event_that_does_nothing_is_found(fault: str) -> None:
+    profile, event = EVENTS[fault]
+    with patch.dict(step._ON, {event: lambda *_: None}), pytest.raises(AssertionError, match="\nafter "):
+        space(**PROFILES[profile]).explore(MOST)
 
 
 @pytest.mark.parametrize("fault", DEEDS)
@@ -245,4 +271,5 @@ def test_a_wrong_deed_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_the_page_counts_the_faults() -> None:
-    assert f"with {len(CELLS) + len(DEEDS)} faults," in PAGE.read_text(encoding="utf-8")
+    faults = len(CELLS) + len(DEEDS) + len(WORDS) + len(EVENTS)
+    assert f"with {faults} faults," in PAGE.read_text(encoding="utf-8")

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Code, Identity, Kind, Role, Source
+from bridge.command import Action, Code, Identity, Kind, Role, Source, Start
+from bridge.command.leg import owners
+from bridge.command.leg.effect import StartEnded, Tell
 from bridge.command.link import NodeState
+from bridge.drive import DriveState
+from bridge.text import render
+from tests.support.leg import Leg, running_nord, settings_of, turn_of
 from tests.support.rig import (
     ENABLE,
     ENGINEER,
@@ -304,3 +309,28 @@ class TestAnOwnerThatNobodyWatches:
         rig.channel.on_connection(OTHER_PLC, rig.now, is_there=False)
         rig.wait(20)
         assert not self.may_take_over(rig)
+
+
+def test_who_leaves_stops_its_drive_and_takes_its_time_out_along() -> None:
+    turn = turn_of(running_nord())
+    turn.timer = turn.timer._replace(timeout_ms=500)
+    owners.leave(turn)
+    assert turn.owner.identity is None
+    assert turn.timer.timeout_ms == 200
+    assert not turn.settings.words.enables(turn.word)
+    (told,) = turn.effects
+    assert isinstance(told, Tell)
+    assert render(told.said) == "fieldbus_timeout_ms = 200 again, as in the site file"
+
+
+def test_a_start_that_is_going_on_ends_when_its_owner_leaves() -> None:
+    leg = Leg(settings_of("nord/sk-tu4-cao", control="modbus"))
+    leg.says(DriveState.READY)
+    leg.asks(Start())
+    assert leg.state.start is not None
+    turn = turn_of(leg)
+    owners.leave(turn)
+    ended = [effect for effect in turn.effects if isinstance(effect, StartEnded)]
+    said = [(one.outcome.code, one.outcome.message) for one in ended]
+    assert said == [(Code.CANCELLED, "control of the drive has changed")]
+    assert turn.start is None

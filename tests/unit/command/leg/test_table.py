@@ -11,6 +11,7 @@ ORDERS = frozenset(
     (
         Stimulus.ENABLING_WORD,
         Stimulus.START,
+        Stimulus.START_ENABLED,
         Stimulus.START_STOPPING,
         Stimulus.START_UNHEARD,
         Stimulus.START_BRAKING,
@@ -18,6 +19,9 @@ ORDERS = frozenset(
 )
 ACKNOWLEDGES = frozenset((Stimulus.ACKNOWLEDGE, Stimulus.ACKNOWLEDGE_FAULT))
 STOPS = frozenset((Stimulus.STOP, Stimulus.LATE_STOP, Stimulus.LEFT, Stimulus.ANEW))
+
+_STOPS_BY = {Stimulus.STOP: Deed.STOP_AS_ASKED, Stimulus.LATE_STOP: Deed.FORWARD}
+"""The others are stops by the bridge."""
 
 
 def test_every_stage_has_each_event_and_a_meaning() -> None:
@@ -48,15 +52,16 @@ def test_nothing_but_the_timer_trips() -> None:
     for (stage, stimulus), (after, deed) in TABLE.items():
         if after in ANY_TRIP and stage not in ANY_TRIP:
             assert stimulus.name.startswith("EXPIRED")
-            assert deed is Deed.REACT
+            assert deed is (Deed.HOLD if after is Stage.HELD else Deed.REACT)
 
 
 def test_a_stop_counts_in_every_stage() -> None:
     for stage in Stage:
         for stimulus in STOPS:
             after, deed = TABLE[stage, stimulus]
+            kind = _STOPS_BY.get(stimulus, Deed.STOP)
             is_late = stimulus is Stimulus.LATE_STOP and stage in REACTING
-            assert deed is (Deed.TAKE if is_late else Deed.STOP), "the reaction stops the drive already"
+            assert deed is (Deed.TAKE if is_late else kind), "the reaction stops the drive already"
             assert after not in MAY_ENABLE | STARTING, "and needs a fresh order after it"
 
 

@@ -20,9 +20,11 @@ from bridge.drive import DriveState
 
 BELIEVED_S: Final = 1.0
 """Without a report from a drive that sends only changes, its last one is accepted after this time."""
+_PULSE_S: Final = 0.1
+"""How long an acknowledge edge of the bridge's own stays on the bus: longer than any cycle we send with."""
 _BURST_S: Final = 0.1
-"""How long a stop breaks the silence: longer than any cycle we send with, so that the drive has it for
-certain; then the drive's own supervision goes on."""
+"""How long a stop breaks the silence: as long, so that the drive has it for certain; then the drive's own
+supervision goes on."""
 _RAMP_LIMIT_S: Final = 10.0
 """After that a quick stop by the watchdog is followed by disable voltage in any case: Lenze's holds the motor
 for ever, and so does CiA 402's with 605Ah = 5 … 8."""
@@ -44,6 +46,8 @@ class About:
     """Why it cannot be done."""
     word: int = 0
     """The stop that an acknowledge leaves behind."""
+    pulse: bool = False
+    """The acknowledge is sent to the drive by the bridge, not with the owner's word."""
     due: float = 0.0
     """When the time-out was over."""
 
@@ -109,11 +113,13 @@ def _keep_silent(turn: Turn, about: About) -> None:
 
 def _clear(turn: Turn, about: About) -> None:
     turn.trip = Trip()
+    if about.pulse:
+        turn.pulse_until = turn.now + _PULSE_S
 
 
 def _clear_and_stop(turn: Turn, about: About) -> None:
     """What would go on after a fault of the drive itself is stopped."""
-    turn.trip = Trip()
+    _clear(turn, about)
     turn.stop(about.word)
 
 

@@ -57,8 +57,6 @@ from bridge.drive import FAULTED, ControlWords
 from bridge.image import Value
 from bridge.text import Text
 
-_PULSE_S: Final = 0.1
-"""How long a generated acknowledge edge stays on the bus: longer than any cycle we send with."""
 _OVERWRITTEN: Final = Outcome(Code.CANCELLED, Text.of("start.overwritten"))
 _CAME_LATE: Final = Text.of("request.came_late")
 _IS_LIFELESS: Final = Text.of("request.came_lifeless")
@@ -293,12 +291,10 @@ def _acknowledge(turn: Turn, request: Request, *, pulse: bool) -> None:
     if turn.settings.reaction == "silence" and was_tripped and turn.trip.burst is None:
         # Nobody has asked for a ramp.
         word = turn.settings.words.disable_voltage(word)
-    happen(turn, Stimulus.ACKNOWLEDGE_FAULT if is_reset else Stimulus.ACKNOWLEDGE, About(word=word))
+    happen(turn, Stimulus.ACKNOWLEDGE_FAULT if is_reset else Stimulus.ACKNOWLEDGE, About(word=word, pulse=pulse))
     if turn.settings.acknowledge_resumes and turn.stage is Stage.INTERLOCKED and not turn.is_asked:
         # Whoever acknowledges means to go on: nothing is active by that.
         happen(turn, Stimulus.RESUME)
-    if pulse:
-        turn.pulse_until = turn.now + _PULSE_S
     if was_tripped:
         by = str(turn.owner.identity)
         turn.tell(Kind.WATCHDOG, 200, Text.of("watchdog.acknowledged", who=by))

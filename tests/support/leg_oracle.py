@@ -122,6 +122,7 @@ class Oracle(Model):
         elif action in STRENGTH:
             says = says and any(stop.fit(word) for stop in words.stops(action))
         elif action == "reset_fault":
+            assert silent or not is_edge or word & words.acknowledge, "an acknowledge goes to the drive"
             says = says and is_edge and bool(word & words.acknowledge)
         else:
             # Nothing is asked of the drive.

@@ -291,7 +291,8 @@ def _acknowledge(turn: Turn, request: Request, *, pulse: bool) -> None:
     if turn.settings.reaction == "silence" and was_tripped and turn.trip.burst is None:
         # Nobody has asked for a ramp.
         word = turn.settings.words.disable_voltage(word)
-    happen(turn, Stimulus.ACKNOWLEDGE_FAULT if is_reset else Stimulus.ACKNOWLEDGE, About(word=word, pulse=pulse))
+    stimulus = Stimulus.ACKNOWLEDGE_FAULT if is_reset else Stimulus.ACKNOWLEDGE
+    happen(turn, stimulus, About(word=word, pulse=pulse))
     if turn.settings.acknowledge_resumes and turn.stage is Stage.INTERLOCKED and not turn.is_asked:
         # Whoever acknowledges means to go on: nothing is active by that.
         happen(turn, Stimulus.RESUME)

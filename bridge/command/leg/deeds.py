@@ -4,8 +4,7 @@ deed. Nothing else changes the stage."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridge.command.leg import order
 from bridge.command.leg.effect import LetGo, StartEnded, Tripped
@@ -32,8 +31,7 @@ _CAN_BE_ENABLED: Final = (DriveState.READY, DriveState.SWITCHED_ON, DriveState.O
 _CANCELLED: Final = Outcome(Code.CANCELLED)
 
 
-@dataclass(frozen=True, slots=True)
-class About:
+class About(NamedTuple):
     """What a deed needs to know of the event, beside the leg's state."""
 
     start_ends: Outcome = _CANCELLED

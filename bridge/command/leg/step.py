@@ -135,7 +135,6 @@ def _on_own_watch(turn: Turn, event: OwnWatch) -> None:
 def _handle(turn: Turn, request: Request) -> None:
     """Do what ``request`` asks and answer it, or refuse it and change nothing."""
     judge(turn)
-    before, effects = turn.end(), len(turn.effects)
     try:
         owners.check_authority(turn, request)
         if request.action not in TAKEN_LATE and _is_stale(turn, request):
@@ -143,7 +142,8 @@ def _handle(turn: Turn, request: Request) -> None:
         alive.check(turn, request)
         _carry_out(turn, request)
     except Refusal as refusal:
-        turn.take_back(before, effects)
+        turn.begin_anew()
+        judge(turn)
         who = request.identity.named_beside(turn.owner.identity)
         turn.tell(Kind.REFUSED, 300, refused(request.action, who, refusal.said))
         outcome = Outcome(refusal.code, refusal.said, forwarded=False)

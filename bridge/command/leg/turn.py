@@ -20,17 +20,19 @@ _values = attrgetter(*LegState._fields)
 class Turn:
     """Made from a state, changed, and made a state again. The attributes are those of ``LegState``."""
 
-    __slots__ = ("asked", "effects", "now", "settings", *LegState._fields)
+    __slots__ = ("_before", "asked", "effects", "now", "settings", *LegState._fields)
 
     def __init__(self, settings: LegSettings, state: LegState, now: float) -> None:
         self.settings = settings
         self.now = now
+        self._before = state
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """As at the beginning of the step: nothing of what was done since counts."""
         self.effects: list[Effect] = []
         self.asked: Asked | None = None
         """What a request asks of the bus: its answer is judged by that."""
-        self._take_apart(state)
-
-    def _take_apart(self, state: LegState) -> None:
         (
             self.way,
             self.timer,
@@ -51,16 +53,10 @@ class Turn:
             self.order,
             self.pulse_until,
             self.silence_stops,
-        ) = state
+        ) = self._before
 
     def end(self) -> LegState:
         return LegState._make(_values(self))
-
-    def take_back(self, state: LegState, effects: int) -> None:
-        """As it was at this state, with the first ``effects`` of what has come of it."""
-        self._take_apart(state)
-        del self.effects[effects:]
-        self.asked = None
 
     # what is known
 

@@ -82,14 +82,12 @@ def test_why_an_enabling_word_is_held_back(change: dict[str, object], why: str) 
     assert turn.may_enable is (not change)
 
 
-def test_what_is_taken_back_leaves_nothing_of_it() -> None:
+def test_what_is_begun_anew_leaves_nothing_of_it() -> None:
     leg = running_nord()
     turn = turn_of(leg)
-    turn.hear(leg.now)
-    before, effects = turn.end(), turn.effects[:]
     turn.stop(SHUT_DOWN, is_asked=True)
     turn.hear(leg.now, ("control_word",))
-    turn.take_back(before, len(effects))
-    assert turn.end() == before
-    assert turn.effects == effects
+    turn.begin_anew()
+    assert turn.end() == leg.state
+    assert not turn.effects
     assert turn.asked is None

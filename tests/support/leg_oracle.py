@@ -35,6 +35,8 @@ class Oracle(Model):
         setpoints = sent[1:]
         enables = words.enabling.fit(word)
         if enables and not self.sends:
+            is_braking = self.is_starting and self.is_heard and self.says == "braking"
+            assert not is_braking, "a start waits for the end of a quick stop"
             self.followed = self.says == "enabled" and self.is_heard
         self.sends = enables
         if enables:

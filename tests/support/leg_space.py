@@ -110,6 +110,8 @@ class Space:
             "node lost": lambda state: self._way(state, _SHUT),
             "node operational": lambda state: self._node_back(state, _OPEN),
             "node operational, not heard": lambda state: self._node_back(state, _UNHEARD),
+            "process data overdue": lambda state: self._way(state, _SHUT),
+            "process data back": lambda state: self._way(state, _OPEN, comes_back=True),
             "position not known": lambda state: self._way(state, _UNPLACED),
             "position known": lambda state: self._way(state, _OPEN),
             "words do not reach the bus": lambda state: self._sends(state, "the kernel refuses them"),
@@ -306,10 +308,10 @@ class Space:
 
     # the way to it
 
-    def _way(self, state: State, way: Way) -> State:
+    def _way(self, state: State, way: Way, *, comes_back: bool = False) -> State:
         leg, seen = state
         way = way._replace(is_heard=leg.way.is_heard, why_unsent=leg.way.why_unsent)
-        if leg.way == way or (way.is_open and not leg.way.is_open):
+        if leg.way == way or (way.is_open and not leg.way.is_open and not comes_back):
             return state
         oracle = Oracle(self.rules, seen, NOW)
         after, effects = self._step(leg, way)

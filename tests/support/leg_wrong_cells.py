@@ -1,0 +1,126 @@
+"""Faults to be put into the cells of the leg's table, and the profiles in which each has to show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+from bridge.command.leg.state import Stage
+from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
+from tests.support.leg_cells import NEVER
+from tests.support.leg_words import POSITION
+
+Place = tuple[Stage, Stimulus]
+
+_WORDS: Final = {"owner writes a stop", "owner enables", "drive follows", "everything is due"}
+_STARTS: Final = _WORDS | {"owner starts the drive"}
+_SAYS: Final = {"drive repeats", "drive says: braking", "drive says: fault", "drive says: inhibited"}
+_UNHEARD: Final = {"node lost", "node operational, not heard"}
+_OTHERS: Final = {"node lost", "drive says: fault"} | {
+    "owner resets the fault",
+    "stranger stops the drive",
+    "owner releases",
+    "bridge gap",
+}
+_BUS: Final = {"node lost", "node operational", "bus back"}
+_SETS: Final = {"owner writes a setpoint", "owner's control data are not valid", "owner's stop comes late"}
+_IGNORED: Final = {"telegram_downtime_s": -0.1}
+_SILENT: Final = {"then_silence_ms": 300}
+REACTIONS: Final = ("disable_voltage", "quick_stop", "stop", "silence", "hold")
+
+PROFILES: Final[dict[str, dict[str, Any]]] = {
+    **{
+        f"words, {reaction}": {"names": _WORDS | _SETS | _OTHERS, "on_expiry": reaction}
+        for reaction in REACTIONS
+    },
+    **{
+        f"bus, {reaction}": {
+            "names": _WORDS | _BUS | {"bridge gap", "drive says: fault"},
+            "on_expiry": reaction,
+        }
+        for reaction in REACTIONS
+    },
+    **{
+        f"starts, {reaction}": {"names": _STARTS | _SAYS | {"node lost"}, "on_expiry": reaction}
+        for reaction in REACTIONS
+    },
+    **{
+        f"starts unheard, {reaction}": {
+            "names": _STARTS | _UNHEARD | {"drive repeats", "drive says: braking"},
+            "on_expiry": reaction,
+        }
+        for reaction in REACTIONS
+    },
+    "starts, telegrams": {"names": _STARTS | _SETS | {"drive says: braking", "drive repeats"}},
+    "starts, whatever it says": {
+        "names": {"owner starts the drive", "drive repeats", "everything is due"}
+        | {f"drive says: {says}" for says in ("ready", "enabled", "braking", "inhibited", "fault")}
+    },
+    "starts unheard, whatever it says": {
+        "names": {"owner starts the drive", "drive repeats", "everything is due"}
+        | _UNHEARD
+        | {f"drive says: {says}" for says in ("ready", "enabled", "braking", "inhibited", "fault")}
+    },
+    "starts, others": {"names": _STARTS | _OTHERS | {"drive says: braking", "drive says: fault"}},
+    "starts, bus": {"names": _STARTS | _BUS | {"drive says: braking", "bridge gap"}},
+    "starts unheard, telegrams": {"names": _STARTS | _UNHEARD | _SETS},
+    "starts unheard, others": {"names": _STARTS | _UNHEARD | _OTHERS},
+    "starts unheard, bus": {"names": _STARTS | _UNHEARD | {"bus back", "drive says: braking"}},
+    "stop, then silence": {"names": _WORDS | _SETS | _OTHERS, "on_expiry": "stop", **_SILENT},
+    "quick stop, then silence": {
+        "names": _WORDS | _SETS | _OTHERS | {"drive says: fault"},
+        "on_expiry": "quick_stop",
+        **_SILENT,
+    },
+    "quick stop, then silence, bus": {"names": _WORDS | _BUS, "on_expiry": "quick_stop", **_SILENT},
+    "started, then silent": {
+        "names": _STARTS | {"stranger stops the drive", "node lost", "node operational"},
+        "on_expiry": "silence",
+    },
+    "words that do not reach the bus": {
+        "names": _STARTS
+        | {"words do not reach the bus", "words reach the bus", "drive says: braking", "drive says: fault"}
+    },
+    "words that do not reach the bus, unheard": {
+        "names": _STARTS | _UNHEARD | {"words do not reach the bus", "words reach the bus"}
+    },
+    "errors ignored": {
+        "names": _STARTS | {"node operational, not heard", "owner resets the fault", "drive says: braking"},
+        **_IGNORED,
+    },
+    "errors ignored, positions": {
+        "words": POSITION,
+        "names": _STARTS | {"node operational", "drive takes the setpoint"},
+        **_IGNORED,
+    },
+    "positions": {
+        "words": POSITION,
+        "names": _STARTS | {"node lost", "node operational", "process data overdue", "process data back"},
+    },
+    "positions, hold": {
+        "words": POSITION,
+        "names": _WORDS | {"process data overdue", "process data back"},
+        "on_expiry": "hold",
+    },
+}
+"""As few events as the faults need to show."""
+
+DOES_NOTHING: Final = "does nothing"
+LEAVES_DEED_OUT: Final = "goes to the next stage and does nothing else"
+
+
+def wrong_cells(place: Place) -> Iterator[tuple[str, Cell]]:
+    """Faults for one cell; none for one that does nothing."""
+    stage, _ = place
+    after, deed = TABLE[place]
+    if (after, deed) == (stage, Deed.NOTHING):
+        return
+    yield DOES_NOTHING, (stage, Deed.NOTHING)
+    if after is not stage and deed is not Deed.NOTHING:
+        yield LEAVES_DEED_OUT, (after, Deed.NOTHING)
+
+
+def every_fault() -> dict[tuple[Place, str], Cell]:
+    return {
+        (place, kind): wrong for place in TABLE if place not in NEVER for kind, wrong in wrong_cells(place)
+    }

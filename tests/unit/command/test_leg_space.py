@@ -50,7 +50,7 @@ _EVERY_CELL: Final = {
     "nord/sk-tu4-cao, other settings": (
         *("started, quick_stop", "started, stop", "started, silence", "started, hold"),
         *("quick_stop, then silence", "errors ignored, started", "life sign, started"),
-        *("two connections, started", "lease"),
+        *("two connections, started", "lease", "started, then silent", "words that do not reach the bus"),
     ),
 }
 """A quarter of what happens at night, with every cell."""

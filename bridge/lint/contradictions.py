@@ -12,6 +12,7 @@ from bridge.lint.bus import BusView, NodeView
 from bridge.lint.report import LintReport
 from bridge.lint.settings import RPDO, TPDO, pdo_cob_id
 from bridge.node.boot import heartbeat_period_ms
+from bridge.text import Text
 
 _CONSUMER: Final = 0x1016
 _SYNC: Final = (0x1005, 0)
@@ -24,17 +25,24 @@ def check_contradictions(bus: BusView, report: LintReport) -> None:
     for node in bus.nodes:
         for (index, sub), value, why in _own_settings(node):
             number = "{:X}h".format if _is_cob_id(index, sub) else str
-            name, hint = f"{index:04X}h:{sub:02X}", f"leave it out: {why} decides"
+            name, hint = f"{index:04X}h:{sub:02X}", Text.of("check.leave_it_out_advice", key=why)
             setting, related = node.settings[index, sub], node.settings.related.get((index, sub))
             if related is not None:
-                told = f"{related.name} decides {name}, too, and the bridge sets that to {number(value)}"
+                told = Text.of("check.decided_too", parameter=related.name, object=name, value=number(value))
                 report.warning(related.key, told, hint)
             if setting is None:
                 continue
             given = pdo_cob_id(setting.value) if _is_cob_id(index, sub) else setting.value
             if given != value:
-                name = f"{setting.name}, which is {name}," if setting.name else name
-                told = f"{name} = {number(given)}, and the bridge sets it to {number(value)}"
+                told = Text.of("check.undone", object=name, given=number(given), value=number(value))
+                if setting.name:
+                    told = Text.of(
+                        "check.undone_named",
+                        parameter=setting.name,
+                        object=name,
+                        given=number(given),
+                        value=number(value),
+                    )
                 report.warning(setting.key, told, hint)
         _check_consumer(bus, node, report)
         _check_sync(node, report)
@@ -44,7 +52,7 @@ def _is_cob_id(index: int, sub: int) -> bool:
     return index >= RPDO[0] and sub == _COB_ID
 
 
-def _own_settings(node: NodeView) -> Iterator[tuple[tuple[int, int], int, str]]:
+def _own_settings(node: NodeView) -> Iterator[tuple[tuple[int, int], int, Text | str]]:
     """What the boot-up sets after the configuration: object, value, and the key that causes it."""
     for index, value in _error_control(node.table).items():
         yield (index, 0), value, "supervision"
@@ -58,7 +66,8 @@ def _own_settings(node: NodeView) -> Iterator[tuple[tuple[int, int], int, str]]:
             for own in tables:
                 number = pdos[0].number if own.number is None else own.number
                 for sub, value in _pdo_settings(own):
-                    yield (base + number - 1, sub), value, f"{name} of {drive.name}"
+                    key = Text.of("check.key_of_drive", key=name, drive=drive.name)
+                    yield (base + number - 1, sub), value, key
 
 
 def _error_control(table: NodeTable) -> dict[int, int]:
@@ -100,14 +109,12 @@ def _check_consumer(bus: BusView, node: NodeView, report: LintReport) -> None:
         name = f"{_CONSUMER:04X}h:{sub:02X}"
         period_ms = heartbeats.get(node_id)
         if period_ms is None:
-            report.warning(setting.key, f"{name}: there is no heartbeat of node {node_id} to wait for")
+            report.warning(setting.key, Text.of("check.no_heartbeat", object=name, node=node_id))
         elif time_ms <= period_ms:
-            whose = "the bridge" if node_id == bus.table.master_node_id else f"node {node_id}"
-            report.warning(
-                setting.key,
-                f"{name} waits for {time_ms} ms, and {whose}'s heartbeat comes every {period_ms} ms",
-                f"at least {2 * period_ms}",
-            )
+            told = Text.of("check.heartbeat_slow", object=name, time=time_ms, node=node_id, period=period_ms)
+            if node_id == bus.table.master_node_id:
+                told = Text.of("check.own_heartbeat_slow", object=name, time=time_ms, period=period_ms)
+            report.warning(setting.key, told, Text.of("check.at_least", least=2 * period_ms))
 
 
 def _check_sync(node: NodeView, report: LintReport) -> None:
@@ -116,14 +123,21 @@ def _check_sync(node: NodeView, report: LintReport) -> None:
     waiting = [pdo.name for pdo in node.pdos if pdo.enabled and pdo.is_synchronous]
     if not waiting:
         return
-    waits = f"{' and '.join(waiting)} would wait for it, and the bridge's SYNC is {cobid.SYNC:X}h"
+    waits = Text.of("check.pdo_waits_for_sync", pdo=waiting[0], sync=cobid.SYNC)
+    if len(waiting) > 1:
+        waits = Text.of("check.pdos_wait_for_sync", pdos=tuple(waiting), sync=cobid.SYNC)
     setting, related = node.settings[_SYNC], node.settings.related.get(_SYNC)
-    hint = f"0x{cobid.SYNC:X}, or PDOs that are not synchronous"
+    hint = Text.of("check.sync_advice", sync=cobid.SYNC)
     at_factory = node.dictionary.number(*_SYNC, node.table.id) if node.dictionary else None
     value = at_factory if setting is None else setting.value
     if value is not None and value & _SYNC_BITS != cobid.SYNC:
-        told = f"{setting.name}, which is 1005h:00," if setting and setting.name else "1005h:00"
-        at = "" if setting else " at factory"
-        report.error(setting.key if setting else node.key, f"{told} = {value:X}h{at}: {waits}", hint)
+        if setting is None:
+            told = Text.of("check.other_sync_at_factory", value=value, waits=waits)
+        elif setting.name:
+            told = Text.of("check.other_sync_named", parameter=setting.name, value=value, waits=waits)
+        else:
+            told = Text.of("check.other_sync", value=value, waits=waits)
+        report.error(setting.key if setting else node.key, told, hint)
     if related is not None and related.value & _SYNC_BITS != cobid.SYNC:
-        report.warning(related.key, f"{related.name} decides 1005h:00, the identifier of SYNC: {waits}", hint)
+        told = Text.of("check.other_sync_decided", parameter=related.name, waits=waits)
+        report.warning(related.key, told, hint)

@@ -63,7 +63,8 @@ def check_read_only(bus: BusView, report: LintReport) -> None:
     """Nodes that somebody may take for drives, and that nobody can command."""
     for node in bus.nodes:
         if why := node.family.family.read_only:
-            report.warning((*node.key, "mapping"), f"{node.table.name} is only read: {why}")
+            told = Text.of("check.only_read", node=node.table.name, why=why)
+            report.warning((*node.key, "mapping"), told)
 
 
 def judged_outputs(bus: BusView, node: NodeView) -> OwnJudgement:

@@ -35,7 +35,7 @@ class Text:
         return said if isinstance(said, Text) else cls(PLAIN, (("text", said),))
 
 
-Fact = str | int | float | Text | tuple[Text, ...]
+Fact = str | int | float | Text | tuple[Text | str, ...]
 """A string is a name or somebody else's words, which are the same in every language."""
 
 
@@ -53,4 +53,4 @@ def _json_of(fact: Fact) -> object:
         return _object_of(fact)
     if isinstance(fact, float) and not isfinite(fact):
         return str(fact)
-    return [_object_of(one) for one in fact] if isinstance(fact, tuple) else fact
+    return [_json_of(one) for one in fact] if isinstance(fact, tuple) else fact

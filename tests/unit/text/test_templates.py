@@ -57,6 +57,11 @@ def by_the_page(asked: dict[str, object]) -> dict[str, list[Any]]:
             "Bus can0: Bus-Off",
         ),
         (
+            Text.of("check.pdos_wait_for_sync", pdos=("RPDO1", "TPDO2"), sync=0x80),
+            "RPDO1 and TPDO2 would wait for it, and the bridge's SYNC is 80h",
+            "RPDO1 und TPDO2 würden darauf warten, und das SYNC der Bridge ist 80h",
+        ),
+        (
             Text.of("node.emergency", number=0x810, text=Text.plain("x")),
             "emergency 0810h: x",
             "Emergency 0810h: x",

@@ -22,7 +22,7 @@ export function isKnown(text, templates) {
 }
 
 function shown(fact, quoted, format, words) {
-  if (Array.isArray(fact)) return fact.map(words).join(format || JOINED_BY);
+  if (Array.isArray(fact)) return fact.map((one) => (typeof one === "string" ? one : words(one))).join(format || JOINED_BY);
   if (typeof fact === "object") return words(fact);
   if (typeof fact === "string") return quoted ? inQuotes(fact) : fact;
   return format ? formatted(fact, format) : String(fact);

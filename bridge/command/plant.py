@@ -187,10 +187,14 @@ class Plant:
                 listener(event)
 
     def set(
-        self, name: str, value: Value, now: float, quality: Quality = Quality.GOOD, reason: str = ""
+        self, name: str, value: Value, now: float, quality: Quality = Quality.GOOD, why: Text | str = ""
     ) -> None:
         """Set a point by its full name."""
-        self.image.set(self.image.index[name], value, now, quality, reason)
+        self.image.set(self.image.index[name], value, now, quality, why)
+
+    def say(self, name: str, said: Text | str, now: float) -> None:
+        """Set a point by its full name to a text in words."""
+        self.image.say(self.image.index[name], said, now)
 
     def submit(self, request: Request, now: float, reply: Reply, carry_out: CarryOut = on_no_bus) -> bool:
         """Carry out ``request``; ``reply`` is called exactly once, now or later. ``carry_out`` takes what is

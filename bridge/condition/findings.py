@@ -9,6 +9,7 @@ from typing import Final
 
 from bridge.drive import Explained
 from bridge.image import Image, Quality, Value
+from bridge.text import Text
 
 OwnFault = Callable[[int, int], Explained | None]
 """The fault that a drive's own status word and its last emergency code tell; None where there is none."""
@@ -31,7 +32,7 @@ class Trouble:
     rank: Rank
     kind: str
     place: str
-    facts: tuple[tuple[str, Value], ...] = ()
+    facts: tuple[tuple[str, Value | Text], ...] = ()
     is_of_bus: bool = False
 
 
@@ -55,12 +56,19 @@ class Look:
         code = self(name)
         return self._labels[name].get(code, "") if isinstance(code, int) else ""
 
-    def quality(self, name: str) -> tuple[Quality, str]:
+    def words(self, name: str) -> Text | str:
+        """What a point says: its text where it is the words of one, else the words; empty where none."""
+        words = self(name)
+        if not isinstance(words, str):
+            return ""
+        return self._image.said(self._places[name]) or words
+
+    def quality(self, name: str) -> tuple[Quality, Text | str]:
         place = self._places.get(name)
         if place is None:
             return Quality.GOOD, ""
-        _, quality, _, reason = self._image[place]
-        return quality, reason
+        _, quality, _, why = self._image[place]
+        return quality, why
 
 
 def is_bridge_dead(look: Look) -> bool:
@@ -74,13 +82,13 @@ def of_bus(look: Look, bus: str, *, is_down: bool) -> Iterator[Trouble]:
     if look(f"{place}/passive"):
         return
     if is_down:
-        why = look(f"{place}/last_error") or ""
+        why = look.words(f"{place}/last_error")
         kind = "bus_off" if look.label(f"{place}/state") == "bus_off" else "bus_down"
         yield Trouble(Rank.ALARM, kind, place, (("why", why),))
         return
     state = look.label(f"{place}/state")
     if state in ("warning", "passive"):
-        yield Trouble(Rank.WARNING, "bus_errors", place, (("why", look(f"{place}/last_error") or ""),))
+        yield Trouble(Rank.WARNING, "bus_errors", place, (("why", look.words(f"{place}/last_error")),))
     if ids := look(f"{place}/duplicate_ids"):
         yield Trouble(Rank.ALARM, "duplicate_ids", place, (("ids", ids),))
     if look(f"{place}/second_master"):
@@ -95,11 +103,11 @@ def of_node(look: Look, node: str) -> Iterator[Trouble]:
     if look(f"{node}/supervision/follows") is False:
         yield Trouble(Rank.DANGER, "outputs_ignore_stop", node)
     state = look.label(f"{node}/node/state")
-    status = look(f"{node}/node/boot_status") or ""
+    status = look.words(f"{node}/node/boot_status")
     if state == "config_error":
         yield Trouble(Rank.ALARM, "not_as_configured", node, (("why", status),))
     elif state == "lost":
-        how = look(f"{node}/node/supervision_state") or ""
+        how = look.words(f"{node}/node/supervision_state")
         yield Trouble(Rank.ALARM, "node_lost", node, (("how", how),))
     elif state == "absent":
         yield Trouble(Rank.ALARM, "node_absent", node)

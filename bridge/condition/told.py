@@ -10,6 +10,7 @@ import msgspec
 from bridge.condition.causes import Known, Shown
 from bridge.condition.findings import Rank, Trouble
 from bridge.condition.recent import Ended
+from bridge.text import Text, as_json, in_english
 
 MOST: Final = 100
 """Troubles in one text; each explains at most as many. The worst come first."""
@@ -26,7 +27,7 @@ def condition(rank: Rank | None) -> int:
 def troubles_json(shown: Iterable[Shown]) -> str:
     """A list of objects: rank, kind, place, since in ms since 1970, facts; ``or_longer`` where it may have
     begun before the bridge did, ``explains`` (the same of each consequence) and ``until`` where the cause is
-    over, and only these are left."""
+    over, and only these are left. Facts that are words of a text are in ``texts`` with its code and facts."""
     return _json([_shown(one) for one in list(shown)[:MOST]])
 
 
@@ -58,6 +59,8 @@ def _said(trouble: Trouble, rank: Rank, since_ms: float, *, is_or_longer: bool) 
         "kind": trouble.kind,
         "place": trouble.place,
         "since": round(since_ms),
-        "facts": dict(trouble.facts),
+        "facts": {name: in_english(fact) if isinstance(fact, Text) else fact for name, fact in trouble.facts},
     }
+    if texts := {name: as_json(fact) for name, fact in trouble.facts if isinstance(fact, Text)}:
+        said["texts"] = texts
     return said | ({"or_longer": True} if is_or_longer else {})

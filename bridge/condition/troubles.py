@@ -176,7 +176,7 @@ class Troubles:
             self._began.pop(key, None)
             return
         if now_ms - self._began.setdefault(key, now_ms) >= BOOTING_MS:
-            why = look(f"{node}/node/boot_status") or ""
+            why = look.words(f"{node}/node/boot_status")
             yield Trouble(Rank.WARNING, "node_booting", node, (("why", why),))
 
     def _of_drive(self, drive: str, node: str) -> Iterator[Trouble]:

@@ -7,15 +7,22 @@ from typing import NamedTuple
 
 from bridge.image.point import Point, Value
 from bridge.image.quality import Quality
+from bridge.text import Text, render
 
 
 class Reading(NamedTuple):
-    """One point's present state. ``time`` is in seconds of the monotonic clock of the image's owner."""
+    """One point's present state. ``time`` is in seconds of the monotonic clock of the image's owner; ``why``
+    tells of a quality that is not good."""
 
     value: Value
     quality: Quality
     time: float
-    reason: str
+    why: Text | str
+
+    @property
+    def reason(self) -> str:
+        """The reason for the quality in English."""
+        return render(self.why)
 
 
 class Columns(NamedTuple):
@@ -24,7 +31,7 @@ class Columns(NamedTuple):
     values: list[Value]
     qualities: list[Quality]
     times: list[float]
-    reasons: list[str]
+    whys: list[Text | str]
 
 
 class Feed:
@@ -86,7 +93,9 @@ class Image:
         self._values: list[Value] = [point.data_type.zero for point in self.points]
         self._qualities = [Quality.WAITING] * count
         self._times = [0.0] * count
-        self._reasons = [""] * count
+        self._whys: list[Text | str] = [""] * count
+        self._said: dict[int, tuple[Value, Text]] = {}
+        """What points said last, with its words."""
         self._feeds: list[Feed] = []
         self._untold: dict[int, None] = {}
 
@@ -103,7 +112,7 @@ class Image:
             self._feeds.remove(feed)
 
     def __getitem__(self, index: int) -> Reading:
-        return Reading(self._values[index], self._qualities[index], self._times[index], self._reasons[index])
+        return Reading(self._values[index], self._qualities[index], self._times[index], self._whys[index])
 
     def columns(self, indices: Sequence[int]) -> Columns:
         """The present states of these points."""
@@ -111,7 +120,7 @@ class Image:
             [self._values[index] for index in indices],
             [self._qualities[index] for index in indices],
             [self._times[index] for index in indices],
-            [self._reasons[index] for index in indices],
+            [self._whys[index] for index in indices],
         )
 
     def qualities(self, indices: Iterable[int]) -> list[Quality]:
@@ -127,21 +136,36 @@ class Image:
         return self[self.index[name]]
 
     def set(
-        self, index: int, value: Value, now: float, quality: Quality = Quality.GOOD, reason: str = ""
+        self, index: int, value: Value, now: float, quality: Quality = Quality.GOOD, why: Text | str = ""
     ) -> None:
         """Store a value with its source time. Storing what is there already changes nothing."""
-        if (
-            self._values[index] == value
-            and self._qualities[index] is quality
-            and self._reasons[index] == reason
-        ):
+        if self._values[index] == value and self._qualities[index] is quality and self._whys[index] == why:
             return
         self._values[index] = value
         self._qualities[index] = quality
         self._times[index] = now
-        self._reasons[index] = reason
+        self._whys[index] = why
         for feed in self._feeds:
             feed.mark(index)
+
+    def say(
+        self,
+        index: int,
+        said: Text | str,
+        now: float,
+        quality: Quality = Quality.GOOD,
+        why: Text | str = "",
+    ) -> None:
+        """Store the words of a text; ``said`` tells what they are the words of."""
+        words = render(said)
+        if isinstance(said, Text):
+            self._said[index] = words, said
+        self.set(index, words, now, quality, why)
+
+    def said(self, index: int) -> Text | None:
+        """The text whose words are the value of this point; None where nobody has told one."""
+        words, said = self._said.get(index, (None, None))
+        return said if words == self._values[index] else None
 
     def renew(self, index: int, value: Value, now: float) -> None:
         """Store a good value with its source time, even if the value is the same: it has been read again, and
@@ -189,7 +213,7 @@ class Image:
             for feed in self._feeds:
                 feed.mark_all(changed)
 
-    def judge(self, indices: Sequence[int], quality: Quality, now: float, reason: str = "") -> None:
+    def judge(self, indices: Sequence[int], quality: Quality, now: float, why: Text | str = "") -> None:
         """Give these points another quality and keep their values."""
         for index in indices:
-            self.set(index, self._values[index], now, quality, reason)
+            self.set(index, self._values[index], now, quality, why)

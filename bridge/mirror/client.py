@@ -339,7 +339,11 @@ class MirrorClient:
     def _apply(self, readings: tuple[Changed, ...]) -> None:
         image = self.image
         for changed in readings:
-            image.set(changed.index, changed.value, changed.time, changed.quality, changed.reason)
+            value = changed.value
+            if isinstance(value, Text):
+                image.say(changed.index, value, changed.time, changed.quality, changed.why)
+            else:
+                image.set(changed.index, value, changed.time, changed.quality, changed.why)
 
     def _mark_dead(self) -> None:
         """The bus process is gone: no value may look current."""

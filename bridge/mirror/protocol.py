@@ -15,6 +15,7 @@ from bridge.command import Action, Do, Event, Identity, Outcome, Rejection, Requ
 from bridge.command.messages.request import COMMANDS
 from bridge.command.points import CONNECTION_COUNTS
 from bridge.image import Point, Quality, Value
+from bridge.text import Text
 
 SNAPSHOT: Final = "mirror/snapshot"
 DELTA: Final = "mirror/delta"
@@ -40,10 +41,11 @@ class Changed(msgspec.Struct, array_like=True, frozen=True):
     """The reading of the point with this index."""
 
     index: int
-    value: Value
+    value: Value | Text
+    """A text where the value is the words of one."""
     quality: Quality
     time: float
-    reason: str
+    why: Text | str
 
 
 class Snapshot(msgspec.Struct, array_like=True, frozen=True):

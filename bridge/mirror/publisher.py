@@ -181,8 +181,9 @@ class MirrorPublisher:
 
     def _changed(self, index: int, at_zero_ns: int) -> Changed:
         """``at_zero_ns``: the wall clock at monotonic 0, which is read once for many points."""
-        value, quality, time, reason = self._image[index]
-        return Changed(index, value, quality, (at_zero_ns + round(time * 1e9)) / 1e9, reason)
+        value, quality, time, why = self._image[index]
+        told = self._image.said(index) or value
+        return Changed(index, told, quality, (at_zero_ns + round(time * 1e9)) / 1e9, why)
 
     def _on_event(self, event: Event) -> None:
         self._send(protocol.EVENT, replace(event, time=self._view.epoch_ns(event.time) / 1e9))

@@ -110,7 +110,7 @@ class PlantCondition:
 
 def _said(trouble: Trouble) -> Text | None:
     """A cause that is found by what several have in common."""
-    facts = dict(trouble.facts)
+    facts = {name: fact for name, fact in trouble.facts if not isinstance(fact, Text)}
     match trouble.kind:
         case "bus_silent":
             bus = trouble.place.removeprefix("bus/")

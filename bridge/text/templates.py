@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from string import Formatter
 from typing import Final, NamedTuple
@@ -60,6 +60,12 @@ def render(said: Text | str, language: str = "en") -> str:
         part.words + (_shown(facts[part.name], part, language) if part.name else "")
         for part in templates(language)[said.code]
     )
+
+
+@lru_cache(maxsize=1024)
+def in_english(said: Text | str) -> str:
+    """As ``render``, and remembered: for what many points have in common and is shown again and again."""
+    return render(said)
 
 
 def _shown(fact: Fact, part: Part, language: str) -> str:

@@ -5,7 +5,8 @@ A topic is a group of points that a page shows together: ``plant``, ``drive <nod
 than the beat gets the whole state anew instead of a backlog.
 
 Messages are JSON: ``{"topic": t, "state": {point: [value, quality, reason, time]}}`` and
-``{"topic": t, "changes": {…}}``. ``quality`` is its label, ``time`` is in ms since 1970.
+``{"topic": t, "changes": {…}}``. ``quality`` is its label, ``time`` is in ms since 1970. Of words that are
+those of a text, its code and facts follow: ``{"value": {"code": …, "facts": …}, "reason": …}``.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import msgspec
 from bridge.condition.layout import Layout
 from bridge.image import Image, Point, Quality
 from bridge.northbound.view import View
+from bridge.text import Text, as_json, in_english
 
 _MOST_AT_ONCE: Final = 1 << 20
 _encode = msgspec.json.Encoder().encode
@@ -100,10 +102,17 @@ class Topics:
         points, image = self._image.points, self._image
         shown: dict[str, list[Any]] = {}
         for index in indices:
-            value, quality, time, reason = image[index]
+            value, quality, time, why = image[index]
             if isinstance(value, float) and not math.isfinite(value):
                 value = None
             held = value if quality.has_value or quality is Quality.DEAD else None
             at_ms = self._view.epoch_ns(time) // 1_000_000 if time else 0
-            shown[points[index].name] = [held, quality.label, reason, at_ms]
+            row = shown[points[index].name] = [held, quality.label, in_english(why), at_ms]
+            if texts := _texts(image.said(index), why):
+                row.append(texts)
         return shown
+
+
+def _texts(value: Text | None, reason: Text | str) -> dict[str, Any]:
+    found = {"value": value and as_json(value), "reason": as_json(reason)}
+    return {name: text for name, text in found.items() if text}

@@ -11,6 +11,7 @@ import msgspec
 from bridge.command import Event, Outcome
 from bridge.image import Columns, Point, Quality, Reading, Value
 from bridge.northbound.zenoh.users import own_keys
+from bridge.text import in_english
 
 JSON: Final = "application/json"
 TEXT: Final = "text/plain"
@@ -135,16 +136,16 @@ class KeySpace:
     def as_jsons(self, indices: Sequence[int], columns: Columns, at_zero_ns: int) -> Iterator[bytes]:
         """The same for many points. ``at_zero_ns``: the wall clock at time 0 of the readings."""
         last, tail = nan, ""
-        for index, value, quality, time, reason in zip(indices, *columns, strict=True):
+        for index, value, quality, time, why in zip(indices, *columns, strict=True):
             if time != last:  # many change together
                 last = time
                 tail = f',"q":"good","t":{seconds(at_zero_ns + round(time * 1e9))!r}}}'
             # What most of them are is written here, four times as fast.
             is_plain = type(value) is int or (type(value) is float and isfinite(value))
-            if is_plain and quality is Quality.GOOD and not reason and not self._states[index]:
+            if is_plain and quality is Quality.GOOD and not why and not self._states[index]:
                 yield f'{{"v":{value!r}{tail}'.encode()
             else:
-                reading = Reading(value, quality, time, reason)
+                reading = Reading(value, quality, time, why)
                 yield self.as_json(index, reading, at_zero_ns + round(time * 1e9))
 
     def as_bare(self, index: int | None, reading: Reading, epoch_ns: int) -> tuple[bytes, bytes]:
@@ -166,7 +167,7 @@ class KeySpace:
         state = ""
         if index is not None and self._states[index] and quality.has_value and isinstance(reading.value, int):
             state = self._states[index].get(reading.value, "")
-        return quality.label, time, state, reading.reason
+        return quality.label, time, state, in_english(reading.why)
 
 
 def _owner(tail: str) -> str:

@@ -9,6 +9,7 @@ import pytest
 from bridge.condition.causes import Known, Shown
 from bridge.condition.findings import Rank, Trouble
 from bridge.condition.told import CONDITIONS, MOST, condition, troubles_json
+from bridge.text import Text
 
 LOST = Trouble(Rank.ALARM, "node_lost", "conveyor", (("how", "heartbeat"),))
 DRIVE = Trouble(Rank.ALARM, "drive_lost", "conveyor/fu1")
@@ -37,6 +38,13 @@ def test_a_trouble_is_told_with_its_facts() -> None:
             "facts": {"how": "heartbeat"},
         }
     ]
+
+
+def test_a_fact_that_is_a_text_is_told_in_english_and_with_its_code() -> None:
+    lost = Trouble(Rank.ALARM, "drive_lost", "conveyor/fu1", (("why", Text.of("node.lost")),))
+    (told,) = json.loads(troubles_json([shown(lost)]))
+    assert told["facts"] == {"why": "node lost"}
+    assert told["texts"] == {"why": {"code": "node.lost", "facts": {}}}
 
 
 def test_consequences_stand_within_their_cause() -> None:

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.image import DataType, Feed, Image, Point, Quality, Reading
+from bridge.text import Text
 
 POINTS = [
     Point(name="a/b/actual/frequency", data_type=DataType.FLOAT),
@@ -209,3 +210,23 @@ def test_qualities_are_numbered_as_modbus_serves_them():
     assert list(Quality) == list(range(8))
     served = [quality.label for quality in Quality if quality.has_value]
     assert served == ["good", "stale", "lost", "device_fault"]
+
+
+def test_a_point_knows_the_text_whose_words_it_shows(image: Image):
+    feed = image.feed()
+    seen(feed)
+    image.say(2, Text.of("node.lost"), 1.0)
+    assert image[2] == Reading("node lost", Quality.GOOD, 1.0, "")
+    assert image.said(2) == Text.of("node.lost")
+    assert seen(feed) == [2]
+    image.set(2, "E003/3.0 overcurrent", 2.0)
+    assert image.said(2) is None
+    image.say(2, "waiting", 3.0)
+    assert (image[2].value, image.said(2), image.said(1)) == ("waiting", None, None)
+
+
+def test_the_reason_for_a_quality_is_a_text_that_reads_in_english(image: Image):
+    image.set(1, 7, 1.0, Quality.LOST, Text.of("node.lost"))
+    assert (image[1].why, image[1].reason) == (Text.of("node.lost"), "node lost")
+    image.judge((1,), Quality.LOST, 2.0, Text.of("node.lost"))
+    assert image[1].time == 1.0, "the same reason is no change"

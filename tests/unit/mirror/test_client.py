@@ -15,6 +15,7 @@ from bridge.image import Point, Quality
 from bridge.mirror import MirrorClient, MirrorPublisher, protocol
 from bridge.mirror import client as mirror_client
 from bridge.mirror.protocol import Answered, Changed, Delta, Snapshot
+from bridge.text import Text
 from bridge.zenohlink import IncomingQuery, Message
 from tests.support.views import view_of
 from tests.support.zenoh_site import READY, drive_says, epoch, make_plant, node_is
@@ -151,6 +152,13 @@ async def waiting(front: MirrorClient, sequence: int, instance: int = INSTANCE) 
 
 async def test_what_the_image_shows_already_is_answered_at_once(front: MirrorClient) -> None:
     assert (await waiting(front, 1)).done()
+
+
+async def test_a_text_is_shown_in_words_and_known_as_what_it_is(front: MirrorClient) -> None:
+    said = Text.of("node.lost")
+    told = Delta(INSTANCE, 2, (Changed(0, said, Quality.GOOD, 1.0, ""),))
+    front._on_delta(Message(protocol.DELTA, protocol.encode(told)))
+    assert (front.image[0].value, front.image.said(0)) == ("node lost", said)
 
 
 async def test_an_answer_waits_for_its_delta_and_no_longer(front: MirrorClient) -> None:

@@ -37,6 +37,7 @@ from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
 from bridge.mirror.endpoint import prepare_folder
 from bridge.mirror.protocol import Answered, Changed, Connected, Counted, Delta, Malformed, Rejected, Snapshot
+from bridge.text import Text
 from tests.support.zenoh_site import make_plant
 
 values = st.booleans() | st.integers(-(2**31), 2**32 - 1) | st.floats(allow_nan=False) | st.text(max_size=20)
@@ -120,6 +121,13 @@ def test_whatever_happens_can_be_told(source: str, message: str, value: str | in
     delta = Delta(1, 1, (Changed(0, 5, Quality.GOOD, 0, ""), Changed(1, value, Quality.GOOD, 0, message)))
     back = protocol.decode_delta(protocol.encode(delta), 2)
     assert back.readings[0] == delta.readings[0], "what is well is as it was"
+
+
+def test_texts_are_passed_on_as_they_are() -> None:
+    why = Text.of("node.lost")
+    said = Text.of("meaning.lost", parameter="P1", in_set=2, before=1.5, affected=(why, "P2"))
+    delta = Delta(1, 1, (Changed(0, said, Quality.LOST, 0, why),))
+    assert protocol.decode_delta(protocol.encode(delta), 1) == delta
 
 
 def test_a_changed_value_takes_25_bytes() -> None:

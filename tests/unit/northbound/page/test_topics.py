@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from bridge.northbound.page.topics import topics_of
+import json
+
+from bridge.command.plant import PlantView
+from bridge.image import Quality
+from bridge.northbound.page.topics import Topics, topics_of
+from bridge.text import Text
 from tests.support import sites
 from tests.support.condition import Watched
 
@@ -22,3 +27,19 @@ def test_each_point_is_in_the_topics_of_its_place() -> None:
         point.name for point in points if point.name.startswith(f"{DRIVE}/")
     }
     assert set(topics) == {"plant", "bus can0", "node conveyor", f"drive {DRIVE}", "drive conveyor/fu2"}
+
+
+def test_words_of_a_text_are_shown_with_it() -> None:
+    case = Watched(_SITE)
+    image, topics = (
+        case.image,
+        Topics(PlantView(case.plant, lambda: 1.0, lambda time: round(time * 1e9)), case.layout),
+    )
+    image.say(image.index["conveyor/node/boot_status"], Text.of("node.lost"), 1.0)
+    image.set(image.index[f"{DRIVE}/status/state"], 3, 1.0, Quality.LOST, Text.of("node.lost"))
+    text = {"code": "node.lost", "facts": {}}
+    state = json.loads(topics.state("node conveyor"))["state"]
+    assert state["conveyor/node/boot_status"][0::4] == ["node lost", {"value": text}]
+    state = json.loads(topics.state(f"drive {DRIVE}"))["state"]
+    assert state[f"{DRIVE}/status/state"][2::2] == ["node lost", {"reason": text}]
+    assert len(state[f"{DRIVE}/status/fault_text"]) == 4

@@ -102,16 +102,16 @@ def test_a_bare_value_is_its_text_with_the_rest_in_the_attachment(
     | st.floats(allow_nan=False, allow_infinity=False)
     | st.text(),
     quality=st.sampled_from(Quality),
-    reason=st.text(max_size=40),
+    why=st.text(max_size=40),
     epoch_ns=st.integers(0, 4_000_000_000_000_000_000),
 )
 def test_whatever_is_shown_reads_back(
-    value: bool | int | float | str, quality: Quality, reason: str, epoch_ns: int
+    value: bool | int | float | str, quality: Quality, why: str, epoch_ns: int
 ) -> None:
-    shown = json.loads(KEYS.as_json(TEXT, Reading(value, quality, 1.0, reason), epoch_ns))
+    shown = json.loads(KEYS.as_json(TEXT, Reading(value, quality, 1.0, why), epoch_ns))
     assert shown["v"] == (value if quality.has_value else None)
     assert shown["q"] == quality.label
-    assert shown.get("r", "") == reason
+    assert shown.get("r", "") == why
     if shown["t"] is not None:
         assert abs(shown["t"] - epoch_ns / 1e9) <= 1e-6
 

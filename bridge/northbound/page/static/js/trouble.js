@@ -6,7 +6,7 @@ import { address } from "./route.js";
 import { clock, span } from "./format.js";
 import { drives, nodes } from "./site.js";
 import { ownerName } from "./owner.js";
-import { faultIn, many, maybe, t, translated } from "./texts.js";
+import { faultIn, many, maybe, t, worded } from "./texts.js";
 
 const TICK_MS = 10_000;
 const now = signal(boxNow());
@@ -144,6 +144,6 @@ function withDefaults(trouble) {
   const facts = { ...said(trouble) };
   // Whoever has lost its lease controls nothing any more.
   if ("owner" in facts) facts.owner = facts.owner ? ownerName(facts.owner) : t("owner.gone");
-  for (const name of ["why", "how", "who", "fronts"]) if (name in facts) facts[name] = translated(facts[name]) || t("unknown");
+  for (const name of ["why", "how", "who", "fronts"]) if (name in facts) facts[name] = worded(trouble.texts?.[name], facts[name]) || t("unknown");
   return facts;
 }

@@ -3,9 +3,11 @@
 import { batch, signal } from "./ui.js";
 
 const NOTHING = Object.freeze([null, "waiting", "", 0]);
+const NONE = Object.freeze({});
 const points = new Map();
 
-/** The signal of a point: [value, quality, reason, time in ms since 1970]. */
+/** The signal of a point: [value, quality, reason, time in ms since 1970], and {value, reason} with the texts, {code,
+ * facts}, whose words these are, where they are the words of any. */
 export function point(name) {
   let found = points.get(name);
   if (!found) points.set(name, (found = signal(NOTHING)));
@@ -16,6 +18,7 @@ export const value = (name) => point(name).value[0];
 export const quality = (name) => point(name).value[1];
 export const reason = (name) => point(name).value[2];
 export const time = (name) => point(name).value[3];
+export const texts = (name) => point(name).value[4] ?? NONE;
 
 /** Takes what the server has told: an object of readings by the points' names. */
 export function take(readings) {

@@ -6,6 +6,7 @@ import { nature } from "../site.js";
 import { number, quantity } from "../format.js";
 import { t, translated } from "../texts.js";
 import { good } from "../drivestate.js";
+import { words } from "../words.js";
 import { BusState } from "./state.js";
 import { Icon } from "../icons.js";
 import { Meter } from "../meter.js";
@@ -25,7 +26,7 @@ export function Condition({ bus }) {
         <div><dt>${t("bus.bitrate")}</dt><dd>${quantity(bus.bitrate / 1000, "kbit/s")}</dd></div>
         ${COUNTERS.map((leaf) => html`<div><dt>${t(`bus.${leaf}`)}</dt><dd>${number(good(point(leaf)))}</dd></div>`)}
       </dl>
-      ${good(point("last_error")) && html`<p><span class="label">${t("bus.last_error")}</span> ${translated(good(point("last_error")))}</p>`}
+      ${good(point("last_error")) && html`<p><span class="label">${t("bus.last_error")}</span> ${words(point("last_error"))}</p>`}
       ${good(point("second_master")) && html`<p class="is-alarm"><${Icon} name="alarm" /> ${t("trouble.second_master")}</p>`}
       <${Strangers} point=${point} />
       ${good(point("passive")) && html`<p>${translated(nature(point("passive")).description)}</p>`}

@@ -8,6 +8,7 @@ import { many, t, translated } from "../texts.js";
 import { good, goodLabel } from "../drivestate.js";
 import { Icon, shapeOfNode } from "../icons.js";
 import { told } from "../outcome.js";
+import { words } from "../words.js";
 
 const STAGES = ["found", "identity", "configuration", "pdos", "supervision", "start"];
 // Which stage a step of the boot-up belongs to (bridge/node/boot). The steps come in the order of the stages: what is
@@ -49,7 +50,7 @@ function Node({ node }) {
         ${STAGES.map((stage, place) => html`<${Stage} stage=${stage} is=${standing(place, state, status, error)} />`)}
       </ol>
       ${error ? html`<p class="is-alarm"><strong>${error[1]}</strong> ${translated(error[2])}</p>` : html`<${Found} status=${status} />`}
-      ${good(point("device_errors")) && html`<p><span class="label">${t("bus.device_errors")}</span> ${translated(good(point("device_errors")))}</p>`}
+      ${good(point("device_errors")) && html`<p><span class="label">${t("bus.device_errors")}</span> ${words(point("device_errors"))}</p>`}
       ${may("engineer") && html`<${Commands} node=${node.name} />`}
     </li>
   `;

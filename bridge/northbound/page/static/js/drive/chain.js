@@ -4,12 +4,13 @@
 import { html } from "../ui.js";
 import { isConnected, troubles } from "../live.js";
 import { has } from "../site.js";
-import { quality, reason } from "../values.js";
+import { quality } from "../values.js";
 import { quantity } from "../format.js";
-import { t, translated } from "../texts.js";
+import { t } from "../texts.js";
 import { good, goodLabel, ownState } from "../drivestate.js";
 import { ownerOf } from "../owner.js";
 import { Meter } from "../meter.js";
+import { why } from "../words.js";
 
 const NEVER_MS = 0xffffffff;
 
@@ -108,7 +109,7 @@ function Margin({ time, of, text }) {
 // What the drive does by itself is read from it: it may be that it would run on.
 function BridgeBreak({ name }) {
   if (!isConnected.value) return t("chain.unknown");
-  if (quality(name) === "config_error") return html`<strong class="is-alarm">${t("chain.bridge.doubt", { why: translated(reason(name)) })}</strong>`;
+  if (quality(name) === "config_error") return html`<strong class="is-alarm">${t("chain.bridge.doubt", { why: why(name) })}</strong>`;
   return html`${t("chain.bridge.silent")}${" "}<${Worst} name=${name} />`;
 }
 
@@ -116,7 +117,7 @@ function BridgeBreak({ name }) {
 function Worst({ name }) {
   if (!has(name)) return null;
   const time = good(name);
-  if (time === null) return html`<strong class="is-alarm">${t("chain.not_known", { why: translated(reason(name)) || t("unknown") })}</strong>`;
+  if (time === null) return html`<strong class="is-alarm">${t("chain.not_known", { why: why(name) || t("unknown") })}</strong>`;
   if (!time) return html`<strong class="is-alarm">${t("chain.never")}</strong>`;
   return html`<strong>${t("chain.within", { time: quantity(time, "ms") })}</strong>`;
 }

@@ -2,13 +2,14 @@
 
 import { html, useState } from "../ui.js";
 import { below, leafOf, nature } from "../site.js";
-import { quality, reason } from "../values.js";
+import { quality } from "../values.js";
 import { quantity, range } from "../format.js";
 import { NumberField, numbersIn } from "../numberfield.js";
-import { t, translated } from "../texts.js";
+import { t } from "../texts.js";
 import { good } from "../drivestate.js";
 import { limitsOf } from "./limits.js";
 import { request } from "./ownership.js";
+import { why } from "../words.js";
 
 const WORDS = /^(control_word|setpoint_\d+)$/;
 
@@ -69,7 +70,7 @@ function Setpoint({ drive, name, isMain, isHeld }) {
     <p class="field">
       <label for=${id}>${t("drive.setpoint", { name: t(`point.${leaf}`) })}</label>
       <${NumberField} id=${id} name=${leaf} says="number.sends" limits=${{ unit, low, high, isWhole: type !== "float" }} isDisabled=${!isHeld || cannot} />
-      <small>${range(low, high, unit)}<br />${cannot ? translated(reason(name)) || t("quality.config_error") : t("drive.sent", { value: quantity(good(name), unit) })}</small>
+      <small>${range(low, high, unit)}<br />${cannot ? why(name) || t("quality.config_error") : t("drive.sent", { value: quantity(good(name), unit) })}</small>
     </p>
   `;
 }

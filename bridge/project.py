@@ -17,6 +17,7 @@ from bridge.mapping import Family
 from bridge.mapping.model import Slot
 from bridge.mapping.own_places import Raw, channels_needed, offline
 from bridge.mapping.site import load_site_and_families
+from bridge.text import Text
 from bridge.tomlfile import Key
 
 
@@ -51,7 +52,7 @@ def _refuse_vain_silence(project: Project) -> None:
         raise FileFaults(file.faults)
 
 
-def _vain_silences(project: Project) -> Iterator[tuple[Key, str, str]]:
+def _vain_silences(project: Project) -> Iterator[tuple[Key, Text | str, str]]:
     """Keys of the site file that ask for silence, why it would not stop the drive, and what would."""
     for b, bus in enumerate(project.site.bus):
         for n, node in enumerate(bus.node):
@@ -69,7 +70,7 @@ def _vain_silences(project: Project) -> Iterator[tuple[Key, str, str]]:
                 why = why_silence_does_not_stop(of_drive, own, node)
                 if not why:
                     continue
-                why = f"silence does not stop this drive: {why}"
+                why = Text.of("check.silence_does_not_stop", why=why)
                 watch = _own_watch(family, node, slot)
                 if drive.on_expiry == "silence":
                     hint = f'"disable_voltage", "quick_stop" or "stop"; or {watch}'

@@ -12,6 +12,7 @@ from bridge.command.stop_check.drive import DriveStopCheck
 from bridge.drive import DriveState, Lack, ParameterSet, ValueCodec, codecs
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Meaning, Slot
+from bridge.text import Text
 
 _GOOD: Final = (Quality.GOOD, "")
 _SPEEDS: Final = ("frequency", "velocity")
@@ -85,7 +86,7 @@ class ActualData:
         leaves = [f"actual/{word}" for word in self._carried]
         leaves += [codec.model.leaf for codec in self._codecs]
         self._indices = [image.index[f"{drive}/{leaf}"] for leaf in leaves]
-        self._shown: tuple[Quality, str] | None = None
+        self._shown: tuple[Quality, Text | str] | None = None
         """Quality and reason as the image has them for the process data."""
         self.compile()
 
@@ -139,7 +140,7 @@ class ActualData:
         self._shown = None
 
     def _to_judge(
-        self, unserved: Mapping[str, str], found: Iterable[tuple[ValueCodec, Lack | None]], in_set: int
+        self, unserved: Mapping[str, Text], found: Iterable[tuple[ValueCodec, Lack | None]], in_set: int
     ) -> Iterable[_Judged]:
         for index in self._status:
             yield _Judged(index)
@@ -256,7 +257,7 @@ class ActualData:
             own, why = self._quality_of(point, quality)
             self._image.judge((point.index,), own, now, why or reason)
 
-    def _quality_of(self, point: _Judged, quality: Quality) -> tuple[Quality, str]:
+    def _quality_of(self, point: _Judged, quality: Quality) -> tuple[Quality, Text | str]:
         """A point's quality, and the reason where that is not the one of the drive's ``quality``."""
         if not quality.has_value:
             return quality, ""
@@ -287,7 +288,7 @@ def _plain(codec: ValueCodec) -> _Plain:
     return _Plain(codec.places[0], scale.full, scale.at) if scale else _Plain(codec.places[0], 1, 1)
 
 
-def _unserved(unserved: Mapping[str, str], leaves: Iterable[str]) -> Lack | None:
+def _unserved(unserved: Mapping[str, Text], leaves: Iterable[str]) -> Lack | None:
     """What there is to say of these actual values, where the node's PDOs do not carry one of them."""
     for leaf in leaves:
         why = unserved.get(f"actual/{leaf}")

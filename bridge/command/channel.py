@@ -160,16 +160,16 @@ class Channel:
 
     def _way(self, now: float) -> Way:
         link = self.link
-        why = ""
+        why: Text | str = ""
         if link.is_expired:
             why = link.reason(Quality.LOST)
         elif not link.may_enable:
-            why = f"the drive's node is {link.node.value}"
+            why = Text.of("node.state_of_drives", state=Text.word("node_state", link.node.value))
         # It is heard when it has reported: until then what it said before would count.
         is_heard = link.is_heard and self.leg.way.is_heard
         return Way(link.may_enable, why, self._why_unplaced(now), is_heard, link.why_unsent)
 
-    def on_sending(self, why_not: str, now: float) -> None:
+    def on_sending(self, why_not: Text | str, now: float) -> None:
         """Whether ``output`` is repeated on the bus: ``why_not``, or an empty text."""
         if why_not != self.link.why_unsent:
             self.link.why_unsent = why_not
@@ -295,6 +295,6 @@ class Channel:
     def _is_silent(self, now: float) -> None:
         """It has been silent for longer than it may."""
 
-    def _why_unplaced(self, now: float) -> str:
+    def _why_unplaced(self, now: float) -> Text | str:
         """Why the position is not known that setpoints have to follow; empty where it is."""
         return ""

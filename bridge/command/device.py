@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.command.drive import Identification
-from bridge.command.link import Link, NodeState
+from bridge.command.link import REASONS, Link, NodeState
 from bridge.command.messages.request import Identity, Role
 from bridge.command.outputs import Outputs, Telling
 from bridge.config import NodeTable
@@ -36,7 +36,7 @@ class _InputTpdo:
     link: Link
     shown: list[tuple[int, Signal, int]] = field(default_factory=list[tuple[int, Signal, int]])
     """Entry, what it is, and its point."""
-    quality: tuple[Quality, str] | None = None
+    quality: tuple[Quality, Text | str] | None = None
     told: tuple[tuple[int, ObjectRef, int], ...] = ()
     """Entries that are outputs: the entry, its object, and the mask that takes its sign away."""
     told_values: list[tuple[ObjectRef, int]] = field(default_factory=list[tuple[ObjectRef, int]])
@@ -71,9 +71,9 @@ class Device:
         self.outputs: Outputs | None = None
         """Where it has some."""
         self._heard: list[_InputTpdo] = []
-        self._unserved: dict[int, str] = {}
+        self._unserved: dict[int, Text] = {}
         """Points that no TPDO carries, with the reason."""
-        self._state: tuple[Quality, str] = (Quality.WAITING, "")
+        self._state: tuple[Quality, Text | str] = (Quality.WAITING, "")
         """How good those inputs are of which no TPDO is known."""
 
     def begin(self, now: float) -> None:
@@ -82,7 +82,7 @@ class Device:
         self._image.set(self._abort_code, 0, now)
         self._judge(now)
 
-    def on_pdos(self, pdos: Sequence[InputPdo], unserved: Mapping[ObjectRef, str], now: float) -> None:
+    def on_pdos(self, pdos: Sequence[InputPdo], unserved: Mapping[ObjectRef, Text], now: float) -> None:
         """What the boot-up has found; ``unserved`` has the reason for each input that no TPDO carries."""
         self._heard = []
         in_charge = _in_charge(pdos)
@@ -226,23 +226,24 @@ class Device:
         quality = heard.link.quality(now)
         if quality is Quality.STALE and heard.link.last_pdo is None:
             quality = Quality.WAITING
-        reason = "" if quality is Quality.GOOD else f"no {heard.pdo.name} from the node"
+        is_good = quality is Quality.GOOD
+        reason = "" if is_good else Text.of("quality.no_pdo_of_node", pdo=heard.pdo.name)
         if self._node is not NodeState.OPERATIONAL:
-            reason = f"node {self._node.value}"
+            reason = REASONS[self._node]
         if (quality, reason) != heard.quality:
             heard.quality = quality, reason
             self._image.judge(heard.points, quality, now, reason)
 
-    def _state_of_node(self) -> tuple[Quality, str]:
+    def _state_of_node(self) -> tuple[Quality, Text | str]:
         match self._node:
             case NodeState.OPERATIONAL:
                 return Quality.GOOD, ""
             case NodeState.DISABLED:
-                return Quality.DISABLED, f"node {self._node.value}"
+                return Quality.DISABLED, REASONS[self._node]
             case NodeState.CONFIG_ERROR:
-                return Quality.CONFIG_ERROR, f"node {self._node.value}"
+                return Quality.CONFIG_ERROR, REASONS[self._node]
             case _:
-                return Quality.WAITING, f"node {self._node.value}"
+                return Quality.WAITING, REASONS[self._node]
 
 
 def _in_charge(pdos: Sequence[InputPdo]) -> dict[ObjectRef, int]:

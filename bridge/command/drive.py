@@ -166,7 +166,7 @@ class Drive(Commanded):
 
     def on_pdos(
         self,
-        unserved: Mapping[str, str],
+        unserved: Mapping[str, Text],
         further: Sequence[FurtherTpdo],
         now: float,
         *,
@@ -212,10 +212,11 @@ class Drive(Commanded):
             if one.codec.places and not one.lack
         }
 
-    def on_codes(self, codes: Codes, why_unread: str = "cannot be read") -> bool:
+    def on_codes(self, codes: Codes, why_unread: Text | None = None) -> bool:
         """What the drive's parameters say that its words carry. True where a setpoint that was written before
         means something else now: it must not be sent to a drive that is enabled next."""
-        means_otherwise = self.channel.meanings.on_codes(codes, why_unread)
+        meanings = self.channel.meanings
+        means_otherwise = meanings.on_codes(codes, why_unread) if why_unread else meanings.on_codes(codes)
         self.compile()
         return means_otherwise
 
@@ -244,11 +245,11 @@ class Drive(Commanded):
         if own.verdict is OwnVerdict.STOPS or own.accepted:
             self._image.set(self._bridge_ms, own.bridge_ms, now, Quality.GOOD, own.accepted)
             return
-        verdict = "the drive runs on" if own.verdict is OwnVerdict.RUNS_ON else "not known"
-        reason = f"{verdict}: {own.reason}"
-        self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, reason)
+        runs_on = own.verdict is OwnVerdict.RUNS_ON
+        why = Text.of("own.drive_runs_on" if runs_on else "own.drive_not_known", why=own.because)
+        self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, why)
 
-    def on_own_supervision_changed(self, why: str, now: float) -> None:
+    def on_own_supervision_changed(self, why: Text, now: float) -> None:
         """What the boot-up has read of it is not true any more."""
         self.own = OwnJudgement()
         self.channel.on_own_watch(why, now)

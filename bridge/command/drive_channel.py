@@ -43,7 +43,7 @@ class DriveChannel(Channel):
         self.meanings = Meanings(family, slot, settings.parameters)
         """What the words mean in each parameter set: from the mapping and the site file, and as read from
         the drive."""
-        self.unserved: dict[str, str] = {}
+        self.unserved: dict[str, Text] = {}
         """Points that the node cannot serve, by their leaf, with the reason; known after boot-up."""
         self.doubts = SetpointDoubts()
         words = family.process.rpdo[1:]
@@ -126,13 +126,13 @@ class DriveChannel(Channel):
 
     # from the drive
 
-    def on_own_watch(self, why_not: str, now: float) -> None:
+    def on_own_watch(self, why_not: Text | str, now: float) -> None:
         """Whether the drive stops by itself when it gets no RPDO any more: ``why_not``, or an empty text."""
         stops = not why_not
         if stops is self.leg.silence_stops:
             return
         if why_not and self.settings.falls_silent:
-            said = Text.of("watchdog.silence_replaced", why=Text.plain(why_not))
+            said = Text.of("watchdog.silence_replaced", why=why_not)
             self._tell(now, Kind.WATCHDOG, 700, said)
         self._happen(event.OwnWatch(stops), now)
 
@@ -196,14 +196,14 @@ class DriveChannel(Channel):
         said = Text.of("watchdog.link_fault", prefix=self.family.faults.prefix, fault=fault, why=why)
         self._tell(now, Kind.WATCHDOG, 700, said)
 
-    def _why_unplaced(self, now: float) -> str:
+    def _why_unplaced(self, now: float) -> Text | str:
         if not self._followed:
             return ""
         quality = self.link.quality(now)
         why = self.link.reason(quality)
         if quality is Quality.GOOD:
             why = self.link.why_lacking(self._followed, now)
-        return f"the drive's own position is not known: {why}" if why else ""
+        return Text.of("start.unplaced", why=why) if why else ""
 
     # its owner and its watchdogs
 

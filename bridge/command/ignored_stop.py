@@ -61,7 +61,7 @@ def _of_drive(drive: Drive, verdict: Verdict, took_s: float) -> Text:
 
 
 def _of_outputs(outputs: Outputs, verdict: Verdict, took_s: float) -> Text:
-    why = Text.plain(outputs.stop_check.why)
+    why = outputs.stop_check.why
     if verdict.before is LastStop.FOLLOWED:
         return Text.of("stop.outputs_differ", took_s=took_s, why=why)
     return Text.of("stop.outputs_ignored", took_s=took_s, why=why)

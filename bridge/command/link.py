@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 from bridge.config import IGNORE_ALL_S
 from bridge.image import Quality
+from bridge.text import Text
 
 
 class NodeState(Enum):
@@ -23,6 +25,13 @@ class NodeState(Enum):
     STOPPED = "stopped by command"
     DISABLED = "disabled"
     CONFIG_ERROR = "configuration error"
+
+
+REASONS: Final = {
+    state: Text.of("quality.node", state=Text.word("node_state", state.value)) for state in NodeState
+}
+"""Why points are not good while their node is in this state."""
+_NO_DATA: Final = Text.of("watchdog.no_process_data")
 
 
 @dataclass(slots=True)
@@ -71,7 +80,7 @@ class Link:
         self._downtime_s = telegram_downtime_s
         self._hold_s = hold_ms / 1000
         self.node = NodeState.ABSENT
-        self.why_unsent = ""
+        self.why_unsent: Text | str = ""
         """Why nothing that belongs on the bus is repeated there; empty where it is."""
         self.pdo_deadline_s: float | None = None
         self.further: Sequence[FurtherTpdo] = ()
@@ -176,19 +185,19 @@ class Link:
             return Quality.DEAD if now >= self._expired_at + self._hold_s else Quality.LOST
         return Quality.STALE
 
-    def why_lacking(self, places: frozenset[int], now: float) -> str:
+    def why_lacking(self, places: frozenset[int], now: float) -> Text | str:
         """Why these words, by their places in ``process.tpdo``, are not known; empty where they are. The TPDO
         with the status word is judged by ``quality``."""
         late = [pdo.name for pdo in self.further if not (pdo.places.isdisjoint(places) or pdo.is_fresh(now))]
-        return f"no {late[0]} from the drive" if late else ""
+        return Text.of("quality.no_pdo", pdo=late[0]) if late else ""
 
-    def reason(self, quality: Quality) -> str:
+    def reason(self, quality: Quality) -> Text | str:
         """Why the data have this quality, in a few words; empty where they are good."""
         if quality is Quality.GOOD:
             return ""
         if self.node is not NodeState.OPERATIONAL:
-            return f"node {self.node.value}"
-        return "no process data from the drive"
+            return REASONS[self.node]
+        return _NO_DATA
 
     def next_deadline(self) -> float | None:
         """When the quality or the expiry changes by itself, beyond what ``on_time`` has judged."""

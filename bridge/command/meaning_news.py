@@ -98,7 +98,7 @@ class MeaningNews:
     def _doubted(self, before: Mapping[str, InForce], after: Mapping[str, InForce]) -> list[Text]:
         note = self._drive.channel.doubts.note
         return [
-            Text.of("meaning.in_doubt", leaf=name, why=Text.plain(why))
+            Text.of("meaning.in_doubt", leaf=name, why=why)
             for name, one in before.items()
             if name in after and (why := note(name, one, after[name]))
         ]
@@ -112,7 +112,7 @@ class MeaningNews:
             if name in value.when or is_steady:
                 found.append(Text.of("meaning.other", leaf=value.leaf))
             elif name in value.scaled_by and setting is not None and not is_scale(setting):
-                found.append(Text.plain(no_scale(name, setting)))
+                found.append(no_scale(name, setting))
             elif name in value.scaled_by:
                 found.append(Text.of("meaning.other_scale", leaf=value.leaf))
         return list(dict.fromkeys(found))

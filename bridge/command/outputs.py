@@ -161,9 +161,9 @@ class Outputs(Commanded):
         self.stop_check = OutputStopCheck()
         self._telling: dict[ObjectRef, Telling] = {}
         """Outputs that a TPDO of the node carries, too."""
-        self.unserved: dict[ObjectRef, str] = {}
+        self.unserved: dict[ObjectRef, Text] = {}
         """Outputs that no RPDO carries, with the reason."""
-        self.bridge_stop: tuple[int, str] = (0, "has not been read yet")
+        self.bridge_stop: tuple[int, Text | str] = (0, Text.of("meaning.not_read_yet"))
         """Longest time in ms from the bridge's hang to outputs that the node itself has made safe, or why
         there is none."""
         self.own: OwnJudgement | None = None
@@ -205,9 +205,9 @@ class Outputs(Commanded):
     def on_pdos(
         self,
         rpdo_type: int,
-        unserved: Mapping[ObjectRef, str],
+        unserved: Mapping[ObjectRef, Text],
         held: Mapping[str, int],
-        bridge_stop: tuple[int, str],
+        bridge_stop: tuple[int, Text | str],
         now: float,
     ) -> None:
         """What the boot-up has found: the transmission type of its RPDOs, what none of them carries, what
@@ -226,7 +226,7 @@ class Outputs(Commanded):
             if place.output.object in telling
         }
 
-    def on_own_supervision_changed(self, why: str, now: float) -> None:
+    def on_own_supervision_changed(self, why: Text, now: float) -> None:
         """An object that decides what the node does by itself was written: nothing is known of it."""
         self.bridge_stop = (0, why)
         self.own = None

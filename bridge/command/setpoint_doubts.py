@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from bridge.drive import ValueCodec
+from bridge.text import Text
 
 
 class InForce(NamedTuple):
@@ -26,20 +27,20 @@ class SetpointDoubts:
     in doubt until its command is written anew, or another word has taken its place."""
 
     def __init__(self) -> None:
-        self._doubts: dict[str, tuple[InForce, str]] = {}
+        self._doubts: dict[str, tuple[InForce, Text]] = {}
 
-    def note(self, name: str, before: InForce, after: InForce) -> str:
+    def note(self, name: str, before: InForce, after: InForce) -> Text | str:
         """``name`` of the command group means another value; what there is to say, empty where nobody would
         notice."""
         if before.words != after.words or before.value == after.value:
             return ""
         first = self._doubts.get(name)
         written = first[0] if first and first[0].words == after.words else before
-        why = f"written as {written.text}, and the same word means {after.text} since the drive was changed"
+        why = Text.of("meaning.means_otherwise", written=written.text, now=after.text)
         self._doubts[name] = (written, why)
         return why
 
-    def why(self, name: str, setpoints: Sequence[int]) -> str:
+    def why(self, name: str, setpoints: Sequence[int]) -> Text | str:
         """Why a command is in doubt, with these words in force; empty where it is not."""
         if not self._doubts or name not in self._doubts:
             return ""

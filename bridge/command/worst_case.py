@@ -12,6 +12,7 @@ from typing import Final
 
 from bridge.command.messages.freshness import way_ms
 from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, OutputsTable
+from bridge.text import Text, render
 
 REACTION_BOUND_MS: Final = 20
 """How late the bridge may be itself, or the kernel's timer in its place."""
@@ -42,7 +43,7 @@ class StopTime:
     given."""
 
     terms: tuple[Term, ...] = ()
-    unknown: str = ""
+    unknown: Text | str = ""
 
     @property
     def ms(self) -> int:
@@ -51,7 +52,7 @@ class StopTime:
 
     def __str__(self) -> str:
         if self.unknown:
-            return f"not known: {self.unknown}"
+            return f"not known: {render(self.unknown)}"
         return f"{self.ms} ms" if self.terms else "never"
 
     @property
@@ -84,7 +85,7 @@ def stop_time(
     if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.on_expiry == "hold":
         return StopTime()
     if table.on_expiry == "silence" and own_ms is None:
-        return StopTime(unknown="the drive's own time-out has not been read yet")
+        return StopTime(unknown=Text.of("stop_time.own_not_read"))
     terms = _to_the_wire(table.control, bus, timeout_ms, transmission_type, wire)
     if isinstance(terms, StopTime):
         return terms
@@ -109,12 +110,9 @@ def _to_the_wire(
     sync_ms = sync_wait_ms(bus, transmission_type)
     is_synchronous = transmission_type <= _LAST_SYNCHRONOUS
     if is_synchronous and not bus.sync_period_ms:
-        return StopTime(
-            unknown=f"its RPDO of transmission type {transmission_type} waits for a SYNC that somebody else "
-            "sends (sync_period_ms = 0)"
-        )
+        return StopTime(unknown=Text.of("stop_time.waits_for_sync", type=transmission_type))
     if wire.before_ms is None:
-        return StopTime(unknown="the predicted load of its bus is more than 100 %")
+        return StopTime(unknown=Text.of("stop_time.overload"))
     terms = [
         *_before_the_bus(control, bus, timeout_ms),
         Term("before_ms", wire.before_ms, "frames that may go first on the bus at the predicted load"),

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from bridge.image import Quality
 from bridge.mapping.model import Family, ProcessValue
+from bridge.text import Text
 
 _FIRST: Final = 1
 
@@ -18,7 +19,7 @@ class Lack(NamedTuple):
     """Why a value is not served, or with the quality *stale*, why it is in doubt."""
 
     quality: Quality
-    why: str
+    why: Text | str
 
 
 class Conditions:
@@ -61,10 +62,11 @@ class Conditions:
         for name, settings in value.when.items():
             setting = self.told(self.key(name, in_set))
             if setting is None:
-                return Lack(unread.quality, f"{name}{self._of(name, in_set)} {unread.why}")
+                return Lack(unread.quality, unread_in((name,), self._set_of(name, in_set), unread.why))
             if setting not in settings:
-                shown = f"{name} is {setting:g}{self._state(name, setting)}"
-                return Lack(Quality.DISABLED, f"{value.otherwise}{self._in(name, in_set)}: {shown}")
+                shown = (self._shown(name, setting),)
+                why = otherwise_in((value.otherwise,), self._set_of(name, in_set), shown)
+                return Lack(Quality.DISABLED, why)
         for name in self._family.steady_of(value):
             key = self.key(name, in_set)
             first, setting = self._first.get(key), self.told(key)
@@ -72,17 +74,31 @@ class Conditions:
                 return Lack(Quality.CONFIG_ERROR, _was_changed(name, first, setting))
         return None
 
-    def _state(self, name: str, setting: float) -> str:
-        text = self._family.parameter_named(name).states.get(round(setting))
-        return f" ({text})" if text else ""
+    def _shown(self, name: str, setting: float) -> Text:
+        state = self._family.parameter_named(name).states.get(round(setting))
+        if state:
+            return Text.of("meaning.setting_state", parameter=name, value=setting, state=state)
+        return Text.of("meaning.setting", parameter=name, value=setting)
 
-    def _of(self, name: str, in_set: int) -> str:
-        return f" of parameter set {in_set}" if self._family.parameter_named(name).sets else ""
-
-    def _in(self, name: str, in_set: int) -> str:
-        return f" in parameter set {in_set}" if self._family.parameter_named(name).sets else ""
+    def _set_of(self, name: str, in_set: int) -> int | None:
+        """The parameter set that is told with it; None where all have the same."""
+        return in_set if self._family.parameter_named(name).sets else None
 
 
-def _was_changed(name: str, first: float, setting: float) -> str:
-    what = f"{name} was {first:g} in the drive and is {setting:g}"
-    return f"{what}: see what it scales, then restart the bridge"
+def unread_in(parameters: tuple[str, ...], in_set: int | None, why: Text | str) -> Text:
+    """What there is to say of parameters that the drive has not told."""
+    if in_set is None:
+        return Text.of("meaning.unread", parameters=parameters, why=why)
+    return Text.of("meaning.unread_in_set", parameters=parameters, in_set=in_set, why=why)
+
+
+def otherwise_in(otherwise: tuple[str, ...], in_set: int | None, settings: tuple[Text, ...]) -> Text:
+    """What the mapping file says of values with these settings."""
+    said = tuple(Text.plain(one) for one in otherwise)
+    if in_set is None:
+        return Text.of("meaning.otherwise", otherwise=said, settings=settings)
+    return Text.of("meaning.otherwise_in_set", otherwise=said, in_set=in_set, settings=settings)
+
+
+def _was_changed(name: str, first: float, setting: float) -> Text:
+    return Text.of("meaning.was_changed", parameter=name, first=first, now=setting)

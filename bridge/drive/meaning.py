@@ -6,17 +6,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from bridge.drive.conditions import Conditions, Key, Lack
+from bridge.drive.conditions import Conditions, Key, Lack, otherwise_in, unread_in
 from bridge.drive.parameter_set import ParameterSet
 from bridge.drive.scaling import LinearScale, is_scale, no_scale, scale_of
 from bridge.drive.values import ValueCodec, scales_of
 from bridge.image import Quality
 from bridge.mapping.model import Family, Meaning, Parameter, ProcessValue, Slot
+from bridge.text import Text
 
 Codes = Mapping[str, Sequence[int | None]]
 """By the word's leaf, such as ``actual/value_1``, the code in each parameter set; None: it cannot be read."""
 
 _FIRST: Final = 1
+
+
+_UNREADABLE: Final = Text.of("meaning.cannot_be_read")
 
 
 class Meanings:
@@ -41,7 +45,7 @@ class Meanings:
         self._no_scale: dict[Key, float] = {}
         """What the drive has for parameters that scale, and that is no scale."""
         self._codes: dict[str, tuple[int | None, ...]] = {}
-        self._unread = Lack(Quality.WAITING, "has not been read yet")
+        self._unread = Lack(Quality.WAITING, Text.of("meaning.not_read_yet"))
         self._found: dict[tuple[str, int], tuple[ValueCodec, Lack | None]] = {}
         self._overdue: frozenset[Key] = frozenset()
         self._set = ParameterSet(family.status_word.parameter_set_bits)
@@ -92,7 +96,7 @@ class Meanings:
         """What counts where the drive says this."""
         return self._family.parameter_named(name).absent if told is None else round(float(told), 9)
 
-    def on_codes(self, codes: Codes, why_unread: str = "cannot be read") -> bool:
+    def on_codes(self, codes: Codes, why_unread: Text = _UNREADABLE) -> bool:
         """What the drive's parameters say that its words carry. True where a setpoint that was written before
         means something else now."""
         before = self._of_commands()
@@ -112,12 +116,12 @@ class Meanings:
         self._overdue = overdue
         return is_news
 
-    def doubt(self, model: ProcessValue, in_set: int) -> str:
+    def doubt(self, model: ProcessValue, in_set: int) -> Text | str:
         """Why it is not certain that this value still means what it meant; empty where it is."""
         if not self._overdue:
             return ""
         late = [key[0] for key in self._deciding(model, in_set) if key in self._overdue]
-        return f"the drive has not been asked for longer than 10 s: {late[0]}" if late else ""
+        return Text.of("meaning.overdue", parameter=late[0]) if late else ""
 
     def _deciding(self, model: ProcessValue, in_set: int) -> list[Key]:
         """What decides the meaning of a value in this set."""
@@ -172,7 +176,8 @@ class Meanings:
         """``number`` is the set in which its parameters are looked up."""
         why = codec.why_unknown
         if why and number > _FIRST:
-            why = f"parameter set {number} is active, and {codec.model.full} is not known of it"
+            name = str(codec.model.full)
+            why = Text.of("meaning.scale_not_of_set", in_set=number, parameter=name)
         for name in codec.model.scaled_by if why else ():
             if (name, number) in self._no_scale:
                 why = no_scale(name, self._no_scale[name, number])
@@ -182,8 +187,8 @@ class Meanings:
         """Where this value stands among the words of its group, without the first one for commands."""
         runs = self._family.meanings_of(self._slot, model.group)
         asked = [meaning for run in runs for meaning in run]
-        twice = self._named_twice(model, asked, in_set) if model.group == "command" else ""
-        if twice:
+        twice = self._named_twice(model, asked, in_set) if model.group == "command" else None
+        if twice is not None:
             return Lack(Quality.DISABLED, twice)
         if model.word_names:
             by_word = {meaning.word: meaning for meaning in asked}
@@ -200,31 +205,32 @@ class Meanings:
             if all(code in by_code for code in model.code):
                 return tuple(self._place(by_code[code]) for code in model.code)
         unread = [one.parameter for one in asked if self._code(one, in_set) is None]
-        which = f"parameter set {in_set}" if len(self.sets) > 1 else ""
+        which = in_set if len(self.sets) > 1 else None
         if unread:
-            of_set = f" of {which}" if which else ""
-            return Lack(self._unread.quality, f"{', '.join(unread)}{of_set} {self._unread.why}")
-        found = ", ".join(dict.fromkeys(self._shown(one, in_set) for one in asked))
-        in_this = f" in {which}" if which else ""
-        otherwise = ", ".join(dict.fromkeys(one.otherwise for one in asked))
-        return Lack(Quality.DISABLED, f"{otherwise}{in_this}: {found}")
+            return Lack(self._unread.quality, unread_in(tuple(unread), which, self._unread.why))
+        found = tuple(dict.fromkeys(self._shown(one, in_set) for one in asked))
+        otherwise = tuple(dict.fromkeys(one.otherwise for one in asked))
+        return Lack(Quality.DISABLED, otherwise_in(otherwise, which, found))
 
-    def _named_twice(self, model: ProcessValue, asked: Sequence[Meaning], in_set: int) -> str:
+    def _named_twice(self, model: ProcessValue, asked: Sequence[Meaning], in_set: int) -> Text | None:
         """Words that parameters of their own make the same setpoint: the drive adds them, and one of them
         alone says nothing."""
         for code in model.code:
             named = {one.parameter: one for one in asked if self._code(one, in_set) == code}
             if len(named) > 1:
-                shown = ", ".join(self._shown(one, in_set) for one in named.values())
-                return f"in more than one word: {shown}"
-        return ""
+                shown = tuple(self._shown(one, in_set) for one in named.values())
+                return Text.of("meaning.twice", settings=shown)
+        return None
 
-    def _shown(self, meaning: Meaning, in_set: int) -> str:
+    def _shown(self, meaning: Meaning, in_set: int) -> Text:
         code = self._code(meaning, in_set)
         name, _ = self._family.parameter_and_set(meaning.parameter)
         states = next((one.states for one in self._family.parameter if one.name == name), None)
         state = states.get(code) if states and code is not None else None
-        return f"{meaning.parameter} is {code}{f' ({state})' if state else ''}"
+        shown = code or 0
+        if state:
+            return Text.of("meaning.code_state", parameter=meaning.parameter, code=shown, state=state)
+        return Text.of("meaning.code", parameter=meaning.parameter, code=shown)
 
     def _code(self, meaning: Meaning, in_set: int) -> int | None:
         of_sets = self._codes.get(meaning.leaf, ())
@@ -236,18 +242,17 @@ class Meanings:
             return process.rpdo.index(meaning.word) - 1
         return process.tpdo.index(meaning.word)
 
-    def unknown(self) -> list[str]:
+    def unknown(self) -> list[Text]:
         """The words that carry something which the family does not know, in words."""
         known = {(value.group, code) for value in self._family.value for code in value.code}
-        told: list[str] = []
+        told: list[Text] = []
         for group in ("command", "actual"):
             for meaning in (one for run in self._family.meanings_of(self._slot, group) for one in run):
                 for in_set in self.sets:
                     code = self._code(meaning, in_set)
                     if code and (group, code) not in known:
-                        told.append(
-                            f"{meaning.parameter} is {code} in set {in_set}, which the mapping does not know"
-                        )
+                        name = meaning.parameter
+                        told.append(Text.of("meaning.unknown_code", parameter=name, code=code, in_set=in_set))
         return told
 
 

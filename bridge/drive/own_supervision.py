@@ -6,12 +6,14 @@ index and sub-index; one that is missing is not known.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
 from bridge.config import BusTable, NodeTable
 from bridge.mapping.model import Family, OwnReaction, OwnSupervision
 from bridge.mapping.own_places import LIFE_TIME_FACTOR, OwnPlace, Raw, place_of
+from bridge.text import Text, render
 
 
 class OwnVerdict(StrEnum):
@@ -31,10 +33,15 @@ class Watch:
     """None where it is not known, 0 where nothing is watched."""
     reaction: str
     verdict: OwnVerdict | None
-    why: str = ""
+    because: Text | str = ""
     """Why the drive would not stop by it."""
     silent_ms: int = 0
     """How long after a hang of the bridge its last frame may come."""
+
+    @property
+    def why(self) -> str:
+        """Why the drive would not stop by it, in English."""
+        return render(self.because)
 
     @property
     def bridge_ms(self) -> float | None:
@@ -98,15 +105,25 @@ class OwnJudgement:
         return " + ".join(f"{name} {ms:g}" for name, ms in self.terms)
 
     @property
-    def reason(self) -> str:
+    def because(self) -> Text | str:
         """Why it would not stop, or why that is not known; empty where it would."""
-        if self.verdict is OwnVerdict.STOPS:
+        wanted = self.verdict
+        if wanted is OwnVerdict.STOPS:
             return ""
         if not any(one.verdict for one in self.watches):
-            return "the mapping says nothing of the drive's own supervision"
-        wanted = self.verdict
-        whys = dict.fromkeys(one.why for one in self.watches if one.verdict is wanted)
-        return "; ".join(whys)
+            return Text.of("own.nothing_said")
+        return _together(one.because for one in self.watches if one.verdict is wanted)
+
+    @property
+    def reason(self) -> str:
+        """Why it would not stop, or why that is not known, in English; empty where it would."""
+        return render(self.because)
+
+
+def _together(reasons: Iterable[Text | str]) -> Text | str:
+    """Each of them once."""
+    each = tuple(dict.fromkeys(reasons))
+    return each[0] if len(each) == 1 else Text.of("own.several", reasons=each)
 
 
 def judge(family: Family, raw: Raw, bus: BusTable, node: NodeTable, accepted: str = "") -> OwnJudgement:
@@ -119,7 +136,7 @@ def judge(family: Family, raw: Raw, bus: BusTable, node: NodeTable, accepted: st
     return OwnJudgement(tuple(watches), accepted)
 
 
-def why_silence_does_not_stop(family: Family, own: OwnJudgement, node: NodeTable) -> str:
+def why_silence_does_not_stop(family: Family, own: OwnJudgement, node: NodeTable) -> Text | str:
     """Why a drive of this node would run on if only its RPDOs ended, or an empty text.
 
     Heartbeat, guarding and SYNC go on then, and so do the RPDOs of the node's other drives.
@@ -129,17 +146,16 @@ def why_silence_does_not_stop(family: Family, own: OwnJudgement, node: NodeTable
         watched = [entry.name for entry in family.own_supervision if entry.watches != "link"]
         name = family.family.name
         if not watched:
-            return f"nothing is known of what {name} watches"
-        return f"{name} watches {' and '.join(watched)}, and not its process data: that goes on"
+            return Text.of("own.nothing_known", family=name)
+        return Text.of("own.watches_else", family=name, watched=tuple(watched))
     alone = [entry for entry in entries if entry.per_drive or len(node.drive) == 1]
     if not alone:
-        names = " and ".join(entry.name for entry in entries)
-        count = len(node.drive)
-        return f"{names} watches the RPDOs of all {count} drives of the node: those of the others go on"
+        names = tuple(entry.name for entry in entries)
+        return Text.of("own.watches_all", watched=names, count=len(node.drive))
     if own.process_data_ms:
         return ""
     watches = {one.name: one for one in own.watches}
-    return "; ".join(dict.fromkeys(watches[entry.name].why for entry in alone))
+    return _together(watches[entry.name].because for entry in alone)
 
 
 def _watch(family: Family, entry: OwnSupervision, raw: Raw, bus: BusTable, node: NodeTable) -> Watch:
@@ -147,11 +163,11 @@ def _watch(family: Family, entry: OwnSupervision, raw: Raw, bus: BusTable, node:
     value = raw.get(place.key)
     silent_ms = max(bus.deadman_ms, bus.heartbeat_ms if entry.watches == "heartbeat" else 0)
     if value is None:
-        why = f"{place.name} is not known"
-        return Watch(entry.name, entry.watches, why, None, "", OwnVerdict.UNKNOWN, why)
+        why = Text.of("own.not_known", place=place.name)
+        return Watch(entry.name, entry.watches, render(why), None, "", OwnVerdict.UNKNOWN, why)
     if entry.watches == "link":
         off = value in entry.off
-        why = "it does not notice when its bus interface is gone" if off else ""
+        why = Text.of("own.no_link") if off else ""
         return Watch(entry.name, entry.watches, place.shown(value), None, "", None, why)
     time_ms, setting, why = _time(entry, place, value, raw, bus, node)
     if time_ms is None:
@@ -165,43 +181,50 @@ def _watch(family: Family, entry: OwnSupervision, raw: Raw, bus: BusTable, node:
 
 def _time(
     entry: OwnSupervision, place: OwnPlace, value: int, raw: Raw, bus: BusTable, node: NodeTable
-) -> tuple[float | None, str, str]:
+) -> tuple[float | None, str, Text | str]:
     """Time-out in ms (0: nothing is watched, None: not known), the setting in words, and why it is off."""
     if entry.watches == "guarding":
         factor = raw.get(LIFE_TIME_FACTOR) if value else 0
         if factor is None:
-            return None, f"{place.name} = {value} ms", "100D:00 is not known"
+            return None, f"{place.name} = {value} ms", Text.of("own.not_known", place="100D:00")
         setting = f"{place.name} × 100D:00 = {value} ms × {factor}"
         if not value * factor:
-            return 0.0, setting, "life guarding is off (100C:00 × 100D:00 is 0)"
+            return 0.0, setting, Text.of("own.guarding_off")
         if node.supervision != "guarding":
-            return 0.0, setting, f'the bridge does not guard it (supervision = "{node.supervision}")'
+            return 0.0, setting, Text.of("own.not_guarded", supervision=node.supervision)
         return float(value * factor), setting, ""
     if entry.watches == "heartbeat":
         watched, time_ms = value >> 16 & 0x7F, value & 0xFFFF
         if not watched or not time_ms:
-            return 0.0, f"{place.name} = 0", f"{place.name} is 0: it watches no heartbeat"
+            return 0.0, f"{place.name} = 0", Text.of("own.no_heartbeat", place=place.name)
         setting = f"{place.name} = node {watched}, {time_ms} ms"
         if watched != bus.master_node_id:
-            return 0.0, setting, f"{place.name} watches node {watched}, the bridge is {bus.master_node_id}"
+            own = bus.master_node_id
+            return 0.0, setting, Text.of("own.other_node", place=place.name, watched=watched, own=own)
         if not bus.heartbeat_ms:
-            return 0.0, setting, "the bridge sends no heartbeat (heartbeat_ms = 0)"
+            return 0.0, setting, Text.of("own.bridge_silent")
         return float(time_ms), setting, ""
     time_ms = value * entry.unit_ms
     if value in entry.off:
-        return 0.0, f"{place.name} = {value} (off)", f"{place.name} is {value} (off)"
+        return 0.0, f"{place.name} = {value} (off)", Text.of("own.off", place=place.name, value=value)
     return time_ms, f"{place.name} = {time_ms:g} ms", ""
 
 
-def _reaction(family: Family, one: OwnReaction | None, raw: Raw) -> tuple[str, OwnVerdict, str]:
+def _reaction(family: Family, one: OwnReaction | None, raw: Raw) -> tuple[str, OwnVerdict, Text | str]:
     """The reaction in words, what the drive does then, and why that is not to stop."""
     if one is None:
         return "stops", OwnVerdict.STOPS, ""
     place = place_of(family, one)
     value = raw.get(place.key)
     if value is None:
-        return f"{place.name} not known", OwnVerdict.UNKNOWN, f"{place.name} is not known"
+        return f"{place.name} not known", OwnVerdict.UNKNOWN, Text.of("own.not_known", place=place.name)
     text = place.shown(value)
     if value in one.nothing:
-        return text, OwnVerdict.RUNS_ON, f"{text}: it runs on"
+        return text, OwnVerdict.RUNS_ON, _runs_on(place, value)
     return text, OwnVerdict.STOPS, ""
+
+
+def _runs_on(place: OwnPlace, value: int) -> Text:
+    if state := place.states.get(value):
+        return Text.of("own.runs_on_state", place=place.name, value=value, state=state)
+    return Text.of("own.runs_on", place=place.name, value=value)

@@ -11,6 +11,7 @@ from bridge.canopen.datatypes import INTEGERS
 from bridge.image import DataType
 from bridge.image.limits import shown_range
 from bridge.mapping.model import ProcessValue
+from bridge.text import Text
 
 _WORD_BITS: Final = 32
 _EXACT: Final = 1 << 53
@@ -75,9 +76,9 @@ def _is_known(value: float | None) -> bool:
     return value is not None and is_scale(value)
 
 
-def no_scale(parameter: str, value: float) -> str:
+def no_scale(parameter: str, value: float) -> Text:
     """Why nothing is made of words that ``parameter`` scales, where that has a value that is no scale."""
-    return f"{parameter} is {value:g} in the drive, which is no scale"
+    return Text.of("meaning.no_scale", parameter=parameter, value=value)
 
 
 def scale_of(value: ProcessValue, full: float | None = None, over: float | None = 1.0) -> LinearScale | None:

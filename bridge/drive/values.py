@@ -12,6 +12,7 @@ from bridge.drive.scaling import LinearScale, scale_of
 from bridge.image import DataType
 from bridge.image.limits import shown_range
 from bridge.mapping.model import Family, ProcessValue
+from bridge.text import Text
 
 _WORD_BITS: Final = 16
 _WORD_MASK: Final = 0xFFFF
@@ -64,10 +65,10 @@ class ValueCodec:
         return self.scale is None and self.model.scale is not None
 
     @property
-    def why_unknown(self) -> str:
+    def why_unknown(self) -> Text | str:
         if not self.is_unknown:
             return ""
-        return f"{' and '.join(self.model.scaled_by)} cannot be read and is not in the site file"
+        return Text.of("meaning.scale_unknown", parameters=tuple(self.model.scaled_by))
 
     @property
     def is_plain(self) -> bool:

@@ -11,6 +11,7 @@ from bridge.errands.errand import SdoErrands
 from bridge.node.boot import Action, BootError, BootResult, Nmt
 from bridge.node.boot.sdo_servers import open_sdo_servers
 from bridge.node.places.sdo_channels import FIRST, SdoChannels
+from bridge.text import render
 
 _Failure = SdoError | BootError
 
@@ -32,7 +33,7 @@ class OpenChannels(SdoErrands):
 
     @property
     def notes(self) -> list[str]:
-        return self._result.notes
+        return [render(note) for note in self._result.notes]
 
     def _do(self, step: Action, now: float) -> bool:
         if isinstance(step, Read | Write):

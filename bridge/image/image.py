@@ -139,7 +139,11 @@ class Image:
         self, index: int, value: Value, now: float, quality: Quality = Quality.GOOD, why: Text | str = ""
     ) -> None:
         """Store a value with its source time. Storing what is there already changes nothing."""
-        if self._values[index] == value and self._qualities[index] is quality and self._whys[index] == why:
+        if (
+            self._values[index] == value
+            and self._qualities[index] is quality
+            and (self._whys[index] is why or self._whys[index] == why)
+        ):
             return
         self._values[index] = value
         self._qualities[index] = quality

@@ -53,7 +53,7 @@ def check_outputs(bus: BusView, report: LintReport) -> None:
                 Text.of(
                     "check.outputs_stay" if stay else "check.outputs_may_stay",
                     node=name,
-                    why=Text.plain(own.reason),
+                    why=own.because,
                 ),
                 Text.of("check.outputs_stay_advice"),
             )

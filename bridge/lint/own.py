@@ -15,7 +15,7 @@ from bridge.lint.report import LintReport
 from bridge.lint.wire import busy_bits, wire_of
 from bridge.mapping.model import OwnSupervision
 from bridge.mapping.own_places import channels_needed, offline, place_of, settable, wanted
-from bridge.text import Text
+from bridge.text import Text, render
 from bridge.tomlfile import Key
 
 
@@ -47,7 +47,7 @@ class WorstCase:
         return {
             "controller_ms": self.stop.ms,
             "controller_terms": [asdict(term) for term in self.stop.terms],
-            "controller_unknown": self.stop.unknown,
+            "controller_unknown": render(self.stop.unknown),
             "controller_longest_ms": self.longest.ms if self.longest else self.stop.ms,
             "bridge_ms": self.own.bridge_ms,
             "bridge_terms": [{"name": name, "ms": ms} for name, ms in self.own.terms],
@@ -175,17 +175,17 @@ def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
 def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
     """Drives not known to stop when the bridge falls silent; drives of a node with the same reason share one
     warning."""
-    drives: dict[tuple[OwnVerdict, str], list[str]] = {}
+    drives: dict[tuple[OwnVerdict, Text | str], list[str]] = {}
     for drive in node.drives:
         own = judged(bus, node, drive)
         if _runs_on(own):
-            drives.setdefault((own.verdict, own.reason), []).append(drive.name)
+            drives.setdefault((own.verdict, own.because), []).append(drive.name)
     for (verdict, reason), names in drives.items():
         runs_on = verdict is OwnVerdict.RUNS_ON
         said = Text.of(
             "check.runs_on" if runs_on else "check.may_run_on",
             drives=", ".join(names),
-            why=Text.plain(reason),
+            why=reason,
         )
         report.warning(node.key, said, Text.of("check.runs_on_advice", what=_remedy(node, names)))
 

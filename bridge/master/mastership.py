@@ -20,7 +20,7 @@ class BusMastership:
         bus: BusTable,
         nodes: Sequence[NodeCore],
         plant: Plant,
-        forget: Callable[[float, str], None],
+        forget: Callable[[float, Text], None],
         listening: Listening | None,
     ) -> None:
         self._bus = bus
@@ -39,15 +39,18 @@ class BusMastership:
         return self._listening.is_passive
 
     @property
-    def why_not(self) -> str:
+    def why_not(self) -> Text | str:
         """Reason why nothing is sent; empty where this bridge acts."""
-        return "" if self.acts() else f"on {self._bus.name} the bridge {self._listening.part.value}"
+        if self.acts():
+            return ""
+        listens = self._listening.part is Part.LISTENING
+        return Text.of("bus.listens" if listens else "bus.leaves", bus=self._bus.name)
 
     def heard(self, sign: str, now: float) -> None:
         """``sign`` reveals another bridge. If this one gives way it sends nothing more, not even stops."""
         if not self._listening.heard(now):
             return
-        self._forget(now, f"another bridge is in charge of {self._bus.name}")
+        self._forget(now, Text.of("bus.other_in_charge", bus=self._bus.name))
         until_ms = self._listening.silence_s * 1000
         self._tell(Text.of("bus.gives_way", sign=Text.plain(sign), until_ms=until_ms), now)
         self._say_passive(now)
@@ -61,7 +64,7 @@ class BusMastership:
         self._tell(Text.of("bus.takes_over", silent_ms=silent_ms), now)
         for node in self._nodes:
             if not node.is_out_of_service:
-                node.say("waiting", now)
+                node.say(Text.of("node.waiting"), now)
             for one in node.node.commanded:
                 one.channel.on_bridge_gap(now)
                 one.refresh(now)
@@ -84,7 +87,7 @@ class BusMastership:
     def _say_passive(self, now: float) -> None:
         for node in self._nodes:
             if not node.is_out_of_service:
-                node.say(f"passive: another bridge is in charge of {self._bus.name}", now)
+                node.say(Text.of("node.passive", bus=self._bus.name), now)
 
     def _tell(self, said: Text, now: float) -> None:
         self._plant.report(Event(now, Kind.BUS, self._bus.name, 800, said))

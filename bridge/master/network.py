@@ -30,7 +30,7 @@ from bridge.master.startup import StartGate
 from bridge.master.watch import BusWatch
 from bridge.node import nmt_commands as node_commands
 from bridge.node.neighbours import Neighbour
-from bridge.node.node import NodeCore
+from bridge.node.node import BUS_IS_DOWN, NodeCore
 from bridge.node.wire import Handler
 from bridge.text import Text, render
 
@@ -249,10 +249,10 @@ class Network:
         self._gate.judge()
         return self._gate.may_start(node)
 
-    def stop_others(self, node: Neighbour, why: str, now: float) -> None:
+    def stop_others(self, node: Neighbour, why: Text, now: float) -> None:
         """A node is lost without which the others must not go on."""
         self._gate.stopped_by(node)
-        said = Text.of("bus.all_stopped", why=Text.plain(why))
+        said = Text.of("bus.all_stopped", why=why)
         self._plant.report(Event(now, Kind.BUS, self.bus.name, 800, said))
         each = self._takes_over(self.nodes)
         for other in self.nodes:
@@ -351,7 +351,7 @@ class Network:
                     self._plant.on_handed_over(one, now)
                     self._schedule.plan(node)
 
-    def _give_way(self, now: float, why: str) -> None:
+    def _give_way(self, now: float, why: Text) -> None:
         """Another bridge is in charge: nothing more is sent than what is owed."""
         self._forget_bus(now, why)
         self.say_farewell(now)
@@ -375,7 +375,7 @@ class Network:
         self._forget_bus(now)
         self._reach.on_bus(now, is_up=False)
 
-    def _forget_bus(self, now: float, why: str = "the bus is down") -> None:
+    def _forget_bus(self, now: float, why: Text = BUS_IS_DOWN) -> None:
         self._frames.clear()
         if self._window:
             self._window.reset()

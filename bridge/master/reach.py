@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
 from bridge.canopen import nmt
 from bridge.command import Drive
 from bridge.command.outputs import Outputs
 from bridge.master.farewell import Farewell
 from bridge.master.mastership import BusMastership
-from bridge.node.node import NodeCore
-
-_BUS_IS_DOWN: Final = "the bus is down"
+from bridge.node.node import BUS_IS_DOWN, NodeCore
+from bridge.text import Text
 
 
 class Reach:
@@ -40,26 +38,30 @@ class Reach:
             for one in node.node.commanded:
                 one.channel.on_sending(why or _why_left_out(node, one), now)
 
-    def _why_not(self, node: NodeCore) -> str:
+    def _why_not(self, node: NodeCore) -> Text | str:
         """Why no words go to this node; empty where they do."""
         if not self._is_up:
-            return _BUS_IS_DOWN
+            return BUS_IS_DOWN
         if not self._mastership.acts() and node not in self._farewell.awaiting:
             return self._mastership.why_not
         if node.sends_process_data:
             return ""
-        sent = "no words are sent to it"
         if node.is_held and node.told is not None:
-            sent = f"NMT {nmt.command_name(node.told)} was sent to it, and no words are"
-        return f"the drive's node is {node.state.value}; {sent}"
+            command, state = nmt.command_name(node.told), Text.word("node_state", node.state.value)
+            return Text.of("unsent.told", state=state, command=command)
+        return _no_words(node)
 
 
-def _why_left_out(node: NodeCore, one: Drive | Outputs) -> str:
+def _why_left_out(node: NodeCore, one: Drive | Outputs) -> Text | str:
     """Why nothing is sent to this one though its node gets words; empty where it is."""
     if isinstance(one, Outputs):
-        return "" if node.wire.outputs else _unbooted(node) or "no RPDO of the node carries its outputs"
+        return "" if node.wire.outputs else _unbooted(node) or Text.of("unsent.no_rpdo")
     return "" if one.name in node.wire.drives else _unbooted(node) or node.wire.why_left_out(one)
 
 
-def _unbooted(node: NodeCore) -> str:
-    return "" if node.is_operational else f"the drive's node is {node.state.value}; no words are sent to it"
+def _unbooted(node: NodeCore) -> Text | str:
+    return "" if node.is_operational else _no_words(node)
+
+
+def _no_words(node: NodeCore) -> Text:
+    return Text.of("unsent.no_words", state=Text.word("node_state", node.state.value))

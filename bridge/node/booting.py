@@ -6,12 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from bridge.base.sdo_texts import text_of
 from bridge.canopen.dialogue import Dialogue, ask
 from bridge.canopen.nmt import NmtState
 from bridge.canopen.sdo import Priority, Result, SdoError
 from bridge.node import boot
 from bridge.node.error_control import ErrorControl
 from bridge.node.places.sdo_channels import SdoChannels
+from bridge.text import Text
 
 _Dialogue = Dialogue[boot.Action, bytes | None, boot.BootResult, SdoError | boot.BootError]
 
@@ -47,7 +49,7 @@ class Booting:
         self._awaited: _Awaited | None = None
         self._goes_on_at: float | None = None
         self._answers: list[Result] = []
-        self._step = boot.Step("", "B")
+        self._step = boot.Step(Text.of("boot_step.look"), "B")
         self.is_held = False
 
     @property
@@ -90,12 +92,12 @@ class Booting:
         if self._awaited and now >= self._awaited.deadline:
             awaited, self._awaited = self._awaited, None
             if awaited.state is None:
-                error = boot.BootError(
-                    self._step.letter, f"nothing was heard while {self._step.text}{_needed(self._step)}"
-                )
+                what = Text.of("boot.nothing_heard", step=self._step.what)
+                error = boot.BootError(self._step.letter, _needed(what, self._step))
             else:
                 wants, stays = awaited.state.words, state.words
-                error = boot.BootError("J", f"the node stays {stays}, expected {wants}", absent=False)
+                what = Text.of("boot.stays", state=stays, wanted=wants)
+                error = boot.BootError("J", what, absent=False)
             self._go_on(error, now)
 
     def next_deadline(self) -> float | None:
@@ -140,11 +142,11 @@ class Booting:
 
 def _failure(error: SdoError, step: boot.Step) -> boot.BootError:
     """What the boot-up ends with. Silence says nothing about what was asked for."""
-    needed = _needed(step)
     if error.was_answered or step.letter == "B":
-        return boot.BootError(step.letter, f"{error}{needed}", absent=not error.was_answered)
-    return boot.BootError(step.letter, f"the node does not answer: {error}{needed}", absent=True)
+        return boot.BootError(step.letter, _needed(text_of(error), step), absent=not error.was_answered)
+    what = Text.of("boot.no_answer", why=text_of(error))
+    return boot.BootError(step.letter, _needed(what, step), absent=True)
 
 
-def _needed(step: boot.Step) -> str:
-    return f"; needed by {step.needed_by}" if step.needed_by else ""
+def _needed(what: Text, step: boot.Step) -> Text:
+    return Text.of("boot.needed", what=what, rule=step.needed_by) if step.needed_by else what

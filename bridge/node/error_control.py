@@ -16,6 +16,7 @@ from bridge.canopen.nmt import NmtState
 from bridge.config import NodeTable
 from bridge.node.boot.status import HINTS
 from bridge.node.bootloop import BootLoop
+from bridge.text import Text
 
 
 class Sign(Enum):
@@ -45,14 +46,15 @@ class ErrorControl:
             self._supervisor = NodeGuard(table.id, table.supervision_ms / 1000, table.life_time_factor)
 
     @property
-    def loss(self) -> str:
+    def loss(self) -> Text:
         """How a loss is called: error status E or F of CiA 302-2."""
         if self._table.supervision != "guarding":
-            return f"E: lost: no heartbeat for {self._table.supervision_ms} ms: {HINTS['E']}"
+            what = Text.of("node.no_heartbeat", ms=self._table.supervision_ms)
+            return Text.of("boot.failed_advised", letter="E", what=what, hint=HINTS["E"])
         wrong = self.toggle_errors - self._toggle_errors_before
         if wrong:
-            return f"F: lost: no correct answer to node guarding, {wrong} with the wrong toggle bit"
-        return f"F: lost: no answer to node guarding: {HINTS['E']}"
+            return Text.of("boot.failed", letter="F", what=Text.of("node.wrong_answers", count=wrong))
+        return Text.of("boot.failed_advised", letter="F", what=Text.of("node.no_answer"), hint=HINTS["E"])
 
     @property
     def toggle_errors(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from bridge.config import NodeTable
+from bridge.text import Text
 
 
 class Neighbour(Protocol):
@@ -47,7 +48,7 @@ class Neighbours(Protocol):
 
     def may_start(self, node: Neighbour) -> bool: ...
 
-    def stop_others(self, node: Neighbour, why: str, now: float) -> None: ...
+    def stop_others(self, node: Neighbour, why: Text, now: float) -> None: ...
 
     def duplicate(self, node: Neighbour, sign: str, now: float) -> None: ...
 

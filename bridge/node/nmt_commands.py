@@ -45,7 +45,7 @@ class CommandedNode(Protocol):
 
     def boot_next(self, at: float | None) -> None: ...
 
-    def say(self, text: str, now: float) -> None: ...
+    def say(self, said: Text, now: float) -> None: ...
 
     def set_state(self, state: NodeState, now: float) -> None: ...
 
@@ -54,7 +54,7 @@ class CommandedNode(Protocol):
     def was_told(self, command: NmtCommand) -> None: ...
 
     def carry_out_command(
-        self, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+        self, action: Action, who: Text | str, now: float, *, send: bool = True, at_once: bool = False
     ) -> None: ...
 
 
@@ -106,7 +106,13 @@ def refusal(request: Request, commanded: Sequence[Drive | Outputs]) -> Text | No
 
 
 def carry_out(
-    node: CommandedNode, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+    node: CommandedNode,
+    action: Action,
+    who: Text | str,
+    now: float,
+    *,
+    send: bool = True,
+    at_once: bool = False,
 ) -> None:
     """Do what ``action`` asks of a node. ``send`` is false where one frame tells all nodes; ``at_once``: its
     drives have had their stopped words for long."""
@@ -115,16 +121,16 @@ def carry_out(
     elif action is Action.DISABLE:
         node.leave_operation(now)
         node.boot_next(None)
-        node.say("switched off by an operator", now)
+        node.say(Text.of("node.switched_off"), now)
         node.set_state(NodeState.DISABLED, now)
     elif action is Action.ENABLE and node.state is NodeState.DISABLED:
-        node.say("waiting", now)
+        node.say(Text.of("node.waiting"), now)
         node.set_state(NodeState.ABSENT, now)
         node.boot_next(now)
 
 
 def _nmt(
-    node: CommandedNode, command: NmtCommand, who: str, now: float, *, send: bool, at_once: bool
+    node: CommandedNode, command: NmtCommand, who: Text | str, now: float, *, send: bool, at_once: bool
 ) -> None:
     """NMT on a node that is switched off goes on the bus and changes nothing here."""
     if command is NmtCommand.START and node.state is not NodeState.OPERATIONAL:
@@ -153,6 +159,6 @@ def _nmt(
         node.boot_next(now + _AFTER_RESET_S)
     else:
         node.boot_next(None)
-        verb = "stopped" if command is NmtCommand.STOP else "set to pre-operational"
-        node.say(f"{verb} by {who}", now)
+        stops, by = command is NmtCommand.STOP, Text.plain(who)
+        node.say(Text.of("node.stopped_by" if stops else "node.pre_operational_by", who=by), now)
         node.set_state(NodeState.STOPPED, now)

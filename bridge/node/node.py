@@ -24,10 +24,14 @@ from bridge.node.process.stop_words import StopWords
 from bridge.node.put_off import CANCELS_WORDS
 from bridge.node.view import NodeView
 from bridge.node.wire import Listener, NodeWire
+from bridge.text import Text
 
 _SETTLE_S: Final = 2.0
 _OWN_RESET_S: Final = 30.0
 """A boot-up message within this time is the answer to our own reset."""
+
+
+BUS_IS_DOWN: Final = Text.of("bus.is_down")
 
 
 class NodeCore:
@@ -74,7 +78,7 @@ class NodeCore:
         if not table.enabled:
             self.boot_at = None
             self.set_state(NodeState.DISABLED, plant.began)
-        self.say("waiting", plant.began)
+        self.say(Text.of("node.waiting"), plant.began)
         self._show(plant.began)
 
     def _on_sign(self, sign: Sign, now: float) -> None:
@@ -119,7 +123,7 @@ class NodeCore:
         self.leave_operation(now)
         self.stop_drives(now)
         if pause_s:
-            self.say(f"starts again and again; asked again in {pause_s:g} s", now)
+            self.say(Text.of("node.loops", pause_s=pause_s), now)
         self.set_state(NodeState.LOST if pause_s else NodeState.BOOTING, now)
         self.boot_at = max(now + pause_s, self._last_boot + BETWEEN_BOOTS_S)
         self._back_off.reset()
@@ -134,7 +138,7 @@ class NodeCore:
             and seen is not NmtState.OPERATIONAL
             and now > self._operational_since + _SETTLE_S
         ):
-            self._lose(f"lost: the node went {seen.words} by itself", now)
+            self._lose(Text.of("node.went", state=seen.words), now)
             self.error_control.assume(seen)
             self._show(now)
             if self.boot_at is not None:
@@ -147,7 +151,7 @@ class NodeCore:
             return
         if reaction == "nothing" and self.wire.pdos and self.error_control.state is NmtState.OPERATIONAL:
             self.node.on_heard_again()
-            self._enter_operation("ok; heard again", now)
+            self._enter_operation(Text.of("node.heard_again"), now)
         elif reaction != "stop_node":
             self.boot_at = self._soon(now)
 
@@ -246,11 +250,11 @@ class NodeCore:
             case boot.Step():
                 # Looking for a node that was never there is nothing to report every ten seconds.
                 if self.state is not NodeState.ABSENT:
-                    self.say(str(action), now)
+                    self.say(action.said, now)
             case boot.Signal.FOUND:
                 self.set_state(NodeState.BOOTING, now)
             case boot.DeviceErrors():
-                self._view.errors(action.text, now)
+                self._view.errors(action.said, now)
             case boot.Signal.START_SUPERVISION:
                 self.error_control.expect(now)
             case _:
@@ -267,10 +271,14 @@ class NodeCore:
         if self._view.identified(result.identification, now):
             self.wire.sdo.forget_block()
         self.wire.connect(result, now)
-        problems = [f"J: {name}" for name, plan in result.drives.items() if plan.problem]
-        self._enter_operation("; ".join([", ".join(problems) or "ok", *result.notes]), now)
+        out = [name for name, plan in result.drives.items() if plan.problem]
+        left_out = tuple(Text.of("boot.failed", letter="J", what=name) for name in out)
+        said = Text.of("boot.left_out", drives=left_out) if left_out else Text.of("boot.ok")
+        if result.notes:
+            said = Text.of("boot.noted", outcome=said, notes=tuple(result.notes))
+        self._enter_operation(said, now)
 
-    def _enter_operation(self, text: str, now: float) -> None:
+    def _enter_operation(self, said: Text, now: float) -> None:
         self.told = None
         self._operational_since = now
         self._back_off.entered_operation(now)
@@ -284,13 +292,14 @@ class NodeCore:
             if not self.wire.carries(one):
                 one.channel.on_node(NodeState.CONFIG_ERROR, now)
                 one.refresh(now)
-        self._view.succeeded(text, now)
+        self._view.succeeded(said, now)
 
     def _fail_boot(self, error: boot.BootError, now: float) -> None:
         self.error_control.stop(now)
-        habits = "; ".join(self.wire.habits.said())
+        habits = self.wire.habits.said()
         if habits and error.absent:
-            error = boot.BootError(error.letter, error.detail, absent=True, hint=habits)
+            hint = Text.of("boot.habits", habits=tuple(map(Text.plain, habits)))
+            error = boot.BootError(error.letter, error.what, absent=True, hint=hint)
         self._view.failed(error, now)
         if self.state is NodeState.BOOTING:
             self.set_state(NodeState.LOST if error.absent else NodeState.CONFIG_ERROR, now)
@@ -309,7 +318,7 @@ class NodeCore:
         else:
             self.leaving.send(NmtCommand.STOP, now)
 
-    def enforce(self, action: Action, why: str, now: float) -> None:
+    def enforce(self, action: Action, why: Text | str, now: float) -> None:
         """Because somebody ignores a stop whose words have been on the bus for long."""
         self.carry_out_command(action, why, now, at_once=self.leaving.has_told(now))
 
@@ -320,7 +329,7 @@ class NodeCore:
 
     # states
 
-    def _lose(self, why: str, now: float) -> None:
+    def _lose(self, why: Text, now: float) -> None:
         """The node is silent, or not in the state it was put in."""
         self.error_control.assume(NmtState.UNKNOWN)
         if not self.is_operational and not self.booting.is_held:
@@ -345,7 +354,7 @@ class NodeCore:
         elif reaction != "nothing":
             self.boot_at = now + pause_s
         if stops_all:
-            self._neighbours.stop_others(self, f"{self.node.name} is lost", now)
+            self._neighbours.stop_others(self, Text.of("node.is_lost", node=self.node.name), now)
 
     def stop_drives(self, now: float) -> None:
         """Every drive of the node has to be enabled anew, and its outputs be written anew."""
@@ -357,7 +366,7 @@ class NodeCore:
         self.wire.stop_polling()
         self.booting.cancel(now)
 
-    def hold(self, why: str, now: float) -> None:
+    def hold(self, why: Text, now: float) -> None:
         """All nodes are stopped: leave operation, and be booted up to the point where it would start.
 
         Whoever is in operation or at its boot-up begins again, and so does a node that cannot be used: it
@@ -369,13 +378,13 @@ class NodeCore:
             self.wire.send_stopped()
             self.leaving.silence(now)
             self.leave_operation(now)
-            self.say(f"stopped: {why}", now)
+            self.say(Text.of("node.stopped_because", why=why), now)
         if self.is_operational:
             self.set_state(NodeState.BOOTING, now)
         if begins_again or self.state is NodeState.CONFIG_ERROR:
             self.boot_at = now + BETWEEN_BOOTS_S
 
-    def bus_is_gone(self, now: float, why: str = "the bus is down") -> None:
+    def bus_is_gone(self, now: float, why: Text = BUS_IS_DOWN) -> None:
         """The bus is down, or another's: everything on it is lost at once."""
         self.error_control.assume(NmtState.UNKNOWN)
         self.stop_drives(now)
@@ -384,7 +393,7 @@ class NodeCore:
             # Who was stopped on purpose is not started by a bus that comes back.
             return
         if self.state is not NodeState.ABSENT:
-            self.say(f"lost: {why}", now)
+            self.say(Text.of("node.lost_because", why=why), now)
             self.set_state(NodeState.LOST, now)
         self.leave_operation(now)
         self.has_concluded = False
@@ -423,8 +432,8 @@ class NodeCore:
         states = (NodeState.OPERATIONAL, NodeState.LOST, NodeState.DISABLED)
         return self.leaving.is_due or self.state in states
 
-    def say(self, text: str, now: float) -> None:
-        self._view.say(text, now)
+    def say(self, said: Text, now: float) -> None:
+        self._view.say(said, now)
 
     def _show(self, now: float) -> None:
         self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
@@ -437,7 +446,7 @@ class NodeCore:
         return ledger.count((owner, address), name, cycles, self._last_boot)
 
     def carry_out_command(
-        self, action: Action, who: str, now: float, *, send: bool = True, at_once: bool = False
+        self, action: Action, who: Text | str, now: float, *, send: bool = True, at_once: bool = False
     ) -> None:
         """A command that may be given; ``send`` is false where one frame has told all nodes."""
         self.error_control.forget_boots()

@@ -9,11 +9,13 @@ from __future__ import annotations
 from functools import partial
 from typing import Final
 
-from bridge.canopen import abort, width
+from bridge.base.sdo_texts import text_of_abort
+from bridge.canopen import width
 from bridge.canopen.sdo import Result, SdoError
 from bridge.command.outputs import Outputs
 from bridge.command.stop_check.outputs import Answer, Question, StoppedOutput
 from bridge.node.places.sdo_channels import FIRST, SdoChannels
+from bridge.text import Text
 
 _EXPEDITED: Final = 4
 """Some servers answer every read of a number with so many bytes. Any other length is another object."""
@@ -44,14 +46,13 @@ class ReadBack:
 def _answer(output: StoppedOutput, result: Result) -> Answer:
     if isinstance(result, SdoError):
         if result.by_server:
-            why = f"{abort.text(result.code)} ({result.code:08X}h)"
-            return Answer(None, f"the node does not let {output.place} be read: {why}")
-        return Answer(None, f"{output.place} cannot be read: no valid answer", was_silent=True)
+            why = text_of_abort(result.code)
+            return Answer(None, Text.of("outputs.not_let", output=output.place, why=why, code=result.code))
+        return Answer(None, Text.of("outputs.no_answer", output=output.place), was_silent=True)
     size = -(-output.size // 8)
     raw = width.unsigned(result, size)
     is_of_length = len(result) == size or len(result) == _EXPEDITED > size
     if not is_of_length or width.surplus(result, size) or (output.size > 1 and raw >> output.size):
-        return Answer(
-            None, f"{output.place} cannot be read: {len(result)} bytes where {output.size} bits belong"
-        )
+        said = Text.of("outputs.odd_answer", output=output.place, length=len(result), bits=output.size)
+        return Answer(None, said)
     return Answer(min(raw, 1) if output.size == 1 else raw)

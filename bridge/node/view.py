@@ -19,47 +19,55 @@ class NodeView:
         self._node = node
         self._plant = plant
         self._top = f"{node.name}/node"
-        self._failure: tuple[str, str] | None = None
-        self._success = ""
-        self._errors = ""
+        self._failure: tuple[str, Text] | None = None
+        self._success: Text | str = ""
+        self._errors: Text | str = ""
         self._identification: Identification | None = None
 
-    def say(self, text: str, now: float) -> None:
+    def say(self, said: Text, now: float) -> None:
         """Step or result of the boot-up."""
-        self._plant.set(f"{self._top}/boot_status", text, now)
+        self._plant.say(f"{self._top}/boot_status", said, now)
 
     def show(self, nmt_state: NmtState, state: NodeState, toggle_errors: int, now: float) -> None:
         self._plant.set(f"{self._top}/nmt_state", int(nmt_state), now)
-        text = f"{self._node.table.supervision}: {state.value}"
-        if toggle_errors:
-            text += f", {toggle_errors} wrong toggle bit{'s' if toggle_errors > 1 else ''}"
-        self._plant.set(f"{self._top}/supervision_state", text, now)
+        self._plant.say(f"{self._top}/supervision_state", self._supervision(state, toggle_errors), now)
 
-    def succeeded(self, text: str, now: float) -> None:
-        self._failure, self._success = None, text
-        self.say(text, now)
+    def _supervision(self, state: NodeState, toggle_errors: int) -> Text:
+        kind, shown = (
+            Text.word("supervision", self._node.table.supervision),
+            Text.word("node_state", state.value),
+        )
+        if not toggle_errors:
+            return Text.of("node.supervised", supervision=kind, state=shown)
+        if toggle_errors == 1:
+            return Text.of("node.supervised_one_toggle", supervision=kind, state=shown)
+        return Text.of("node.supervised_toggles", supervision=kind, state=shown, count=toggle_errors)
+
+    def succeeded(self, said: Text, now: float) -> None:
+        self._failure, self._success = None, said
+        self.say(said, now)
 
     def failed(self, error: BootError, now: float) -> None:
         """The boot-up has failed; each way of failing is an event once until it succeeds."""
-        self.say(str(error), now)
-        failure = error.letter, error.detail
+        self.say(error.said, now)
+        failure = error.letter, error.what
         if self._failure != failure:
             self._failure = failure
-            said = Text.of("node.boot_failed", error=Text.plain(str(error)))
+            said = Text.of("node.boot_failed", error=error.said)
             self._tell(Kind.CONFIGURATION, 600, said, now)
 
-    def errors(self, text: str, now: float) -> None:
+    def errors(self, said: Text | str, now: float) -> None:
         """What the node says of its errors, empty where it has none; an event when it is something else."""
-        self._plant.set(f"{self._top}/device_errors", text, now)
-        if text and text != self._errors:
-            self._tell(Kind.EMERGENCY, 300, Text.of("node.says", errors=Text.plain(text)), now)
-        self._errors = text
+        self._plant.say(f"{self._top}/device_errors", said, now)
+        if said and said != self._errors:
+            self._tell(Kind.EMERGENCY, 300, Text.of("node.says", errors=said), now)
+        self._errors = said
 
     def shows_habits(self, news: Sequence[str], habits: Sequence[str], now: float) -> None:
         """``news`` are habits of the node in operation that are to be told, ``habits`` all of them."""
-        for text in news:
-            self._tell(Kind.CONFIGURATION, 300, Text.plain(text), now)
-        self.say("; ".join([self._success, *habits]), now)
+        for said in news:
+            self._tell(Kind.CONFIGURATION, 300, Text.plain(said), now)
+        self.say(Text.of("boot.noted", outcome=self._success, notes=tuple(map(Text.plain, habits))), now)
 
     def identified(self, found: Identification, now: float) -> bool:
         """Who the node is, by a boot-up that has succeeded. True where that is somebody else than before,
@@ -72,8 +80,8 @@ class NodeView:
             self._tell(Kind.CONFIGURATION, 600, Text.of("node.other_device", changes=changes), now)
         return bool(changes)
 
-    def resets(self, why: str, now: float) -> None:
-        said = Text.of("node.reset_communication", why=Text.plain(why))
+    def resets(self, why: Text, now: float) -> None:
+        said = Text.of("node.reset_communication", why=why)
         self._tell(Kind.CONFIGURATION, 500, said, now)
 
     def restarted(self, now: float) -> None:

@@ -72,7 +72,7 @@ class NodeWire:
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
         self.drives: dict[str, DrivePdos] = {}
-        self._left_out: dict[str, str] = {}
+        self._left_out: dict[str, Text | str] = {}
         self.outputs: OutputPdos | None = None
         self._emcy_id: int | None = cobid.EMCY + node.table.id
         self.routes: dict[int, Handler] = self._basic_routes()
@@ -101,10 +101,10 @@ class NodeWire:
         """By which the node is commanded."""
         return [self.outputs] if self.outputs else [*self.drives.values()]
 
-    def why_left_out(self, drive: Drive) -> str:
+    def why_left_out(self, drive: Drive) -> Text:
         """Why the boot-up has found no PDOs by which this drive can be commanded."""
         why = self._left_out.get(drive.name, "")
-        return f"no PDOs of the drive can be used: {why}" if why else "no PDOs of the drive can be used"
+        return Text.of("unsent.no_pdos_because", why=why) if why else Text.of("unsent.no_pdos")
 
     def take_routes(self) -> dict[int, Handler]:
         """Who gets which identifier; no news any more until it changes."""
@@ -267,7 +267,7 @@ class NodeWire:
         wanted = result.emcy_id
         if wanted in (None, default) or not self._listener.is_taken(wanted):
             return wanted
-        result.notes.append(f"another node has {wanted:03X}h, too: emergency messages are not taken there")
+        result.notes.append(Text.of("boot.emergency_id_taken", id=f"{wanted:03X}h"))
         return default
 
     def refresh(self, now: float) -> None:

@@ -19,7 +19,7 @@ class Text:
     facts: tuple[tuple[str, Fact], ...] = ()
 
     @classmethod
-    def of(cls, code: str, **facts: Fact) -> Text:
+    def of(cls, code: str, /, **facts: Fact) -> Text:
         """The text with this code, which is written out in the source: a test compares it and the names of
         its facts with the templates."""
         return cls(code, tuple(facts.items()))

@@ -14,6 +14,7 @@ from typing import Any, Final, TypeVar, cast
 from pydantic import BaseModel, ValidationError
 
 from bridge.base.errors import Fault, FileFaults
+from bridge.text import Text
 from bridge.tomlfile.lines import Key, key_lines
 from bridge.tomlfile.messages import explain
 
@@ -107,9 +108,9 @@ class TomlFile:
                 return line
         return 0
 
-    def fault(self, key: Sequence[int | str], message: str, hint: str = "") -> None:
+    def fault(self, key: Sequence[int | str], said: Text | str, hint: Text | str = "") -> None:
         """Note a fault; ``finish`` raises them all."""
-        self.faults.append(Fault(str(self.path), self.line(key), dotted(key), message, hint))
+        self.faults.append(Fault(str(self.path), self.line(key), dotted(key), said, hint))
 
     def validate(self, model: type[Model]) -> Model | None:
         """The file's content as ``model``, or None with every fault noted."""

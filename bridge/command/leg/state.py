@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from bridge.command.messages.request import Identity
 from bridge.drive import DriveState
+from bridge.text import Text
 
 
 class WatchdogState(IntEnum):
@@ -201,10 +202,10 @@ class Way(NamedTuple):
     the bus at all, empty where they are."""
 
     is_open: bool
-    why: str
-    why_unplaced: str = ""
+    why: Text | str
+    why_unplaced: Text | str = ""
     is_heard: bool = False
-    why_unsent: str = ""
+    why_unsent: Text | str = ""
 
 
 class LegState(NamedTuple):

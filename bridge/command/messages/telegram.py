@@ -76,7 +76,7 @@ class TelegramDecoder:
         family: Family,
         slot: Slot,
         meanings: Meanings,
-        unserved: Mapping[str, str],
+        unserved: Mapping[str, Text],
         reported: Callable[[], int | None] = lambda: None,
     ) -> None:
         self._name = name
@@ -208,8 +208,8 @@ class TelegramDecoder:
         return tuple(kept)
 
 
-def _not_configured(leaf: str, why: str) -> Refusal:
-    said = Text.of("telegram.not_configured", leaf=leaf, why=Text.plain(why))
+def _not_configured(leaf: str, why: Text | str) -> Refusal:
+    said = Text.of("telegram.not_configured", leaf=leaf, why=why)
     return Refusal(Code.NOT_CONFIGURED, said)
 
 

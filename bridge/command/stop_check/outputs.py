@@ -24,11 +24,12 @@ from typing import Final
 
 from bridge.command.stop_check.state import LastStop, Verdict
 from bridge.mapping.fields import ObjectRef
+from bridge.text import Text
 
 _AGAIN_S: Final = 1.0
 """Pause before what was ignored, or has not been answered, is read again."""
-_UNREAD: Final = "its outputs have not been read back yet"
-_AWAY: Final = "the node left operation before its outputs were read back"
+_UNREAD: Final = Text.of("outputs.unread")
+_AWAY: Final = Text.of("outputs.away")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +67,7 @@ class Answer:
     said so, or because it was silent."""
 
     raw: int | None
-    why: str = ""
+    why: Text | str = ""
     was_silent: bool = False
 
 
@@ -76,7 +77,7 @@ class _Seen:
 
     raw: int | None = None
     at: float = -inf
-    why: str = ""
+    why: Text | str = ""
 
 
 class OutputStopCheck:
@@ -88,7 +89,7 @@ class OutputStopCheck:
     def __init__(self) -> None:
         self.last_stop = LastStop.NONE
         self.follows = True
-        self.why = ""
+        self.why: Text | str = ""
         self.awaits_sending = False
         """Another stop is to be sent, and has not been handed to the bus yet."""
         self.is_owed = False
@@ -260,7 +261,9 @@ class OutputStopCheck:
         if unseen is not None:
             if self.last_stop is LastStop.FORWARDED:
                 one, seen = unseen
-                self.why = seen.why or (f"no {one.told_by} from the node" if one.told_by else _UNREAD)
+                self.why = seen.why or (
+                    Text.of("quality.no_pdo_of_node", pdo=one.told_by) if one.told_by else _UNREAD
+                )
             return
         since = min((seen.at for seen in self._seen), default=at)
         # Not at once: another master's frames and ours may alternate.
@@ -303,5 +306,6 @@ class OutputStopCheck:
         return self._verdicts[0].at if self._verdicts else None
 
 
-def _held(one: StoppedOutput, raw: int) -> str:
-    return f"{one.place} ({one.name}) holds {one.shown(raw)} instead of {one.shown(one.raw)}"
+def _held(one: StoppedOutput, raw: int) -> Text:
+    held, want = one.shown(raw), one.shown(one.raw)
+    return Text.of("outputs.held", object=one.place, output=one.name, held=held, want=want)

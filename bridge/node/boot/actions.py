@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
+from bridge.base.sdo_texts import text_of
 from bridge.canopen import width
 from bridge.canopen.dialogue import Read, Write
 from bridge.canopen.nmt import NmtCommand, NmtState
@@ -18,6 +19,7 @@ from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_plan import PdoPlan
 from bridge.node.boot.status import BootError
+from bridge.text import Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +30,16 @@ class Step:
     a node that answers it wrongly or not at all is used all the same.
     """
 
-    text: str
+    what: Text
     letter: str
     needed_by: str = ""
 
-    def __str__(self) -> str:
-        return f"{self.text} (needed by {self.needed_by})" if self.needed_by else self.text
+    @property
+    def said(self) -> Text:
+        """What it does, and who needs that."""
+        if not self.needed_by:
+            return self.what
+        return Text.of("boot_step.needed", step=self.what, rule=self.needed_by)
 
 
 class Signal(Enum):
@@ -78,7 +84,7 @@ class DeviceErrors:
 
     register: int = 0
     codes: tuple[int, ...] = ()
-    text: str = ""
+    said: Text | str = ""
 
     @property
     def cause(self) -> tuple[int, int]:
@@ -90,7 +96,7 @@ class DeviceErrors:
 class ResetCommunication:
     """NMT reset communication, because of ``why``, after a stopped word for every drive."""
 
-    why: str
+    why: Text
 
 
 Action = Step | Signal | Read | Write | Nmt | Pause | DeviceErrors | ResetCommunication | Await
@@ -113,10 +119,10 @@ class DrivePlan:
 
     rpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
     tpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
-    problem: str = ""
-    unserved: dict[str, str] = field(default_factory=dict[str, str])
+    problem: Text | str = ""
+    unserved: dict[str, Text] = field(default_factory=dict[str, Text])
 
-    def leave_out(self, why: str) -> None:
+    def leave_out(self, why: Text) -> None:
         """It cannot be served; the first reason counts."""
         self.problem = self.problem or why
 
@@ -127,7 +133,10 @@ class SignalPlan:
     output that none of them carries."""
 
     pdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
-    unserved: dict[ObjectRef, str] = field(default_factory=dict[ObjectRef, str])
+    unserved: dict[ObjectRef, Text] = field(default_factory=dict[ObjectRef, Text])
+
+
+UNREADABLE: Final = Text.of("meaning.cannot_be_read")
 
 
 @dataclass(slots=True)
@@ -137,7 +146,7 @@ class WordFacts:
 
     parameters: dict[Key, float | None] = field(default_factory=dict[Key, float | None])
     codes: dict[str, list[int | None]] = field(default_factory=dict[str, list[int | None]])
-    why_unread: str = "cannot be read"
+    why_unread: Text = UNREADABLE
 
 
 @dataclass(slots=True)
@@ -151,10 +160,10 @@ class BootResult:
     outputs: SignalPlan | None = None
     held: dict[str, int] = field(default_factory=dict[str, int])
     """What outputs hold that are to hold it, as integers without sign, by their names."""
-    bridge_stop: tuple[int, str] = (0, "")
+    bridge_stop: tuple[int, Text | str] = (0, "")
     """Longest time in ms from the bridge's hang to outputs that the node itself has made safe; 0 with the
     reason where there is none."""
-    notes: list[str] = field(default_factory=list[str])
+    notes: list[Text] = field(default_factory=list[Text])
     silences: int = 0
     """Objects that nothing needs and that were not answered."""
     emcy_id: int | None = None
@@ -198,7 +207,7 @@ def number(data: bytes | None, default: int = 0, *, size: int = U32) -> int:
     if data is None:
         return default
     if len(data) > width.LONGEST:
-        raise BootError("J", f"the node answers with {len(data)} bytes where a number belongs")
+        raise BootError("J", Text.of("boot.no_number", length=len(data)))
     return width.unsigned(data, size)
 
 
@@ -230,7 +239,7 @@ def go_on_without(error: SdoError, result: BootResult) -> None:
         result.silences += 1
         if result.silences > _MOST_SILENCES:
             raise error
-    result.notes.append(f"cannot be read, and is not needed: {error}")
+    result.notes.append(Text.of("boot.not_needed", why=text_of(error)))
 
 
 def write_number(

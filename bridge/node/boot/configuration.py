@@ -11,15 +11,17 @@ import zlib
 from collections.abc import Generator, Sequence
 from typing import Final
 
+from bridge.base.sdo_texts import text_of
 from bridge.canopen.datatypes import INTEGERS, NUMBERS
 from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.sdo import SdoError
 from bridge.canopen.width import holds
 from bridge.config.download import Download
 from bridge.node.boot.actions import Action, BootResult, Do, Step, number, told_as, write_number
-from bridge.node.boot.memory import NOT_AGAIN, BootMemory
+from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_downloads import download_pdo, is_pdo, pdo_parameter
 from bridge.node.boot.status import BootError
+from bridge.text import Text
 
 _VERIFY: Final = 0x1020
 _STORE: Final = 0x1010
@@ -55,18 +57,19 @@ def configure(downloads: Sequence[Download], *, store: bool, result: BootResult)
     wanted = [download for download in downloads if download.index != _VERIFY]
     if not wanted:
         return
-    yield Step("comparing the configuration", "J", needed_by="configure")
+    yield Step(Text.of("boot_step.compare"), "J", needed_by="configure")
     stamp = configuration_stamp(downloads)
     days = yield from optional(_VERIFY, 1)
     has_stamp = days is not None
     is_stored = not (store and memory.unsaved)
     if is_stored and has_stamp and (number(days), number((yield from optional(_VERIFY, 2)))) == stamp:
-        result.notes.append("the node has this configuration already (1020h)")
+        result.notes.append(Text.of("boot.has_configuration"))
         return
     written = 0
     parts = _parts(wanted)
     for place, part in enumerate(parts, 1):
-        yield Step(f"downloading the configuration, {place} of {len(parts)}", "J", needed_by="configure")
+        what = Text.of("boot_step.download", place=place, count=len(parts))
+        yield Step(what, "J", needed_by="configure")
         if is_pdo(part[0].index):
             written += yield from download_pdo(part, memory)
         else:
@@ -77,7 +80,7 @@ def configure(downloads: Sequence[Download], *, store: bool, result: BootResult)
     if store and (memory.unsaved or has_stamp):
         yield from _store(memory, has_stamp=has_stamp)
     if written:
-        result.notes.append(f"{written} of {len(wanted)} objects of the configuration were written")
+        result.notes.append(Text.of("boot.configured", written=written, count=len(wanted)))
 
 
 def _store(memory: BootMemory, *, has_stamp: bool) -> Do:
@@ -86,9 +89,9 @@ def _store(memory: BootMemory, *, has_stamp: bool) -> Do:
 
     A node that takes "save" without an answer may have stored all the same: it is not asked for ever.
     """
-    yield Step("storing the configuration", "J", needed_by="configuration_store")
+    yield Step(Text.of("boot_step.store"), "J", needed_by="configuration_store")
     if memory.unanswered_stores >= _UNANSWERED_STORES:
-        raise BootError("J", f"1010h:01 was not answered {_UNANSWERED_STORES} times; {NOT_AGAIN}")
+        raise BootError("J", Text.of("boot.store_unanswered", times=_UNANSWERED_STORES))
     memory.unsaved = True
     try:
         yield Write(_STORE, 1, _SAVE)
@@ -96,7 +99,7 @@ def _store(memory: BootMemory, *, has_stamp: bool) -> Do:
         memory.unanswered_stores += not error.by_server
         if has_stamp:
             yield from _take_stamp_back()
-        raise BootError("J", f"{error}; the configuration is not stored") from None
+        raise BootError("J", Text.of("boot.not_stored", why=text_of(error))) from None
     memory.unsaved = False
     memory.unanswered_stores = 0
 
@@ -144,15 +147,16 @@ def download(one: Download, memory: BootMemory) -> Generator[Action, bytes | Non
 
 
 def _not_kept(download: Download, read: bytes | None) -> BootError:
-    what = f"{download.name} is {_shown(read)} after {_shown(download.data)} was written"
-    return BootError("J", f"{what}; {NOT_AGAIN}")
+    found, written = _shown(read), _shown(download.data)
+    what = Text.of("boot.not_kept", object=download.name, read=found, written=written)
+    return BootError("J", what)
 
 
 def _read_back(download: Download, memory: BootMemory) -> Generator[Action, bytes | None, bytes | None]:
     def unreadable(error: SdoError) -> BootError:
         memory.note_not_kept(download.index, download.sub, download.data)
-        what = f"{_shown(download.data)} was written and cannot be read back"
-        return BootError("J", f"{error}; {what}; {NOT_AGAIN}")
+        written = _shown(download.data)
+        return BootError("J", Text.of("boot.not_read_back", why=text_of(error), written=written))
 
     with told_as(unreadable):
         return (yield Read(download.index, download.sub))
@@ -164,7 +168,11 @@ def _is_signed(download: Download) -> bool:
 
 def _write(download: Download, have: bytes | None = None) -> Do:
     """``have`` is what was read before; a command is written as it is."""
-    with told_as(lambda error: BootError("J", f"{error}; it was to become {_shown(download.data)}")):
+
+    def refused(error: SdoError) -> BootError:
+        return BootError("J", Text.of("boot.not_taken", why=text_of(error), wanted=_shown(download.data)))
+
+    with told_as(refused):
         if have is None:
             yield Write(download.index, download.sub, download.data)
         else:
@@ -179,10 +187,10 @@ def _write(download: Download, have: bytes | None = None) -> Do:
             )
 
 
-def _shown(data: bytes | None) -> str:
+def _shown(data: bytes | None) -> Text | str:
     """A value as people write it: a number up to eight bytes, else its bytes."""
     if data is None:
-        return "nothing"
+        return Text.of("boot.nothing")
     if 0 < len(data) <= 8:
         return f"{int.from_bytes(data, 'little'):0{2 * len(data)}X}h"
-    return data.hex(" ").upper() or "empty"
+    return data.hex(" ").upper() or Text.of("boot.empty")

@@ -24,6 +24,7 @@ from bridge.node.boot.actions import (
     wish,
 )
 from bridge.node.boot.status import BootError
+from bridge.text import Text
 
 _REGISTER: Final = 0x1001
 _HISTORY: Final = 0x1003
@@ -36,7 +37,7 @@ _RESTARTS_S: Final = 2.0
 
 def read_errors(node: Node, result: BootResult) -> Do:
     """Note and show the error register, and the newest errors where there is one."""
-    yield Step("reading its errors", "J")
+    yield Step(Text.of("boot_step.errors"), "J")
     register = _number((yield from wish(result, _REGISTER)), U8)
     codes: list[int] = []
     count = _number((yield from wish(result, _HISTORY)), U8) if register else 0
@@ -59,11 +60,11 @@ def reset_once(node: Node, result: BootResult) -> Do:
     if not memory.may_reset_for(errors.cause):
         return
     memory.note_reset(errors.cause)
-    yield Step("resetting its communication", "J", needed_by="on_failed_start")
-    yield ResetCommunication(f"the node did not start: {errors.text}")
+    yield Step(Text.of("boot_step.reset"), "J", needed_by="on_failed_start")
+    yield ResetCommunication(Text.of("boot.did_not_start", errors=errors.said))
     # Its boot-up message ends this boot-up, and begins the next one.
     yield Pause(_RESTARTS_S)
-    raise BootError("J", f"no boot-up message after reset communication; {errors.text}", absent=False)
+    raise BootError("J", Text.of("boot.no_boot_up", errors=errors.said), absent=False)
 
 
 def _number(data: bytes | None, size: int) -> int:
@@ -71,9 +72,14 @@ def _number(data: bytes | None, size: int) -> int:
     return width.unsigned(data, size) if data and len(data) <= _LONGEST else 0
 
 
-def _text(node: Node, register: int, codes: list[int]) -> str:
+def _text(node: Node, register: int, codes: list[int]) -> Text | str:
     if not register:
         return ""
-    text = f"1001h is {register:02X}h ({emcy_codes.register_text(register)})"
-    named = ", ".join(f"{code:04X}h {node.family.emcy.text(code)}" for code in codes)
-    return f"{text}, 1003h: {named}" if named else text
+    bits = Text.plain(emcy_codes.register_text(register))
+    if not codes:
+        return Text.of("boot.error_register", register=register, bits=bits)
+    named = tuple(
+        Text.of("boot.kept_error", number=code, text=Text.plain(node.family.emcy.text(code)))
+        for code in codes
+    )
+    return Text.of("boot.kept_errors", register=register, bits=bits, errors=named)

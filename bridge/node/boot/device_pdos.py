@@ -24,6 +24,8 @@ from bridge.node.boot.actions import (
     wish,
 )
 from bridge.node.boot.pdos import read_entries
+from bridge.node.boot.unusable import why_unusable
+from bridge.text import Text
 
 _BASES: Final = {"TPDO": (0x1800, 0x1A00), "RPDO": (0x1400, 0x1600)}
 _MOST: Final = 512
@@ -38,7 +40,7 @@ Plan = Generator[Action, bytes | None, SignalPlan]
 def plan_device(node: Node, result: BootResult) -> Do:
     """Every PDO that is switched on and carries one of the family's inputs or outputs."""
     family = node.family
-    yield Step("reading the process data mapping", "J")
+    yield Step(Text.of("boot_step.pdos"), "J")
     inputs = {one.object: one for one in family.input}
     outputs = {one.object: one for one in family.output}
     # A TPDO that carries an output tells whether a stop of it is followed.
@@ -71,25 +73,25 @@ def _plan(
             entries = yield from read_entries(mapping, count)
             codec = PdoCodec(entries, signed)
         except MappingError as error:
-            result.notes.append(f"{name} is not used: {error}")
+            result.notes.append(Text.of("boot.pdo_not_used", pdo=name, why=why_unusable(error)))
             continue
         mapped = [ObjectRef(entry.index, entry.sub) for entry in entries if not entry.is_dummy]
         objects = [ref for ref in mapped if ref in wanted]
         if kind == "TPDO" and len(objects) < len(mapped) and not cob_id & cobid.PDO_DISABLED:
-            others = ", ".join(str(ref) for ref in mapped if ref not in wanted)
-            result.notes.append(f"{name} carries {others}, which nothing here describes")
+            others = tuple(str(ref) for ref in mapped if ref not in wanted)
+            result.notes.append(Text.of("boot.carries_more", pdo=name, objects=others))
         if not objects:
             continue
         if cob_id & cobid.PDO_DISABLED:
             missed = (ref for ref in objects if ref in needed)
-            plan.unserved |= dict.fromkeys(missed, f"{name} is switched off in the node")
+            plan.unserved |= dict.fromkeys(missed, Text.of("boot.pdo_off", pdo=name))
             continue
         if cob_id & cobid.PDO_EXTENDED or not cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK):
-            result.notes.append(f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO")
+            result.notes.append(Text.of("boot.no_pdo_id", object=f"{parameter:04X}h:01", id=cob_id))
             continue
         if kind == "RPDO" and len(objects) < len(mapped):
-            others = ", ".join(str(ref) for ref in mapped if ref not in wanted)
-            result.notes.append(f"{name} carries {others}, too, which get 0")
+            others = tuple(str(ref) for ref in mapped if ref not in wanted)
+            result.notes.append(Text.of("boot.carries_too", pdo=name, objects=others))
         transmission = number((yield from wish(result, parameter, 2)), 255, size=U8)
         event_ms = 0
         if kind == "TPDO" and transmission >= 254:
@@ -108,5 +110,5 @@ def _note_unserved(kind: str, wanted: Collection[ObjectRef], plan: SignalPlan, r
         if ref in carried:
             plan.unserved.pop(ref, None)
         else:
-            why = plan.unserved.setdefault(ref, f"no {kind} of the node carries {ref}")
+            why = plan.unserved.setdefault(ref, Text.of("boot.not_carried", kind=kind, object=str(ref)))
             result.notes.append(why)

@@ -18,6 +18,7 @@ from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, judge
 from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.actions import Action, BootResult, Step, number
 from bridge.node.boot.own_supervision import bring_node
+from bridge.text import Text
 
 _DIGITAL: Final = range(0x6200, 0x6400)
 """CiA 401: one bit of error mode and error value for each output. Analogue ones have a number each."""
@@ -38,13 +39,13 @@ def judge_outputs(
     """Into ``result.bridge_stop``; what ``own_timeout_ms`` says is written first where ``enforce`` is true
     and the node holds something else. Raises BootError J where a value that is enforced is not taken."""
     if words.all_hold:
-        result.bridge_stop = 0, "all of its outputs hold their values"
+        result.bridge_stop = 0, Text.of("outputs.all_hold")
         return
     needed_by = "enforce" if node.table.enforce else ""
-    yield Step("reading the node's own supervision", "J", needed_by=needed_by)
+    yield Step(Text.of("boot_step.node_supervision"), "J", needed_by=needed_by)
     raws = yield from bring_node(node, result)
     own = judge(node.family, raws, node.bus, node.table)
-    why = "" if own.verdict is OwnVerdict.STOPS else own.reason
+    why = "" if own.verdict is OwnVerdict.STOPS else own.because
     for place in words.places.values():
         if not why and place.safe is not None:
             why = yield from read_why_not_safe(place, place.safe)
@@ -52,41 +53,43 @@ def judge_outputs(
     result.own[node.name] = replace(keeps_outputs(own, why) if why else own, accepted=accepted)
     result.bridge_stop = (0, accepted or why) if why else (own.bridge_ms, "")
     if why and not accepted:
-        result.notes.append(f"outputs are not safe by themselves when the bridge falls silent: {why}")
+        result.notes.append(Text.of("boot.outputs_not_safe", why=why))
 
 
-def read_why_not_safe(place: Place, safe: int) -> Generator[Read, bytes | None, str]:
+def read_why_not_safe(place: Place, safe: int) -> Generator[Read, bytes | None, Text | str]:
     """As ``why_not_safe``, by what the node holds."""
     mode = yield from _number(place.output.error_mode)
     value = yield from _number(place.output.error_value)
     return why_not_safe(place, safe, mode, value)
 
 
-def why_not_safe(place: Place, safe: int, mode: int | None, value: int | None) -> str:
+def why_not_safe(place: Place, safe: int, mode: int | None, value: int | None) -> Text | str:
     """Why this output does not take its safe value when the node leaves Operational; empty where it does.
     ``mode`` and ``value`` are what error mode and error value hold, None where that is not known."""
     output = place.output
     if output.error_mode is None or output.error_value is None:
-        return f"what {output.name} does then is not known: the mapping names no error_mode and error_value"
+        return Text.of("outputs.no_error_mode", output=output.name)
     if mode is None or value is None:
         missing = output.error_mode if mode is None else output.error_value
-        return f"what {output.name} does then is not known: {missing} cannot be read"
+        return Text.of("outputs.unreadable", output=output.name, object=str(missing))
     bits = (1 << output.size) - 1
     if output.object.index in _DIGITAL:
         if keeps := ~mode & bits:
-            return f"{output.name} keeps {keeps.bit_count()} of its bits: {output.error_mode} is {mode:X}h"
+            count, by = keeps.bit_count(), str(output.error_mode)
+            return Text.of("outputs.keeps_bits", output=output.name, count=count, object=by, mode=mode)
     elif not mode & 0xFF:
-        return f"{output.name} keeps its value: {output.error_mode} is 0"
+        return Text.of("outputs.keeps_value", output=output.name, object=str(output.error_mode))
     if value & bits != safe:
-        return f"{output.name} becomes {value & bits:X}h by {output.error_value}, not {safe:X}h"
+        becomes, by = value & bits, str(output.error_value)
+        return Text.of("outputs.becomes", output=output.name, value=becomes, object=by, safe=safe)
     return ""
 
 
-def keeps_outputs(own: OwnJudgement, why: str, *, is_known: bool = True) -> OwnJudgement:
+def keeps_outputs(own: OwnJudgement, why: Text | str, *, is_known: bool = True) -> OwnJudgement:
     """The same for a node that notices a silent bridge, and does not make all of its outputs safe."""
     verdict = OwnVerdict.RUNS_ON if is_known else OwnVerdict.UNKNOWN
     watches = [
-        replace(watch, verdict=verdict, why=why) if watch.verdict is OwnVerdict.STOPS else watch
+        replace(watch, verdict=verdict, because=why) if watch.verdict is OwnVerdict.STOPS else watch
         for watch in own.watches
     ]
     return replace(own, watches=tuple(watches))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bridge.canopen import cobid
 from bridge.node.boot.actions import BootResult, Do, Step, number, wish
+from bridge.text import Text
 
 
 def read_emcy_id(node_id: int, result: BootResult) -> Do:
@@ -11,14 +12,14 @@ def read_emcy_id(node_id: int, result: BootResult) -> Do:
     them is noted, and taken to do the same."""
     default = cobid.EMCY + node_id
     result.emcy_id = default
-    yield Step("reading the identifier of emergency messages", "J")
+    yield Step(Text.of("boot_step.emergency_id"), "J")
     value = number((yield from wish(result, 0x1014)), default)
     cob_id = value & cobid.COB_ID_MASK
     if value & cobid.PDO_DISABLED:  # bit 31 means the same here
         result.emcy_id = None
-        result.notes.append("emergency messages are off (1014h, bit 31)")
+        result.notes.append(Text.of("boot.emergencies_off"))
     elif value & cobid.PDO_EXTENDED or not cobid.is_for_emcy(cob_id):
-        result.notes.append(f"1014h is {value:08X}h: no identifier for emergency messages")
+        result.notes.append(Text.of("boot.no_emergency_id", id=value))
     elif cob_id != default:
         result.emcy_id = cob_id
-        result.notes.append(f"emergency messages come on {cob_id:03X}h (1014h)")
+        result.notes.append(Text.of("boot.emergency_id", id=f"{cob_id:03X}h"))

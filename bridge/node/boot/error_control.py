@@ -5,10 +5,12 @@ from __future__ import annotations
 import struct
 from typing import Final
 
+from bridge.base.sdo_texts import text_of
+from bridge.canopen.sdo import SdoError
 from bridge.config import NodeTable
 from bridge.node.boot.actions import BootResult, Do, Step, number, same, told_as, wish, write_number
-from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
+from bridge.text import Text
 
 _PERIOD: Final = 0x1017
 
@@ -23,7 +25,7 @@ def set_error_control(table: NodeTable, result: BootResult) -> Do:
 
     A heartbeat period that the node rounds is adopted.
     """
-    yield Step("setting error control", "J", needed_by="supervision")
+    yield Step(Text.of("boot_step.error_control"), "J", needed_by="supervision")
     heartbeat_ms = heartbeat_period_ms(table.supervision_ms) if table.supervision == "heartbeat" else 0
     guard = (table.supervision_ms, table.life_time_factor) if table.supervision == "guarding" else (0, 0)
     wanted = [
@@ -43,7 +45,7 @@ def set_error_control(table: NodeTable, result: BootResult) -> Do:
             continue
         yield from _write(table, index, data, have)
         was = number(have, size=len(data))
-        result.notes.append(f"{index:04X}h was {was}, is {number(data)} now")
+        result.notes.append(Text.of("boot.changed", object=f"{index:04X}h", before=was, now=number(data)))
 
 
 def _set_period(table: NodeTable, data: bytes, have: bytes | None, result: BootResult) -> Do:
@@ -53,19 +55,22 @@ def _set_period(table: NodeTable, data: bytes, have: bytes | None, result: BootR
     if not result.memory.was_not_kept(_PERIOD, 0, data):
         yield from _write(table, _PERIOD, data, have)
         kept_ms = number((yield from wish(result, _PERIOD)), want_ms, size=len(data))
-        written = ""
+        note = Text.of("boot.changed", object="1017h", before=was_ms, now=kept_ms)
         if kept_ms != want_ms:
             result.memory.note_not_kept(_PERIOD, 0, data)
-            written = f" ({want_ms} was written)"
-        result.notes.append(f"1017h was {was_ms}, is {kept_ms} now{written}")
+            note = Text.of("boot.period_rounded", before=was_ms, now=kept_ms, written=want_ms)
+        result.notes.append(note)
     least_ms, most_ms = (want_ms + 1) // 2, table.supervision_ms // 2
     if not least_ms <= kept_ms <= most_ms:
-        raise BootError(
-            "J", f"1017h is {kept_ms} after {want_ms} was written, {least_ms}…{most_ms} would do; {NOT_AGAIN}"
-        )
+        what = Text.of("boot.period_not_kept", kept=kept_ms, written=want_ms, least=least_ms, most=most_ms)
+        raise BootError("J", what)
     result.heartbeat_ms = kept_ms
 
 
 def _write(table: NodeTable, index: int, data: bytes, have: bytes | None) -> Do:
-    with told_as(lambda error: BootError("J", f"{table.supervision} is not possible: {error}")):
+    def refused(error: SdoError) -> BootError:
+        supervision = Text.word("supervision", table.supervision)
+        return BootError("J", Text.of("boot.not_possible", supervision=supervision, why=text_of(error)))
+
+    with told_as(refused):
         yield from write_number(index, 0, data, have)

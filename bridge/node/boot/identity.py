@@ -13,6 +13,7 @@ from bridge.command import Identification
 from bridge.command.node import Node
 from bridge.node.boot.actions import Action, BootResult, Do, Signal, Step, number, wish
 from bridge.node.boot.status import BootError
+from bridge.text import Text
 
 _ALL = 0xFFFF_FFFF
 _LONGEST_TEXT = 64
@@ -30,20 +31,24 @@ class Rule:
     expected: int | None
     mask: int | None = None
 
-    def check(self, read: int | None, where: str) -> None:
+    def check(self, read: int | None, where: Text) -> None:
         """Raises BootError where the value is another one; ``read`` is None where the node has none."""
         mask = _ALL if self.mask is None else self.mask
         if self.expected is None or not ((read or 0) ^ self.expected) & mask:
             return
-        masked = "" if mask == _ALL else f" (mask {mask:08X}h)"
         name = f"{self.index:04X}h:{self.sub:02X}"
-        found = f"the node has no {name}" if read is None else f"{name} is {read:08X}h"
-        raise BootError(self.letter, f"{found}, expected {self.expected:08X}h{masked} {where}")
+        found = Text.of("boot.has_no", object=name)
+        if read is not None:
+            found = Text.of("boot.number_read", object=name, read=read)
+        what = Text.of("boot.not_expected", found=found, wanted=self.expected, where=where)
+        if mask != _ALL:
+            what = Text.of("boot.not_as_masked", found=found, wanted=self.expected, mask=mask, where=where)
+        raise BootError(self.letter, what)
 
 
-def _rules(expected: object, where: str, table: str) -> list[tuple[Rule, str]]:
+def _rules(expected: object, where: Text, table: str) -> list[tuple[Rule, Text]]:
     """The rules of an identity table; the mapping's has fewer keys than the site file's."""
-    rules: list[tuple[Rule, str]] = []
+    rules: list[tuple[Rule, Text]] = []
     for letter, index, sub, name in (
         ("C", 0x1000, 0, "device_type"),
         ("D", 0x1018, 1, "vendor_id"),
@@ -63,18 +68,18 @@ def identify(node: Node, device_type: int | None, result: BootResult) -> Do:
 
     The mapping's device name is a hint for ``scan``; the site file's is a rule.
     """
-    rules = _rules(node.table.identity, "by the site file", "identity")
+    rules = _rules(node.table.identity, Text.of("boot.by_site"), "identity")
     # What the site file says of a field stands in place of what the mapping says.
     given = {rule.letter for rule, _ in rules if rule.expected is not None}
     rules += [
         (rule, where)
-        for rule, where in _rules(node.family.identity, "by the mapping", "mapping.identity")
+        for rule, where in _rules(node.family.identity, Text.of("boot.by_mapping"), "mapping.identity")
         if rule.letter not in given
     ]
     read: dict[tuple[int, int], int | None] = {(0x1000, 0): device_type}
     for sub, letter in ((1, "D"), (2, "M"), (3, "N"), (4, "O")):
         key = next((rule.key for rule, _ in rules if rule.letter == letter and rule.expected is not None), "")
-        yield Step("reading the identity", letter, needed_by=key)
+        yield Step(Text.of("boot_step.identity"), letter, needed_by=key)
         data = yield from (optional(0x1018, sub) if key else wish(result, 0x1018, sub))
         read[0x1018, sub] = None if data is None else number(data)
     for rule, where in rules:
@@ -90,7 +95,7 @@ def identify(node: Node, device_type: int | None, result: BootResult) -> Do:
 def look_for() -> Generator[Action, bytes | None, int | None]:
     """Device type of the node, None where it is there and does not say it; SdoError where nobody answers, and
     a second time after it was woken."""
-    yield Step("looking for the node", "B")
+    yield Step(Text.of("boot_step.look"), "B")
     try:
         return (yield from _device_type())
     except SdoError:
@@ -112,10 +117,13 @@ def _text(
     letter: str, index: int, wanted: str | None, key: str, result: BootResult
 ) -> Generator[Action, bytes | None, str]:
     """A text of the node, in which the regular expression ``wanted``, if there is one, has to be found."""
-    yield Step("reading name and version", letter, needed_by="" if wanted is None else key)
+    yield Step(Text.of("boot_step.name"), letter, needed_by="" if wanted is None else key)
     data = yield from (wish(result, index) if wanted is None else optional(index))
     text = datatypes.readable((data or b"")[:_LONGEST_TEXT]).strip()
     if wanted is not None and not re.search(wanted, text, re.IGNORECASE):
-        found = f"the node has no {index:04X}h" if data is None else f"{index:04X}h is {text!r}"
-        raise BootError(letter, f"{found}, expected {wanted!r} by the site file")
+        name = f"{index:04X}h"
+        found = Text.of("boot.text_read", object=name, read=text)
+        if data is None:
+            found = Text.of("boot.has_no", object=name)
+        raise BootError(letter, Text.of("boot.text_not_expected", found=found, wanted=wanted))
     return text

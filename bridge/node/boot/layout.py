@@ -9,6 +9,7 @@ from bridge.canopen.pdo import PdoEntry
 from bridge.mapping.fields import ObjectRef
 from bridge.mapping.model import MappedObject, Pdo
 from bridge.node.places.words import WORD_BITS, Place
+from bridge.text import Text
 
 Layouts = Mapping[int, Sequence[MappedObject]]
 """By the word's place, the objects that may stand for it; those at one position belong together."""
@@ -97,14 +98,14 @@ def missing_parts(refs: Sequence[MappedObject], mapped: Set[_Object]) -> list[Mi
 
 def differences(
     entries: Sequence[PdoEntry], expected: Sequence[PdoEntry], places: Sequence[Place | None]
-) -> list[str]:
+) -> list[Text]:
     """What the node has otherwise than the mapping file, entry by entry."""
-    told: list[str] = []
+    told: list[Text] = []
     bits = {(entry.index, entry.sub): entry.bits for entry in expected}
     for entry, place in zip(entries, places, strict=True):
         wants = bits.get((entry.index, entry.sub))
         if place is None and not entry.is_dummy:
-            told.append(f"{entry} is no word that the mapping file knows")
+            told.append(Text.of("boot.no_word", entry=str(entry)))
         elif wants is not None and wants != entry.bits:
-            told.append(f"{entry} has {wants} bits in the mapping file")
+            told.append(Text.of("boot.other_bits", entry=str(entry), bits=wants))
     return told

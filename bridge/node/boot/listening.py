@@ -14,6 +14,7 @@ from bridge.mapping.model import Family, Pdo, Slot
 from bridge.node.boot.actions import U8, Action, BootResult, Do, PdoPlan, Step, number, wish
 from bridge.node.boot.layout import factory_entries, layouts, match_words
 from bridge.node.boot.pdos import RPDO, read_entries
+from bridge.text import Text
 
 _FACTORY_TYPE: Final = 255
 
@@ -21,7 +22,7 @@ _FACTORY_TYPE: Final = 255
 def find_rpdos(node: Node, result: BootResult) -> Do:
     """Note where the node listens for each drive's words, so that a stop reaches it there. While a drive may
     be running nothing waits for a node that is silent: SdoError at once."""
-    yield Step("reading where it listens", "J", needed_by="drive")
+    yield Step(Text.of("boot_step.listen"), "J", needed_by="drive")
     for drive in node.drives:
         for pdo in drive.slot.rpdo:
             plan = yield from _rpdo(drive, pdo, result)

@@ -18,8 +18,6 @@ _RPDOS: Final = 2
 _RESETS: Final = 3
 """Errors in a row for which a node that does not start is reset: one with ever new ones is left alone."""
 
-NOT_AGAIN: Final = "it is not written again until the node restarts or is reset"
-
 
 CountWrite = Callable[[str, str, str], str]
 """One more write to an EEPROM: owner, object, name. Returns a warning or an empty text, and raises

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from functools import partial
 
+from bridge.base.sdo_texts import text_of
 from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Drive
@@ -14,10 +15,10 @@ from bridge.drive.own_supervision import judge
 from bridge.mapping.model import Family
 from bridge.mapping.own_places import OwnPlace, OwnWant, places, wanted
 from bridge.node.boot.actions import Action, BootResult, Do, Step, told_as, wish, write_number
-from bridge.node.boot.memory import NOT_AGAIN
 from bridge.node.boot.status import BootError
 from bridge.node.places.sdo_channels import FIRST, channel_of
 from bridge.parameter import ParameterError
+from bridge.text import Text
 
 Raws = dict[tuple[int, int], int]
 
@@ -33,7 +34,7 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
             result.own[drive.name] = OwnJudgement(accepted=drive.table.accepts.runs_on or "")
         return
     needed_by = "enforce" if node.table.enforce else ""
-    yield Step("reading the drives' own supervision", "J", needed_by=needed_by)
+    yield Step(Text.of("boot_step.own_supervision"), "J", needed_by=needed_by)
     of_node = yield from bring_node(node, result)
     for drive in node.drives:
         of_drive = yield from read_places(node, drive, read=_reader(node, result))
@@ -99,26 +100,35 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
     if have is not None and want.met_by(have):
         return
     if not node.table.enforce:
-        held = "not known" if have is None else str(have)
-        result.notes.append(f"{owner}: {place.name} is {held}, the site file says {want.value}")
+        note = Text.of("boot.own_other", owner=owner, place=place.name, held=have or 0, wanted=want.value)
+        if have is None:
+            note = Text.of("boot.own_not_known", owner=owner, place=place.name, wanted=want.value)
+        result.notes.append(note)
         return
     if have is None:
-        raise BootError("J", f"{owner}: {place.name} ({place.ref}) is to be {want.value}, and is not there")
+        ref = str(place.ref)
+        what = Text.of("boot.own_absent", owner=owner, place=place.name, object=ref, wanted=want.value)
+        raise BootError("J", what)
     memory, data = result.memory, place.number.encode(want.value)
     # Each drive has its own object of the same number.
     tried = place.ref.index | channel << 16
     if memory.was_not_kept(tried, place.ref.sub, data):
-        raise BootError("J", f"{owner}: {place.name} stays {have}, expected {want.value}; {NOT_AGAIN}")
+        what = Text.of("boot.own_stays", owner=owner, place=place.name, held=have, wanted=want.value)
+        raise BootError("J", what)
     if _wears(node.family, place):
         try:
             warning = memory.count_write(owner, str(place.ref).upper(), place.name)
         except ParameterError as error:
-            raise BootError("J", f"{owner}: {error}") from None
-        result.notes += [warning] if warning else []
+            raise BootError("J", Text.of("boot.of", owner=owner, what=Text.plain(str(error)))) from None
+        if warning:
+            result.notes.append(Text.plain(warning))
 
     def refused(error: SdoError) -> BootError:
         memory.note_not_kept(tried, place.ref.sub, data)
-        return BootError("J", f"{owner}: {place.name} was to become {want.value}: {error}")
+        what = Text.of(
+            "boot.own_not_taken", owner=owner, place=place.name, wanted=want.value, why=text_of(error)
+        )
+        return BootError("J", what)
 
     with told_as(refused):
         yield from write_number(place.ref.index, place.ref.sub, data, None, channel=channel)
@@ -126,9 +136,12 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
     kept = None if read is None else place.number.decode(read)
     if kept != want.value:
         memory.note_not_kept(tried, place.ref.sub, data)
-        raise BootError("J", f"{owner}: {place.name} is {kept} after {want.value} was written; {NOT_AGAIN}")
+        found, written = str(kept), str(want.value)
+        what = Text.of("boot.not_kept", object=place.name, read=found, written=written)
+        raise BootError("J", Text.of("boot.of", owner=owner, what=what))
     raw[place.key] = want.value
-    result.notes.append(f"{owner}: {place.name} was {have}, is {want.value} now (enforced)")
+    note = Text.of("boot.own_enforced", owner=owner, place=place.name, before=have, now=want.value)
+    result.notes.append(note)
 
 
 def _wears(family: Family, place: OwnPlace) -> bool:
@@ -141,11 +154,13 @@ def _wears(family: Family, place: OwnPlace) -> bool:
 
 def _note_who_runs_on(node: Node, result: BootResult) -> None:
     """One note for all drives of the node about which the same is to be said."""
-    names: dict[str, list[str]] = {}
+    names: dict[Text | str, list[str]] = {}
     for drive in node.drives:
         own = result.own[drive.name]
         if own.verdict is OwnVerdict.RUNS_ON and not own.accepted:
-            names.setdefault(own.reason, []).append(drive.name.partition("/")[2])
+            names.setdefault(own.because, []).append(drive.name.partition("/")[2])
     for reason, drives in names.items():
-        who = "" if len(drives) == len(node.drives) else f" ({', '.join(drives)})"
-        result.notes.append(f"the drive runs on when the bridge falls silent{who}: {reason}")
+        note = Text.of("boot.runs_on", why=reason)
+        if len(drives) < len(node.drives):
+            note = Text.of("boot.some_run_on", drives=tuple(drives), why=reason)
+        result.notes.append(note)

@@ -10,11 +10,10 @@ from collections.abc import Generator, Sequence
 from typing import Final
 
 from bridge.canopen.dialogue import optional
-from bridge.canopen.pdo import MappingError
 from bridge.config.download import Download
 from bridge.node.boot.actions import U8, Action, number, same
 from bridge.node.boot.memory import BootMemory
-from bridge.node.boot.pdo_settings import FIXED_BITS, Change, PdoObjects, write_pdo
+from bridge.node.boot.pdo_settings import FIXED_BITS, Change, NotTaken, PdoObjects, write_pdo
 from bridge.node.boot.status import BootError
 
 _PDOS: Final = (range(0x1400, 0x1800), range(0x1800, 0x1C00))
@@ -61,6 +60,6 @@ def download_pdo(downloads: Sequence[Download], memory: BootMemory) -> Generator
     target_id = have_id if want_id is None else want_id.value
     try:
         yield from write_pdo(objects, have_id, target_id, mapped, entries, changes, memory)
-    except MappingError as error:
-        raise BootError("J", str(error).removeprefix("J: ")) from None
+    except NotTaken as error:
+        raise BootError("J", error.what) from None
     return different

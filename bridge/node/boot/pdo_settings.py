@@ -10,23 +10,32 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.base.sdo_texts import text_of
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import optional
-from bridge.canopen.pdo import MappingError, PdoEntry
+from bridge.canopen.pdo import PdoEntry
+from bridge.canopen.sdo import SdoError
 from bridge.config import PdoTable
 from bridge.mapping.model import Pdo
 from bridge.node.boot.actions import U8, Action, BootResult, Do, number, told_as, write_number
-from bridge.node.boot.memory import NOT_AGAIN, BootMemory
+from bridge.node.boot.memory import BootMemory
+from bridge.node.boot.unusable import Unusable
+from bridge.text import Text
 
 FIXED_BITS: Final = 0x6000_0000
 """Bits 30 and 29 of a COB-ID: what the node has there stays."""
 MOST_ENTRIES: Final = 64
 """Objects in one PDO, at most (CiA 301 §7.5.2.36)."""
-MPDO_KINDS: Final = {
-    0xFE: "a multiplexed PDO of many sources (SAM-MPDO)",
-    0xFF: "a multiplexed PDO of many destinations (DAM-MPDO)",
-}
+MPDO_KINDS: Final = {0xFE: Text.of("boot.mpdo_sources"), 0xFF: Text.of("boot.mpdo_destinations")}
 """By sub-index 0 of the mapping (CiA 301 §7.5.2.36, §7.5.2.38)."""
+
+
+class NotTaken(Unusable):
+    """The node refuses a value, or does not keep it: ``what`` says which."""
+
+    def __init__(self, what: Text) -> None:
+        super().__init__(Text.of("boot.failed", letter="J", what=what))
+        self.what = what
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +77,7 @@ def table_for(pdo: Pdo, factory: Sequence[PdoEntry], asked: PdoTable | None) -> 
 
 
 def set_pdo(objects: PdoObjects, wanted: PdoTable, result: BootResult) -> Do:
-    """Bring one PDO to what ``wanted`` says; what it leaves out stays. Raises MappingError where the
+    """Bring one PDO to what ``wanted`` says; what it leaves out stays. Raises NotTaken where the
     node refuses a value or does not keep it."""
     have_id = number((yield from optional(objects.parameter, 1)), objects.default_cob_id)
     want_id = _cob_id(objects, wanted, have_id)
@@ -94,12 +103,14 @@ def set_pdo(objects: PdoObjects, wanted: PdoTable, result: BootResult) -> Do:
         Change(objects.mapping, sub, 4, entry.to_object()) for sub, entry in enumerate(entries, 1) if maps
     ]
     yield from write_pdo(objects, have_id, want_id, mapped, len(mapped), changes, result.memory)
-    done = [f"sub {change.sub} = {change.value}" for change in changes]
+    done = [Text.of("boot.pdo_sub", sub=change.sub, value=change.value) for change in changes]
     if maps:
-        done.append(f"{objects.mapping:04X}h = {' '.join(str(entry) for entry in entries)}")
+        mapped_to = " ".join(str(entry) for entry in entries)
+        done.append(Text.of("boot.pdo_mapping", object=f"{objects.mapping:04X}h", entries=mapped_to))
     if have_id != want_id:
-        done.append(f"COB-ID {want_id & cobid.COB_ID_MASK:03X}h, {'off' if want_id >> 31 else 'on'}")
-    result.notes.append(f"{objects.parameter:04X}h: {', '.join(done)}")
+        cob_id = f"{want_id & cobid.COB_ID_MASK:03X}h"
+        done.append(Text.of("boot.cob_id_off" if want_id >> 31 else "boot.cob_id_on", id=cob_id))
+    result.notes.append(Text.of("boot.pdo_set", object=f"{objects.parameter:04X}h", done=tuple(done)))
 
 
 def _cob_id(objects: PdoObjects, wanted: PdoTable, have: int) -> int:
@@ -133,7 +144,7 @@ def write_pdo(
 ) -> Do:
     """Off, mapping (where ``mapped`` has entries), communication, on; then everything is read back.
 
-    Raises MappingError where the node refuses a value or does not keep it. Where one of the values was
+    Raises NotTaken where the node refuses a value or does not keep it. Where one of the values was
     not kept before, nothing is written.
     """
     parameter, mapping = objects.parameter, objects.mapping
@@ -156,16 +167,20 @@ def write_pdo(
 
 
 def _write_one(change: Change) -> Do:
-    with told_as(lambda error: MappingError(f"J: {error}; it was to become {change.value:X}h")):
+    def refused(error: SdoError) -> NotTaken:
+        return NotTaken(Text.of("boot.not_taken", why=text_of(error), wanted=f"{change.value:X}h"))
+
+    with told_as(refused):
         yield from write_number(change.index, change.sub, change.data, None)
 
 
 def _verify(change: Change, memory: BootMemory) -> Do:
-    """Raises MappingError where the node holds something else, and remembers that."""
+    """Raises NotTaken where the node holds something else, and remembers that."""
     read = number((yield from optional(change.index, change.sub)), -1, size=change.size)
     # Some nodes fix bits 30 and 29 of a COB-ID.
     ignored = FIXED_BITS if change.index & 0x0200 == 0 and change.sub == 1 else 0
     if (read ^ change.value) & ~ignored:
         memory.note_not_kept(change.index, change.sub, change.data)
         name = f"{change.index:04X}h:{change.sub:02X}"
-        raise MappingError(f"J: {name} is {read:X}h after {change.value:X}h was written; {NOT_AGAIN}")
+        found, written = f"{read:X}h", f"{change.value:X}h"
+        raise NotTaken(Text.of("boot.not_kept", object=name, read=found, written=written))

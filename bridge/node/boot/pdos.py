@@ -11,6 +11,7 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.base.sdo_texts import text_of
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
@@ -38,6 +39,8 @@ from bridge.node.boot.actions import (
 from bridge.node.boot.layout import Layouts, differences, factory_entries, layouts, match_words, missing_parts
 from bridge.node.boot.pdo_settings import MOST_ENTRIES, MPDO_KINDS, PdoObjects, set_pdo, table_for
 from bridge.node.boot.start import write_start
+from bridge.node.boot.unusable import Unusable, why_unusable
+from bridge.text import Text
 
 RPDO: Final = (0x1400, 0x1600)
 """First communication and first mapping object."""
@@ -46,7 +49,7 @@ _BYTES: Final = 2
 _ALL_BITS: Final = 0xFFFF
 
 
-class _Off(MappingError):
+class _Off(Unusable):
     """The PDO is switched off in the node."""
 
 
@@ -75,9 +78,7 @@ def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action
     process = family.process
     receives = [family.rpdo_words(pdo) for pdo in slot.rpdo]
     sends = [family.tpdo_words(pdo) for pdo in slot.tpdo]
-    yield Step(
-        f"setting and reading the process data mapping of {slot.name}", "J", needed_by=f"drive.{slot.name}"
-    )
+    yield Step(Text.of("boot_step.pdos_of", slot=slot.name), "J", needed_by=f"drive.{slot.name}")
     try:
         yield from write_start(drive, result)
         for direction, found in (
@@ -101,9 +102,13 @@ def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action
     except (MappingError, SdoError) as error:
         if isinstance(error, SdoError) and not error.was_answered:
             raise
-        plan.leave_out(str(error))
-        result.notes.append(f"{slot.name}: {error}")
+        plan.leave_out(why_unusable(error))
+        result.notes.append(_of(slot.name, why_unusable(error)))
     return plan
+
+
+def _of(slot: str, what: Text) -> Text:
+    return Text.of("boot.of_slot", slot=slot, what=what)
 
 
 def _require_followed(drive: Drive, plan: DrivePlan) -> None:
@@ -117,7 +122,8 @@ def _require_followed(drive: Drive, plan: DrivePlan) -> None:
         for word in followed.word_names:
             why = plan.unserved.get(f"actual/{word}")
             if why:
-                raise MappingError(f"{value.leaf} has to follow {followed.leaf}: {why}")
+                said = Text.of("boot.has_to_follow", value=value.leaf, followed=followed.leaf, why=why)
+                raise Unusable(said)
 
 
 def _plan(
@@ -125,7 +131,7 @@ def _plan(
 ) -> Do:
     """All PDOs of one direction, into ``found``. Raises MappingError where the first word is in none."""
     first = direction.process[0]
-    reasons: dict[str, str] = {}
+    reasons: dict[str, Text] = {}
     for pdo, words in zip(direction.pdos, direction.words, strict=True):
         try:
             one = yield from _pdo(node, drive, pdo, direction, result)
@@ -135,25 +141,27 @@ def _plan(
         except MappingError as error:
             if first in words:
                 raise
-            reasons |= dict.fromkeys(words, str(error))
+            reasons |= dict.fromkeys(words, why_unusable(error))
             expected = pdo.optional and isinstance(error, _Off) and direction.asked(pdo) is None
             if not expected:
-                result.notes.append(f"{drive.slot.name}: {error}")
+                result.notes.append(_of(drive.slot.name, why_unusable(error)))
     carried = {place for one in found for place in one.words}
     if 0 not in carried:
-        names = " and ".join(one.name for one in found)
-        message = f"{names} does not carry" if len(found) == 1 else f"{names} do not carry"
-        raise MappingError(f"{message} the {first.replace('_', ' ')}")
+        word, names = Text.word("word", first), tuple(one.name for one in found)
+        if len(names) == 1:
+            raise Unusable(Text.of("boot.pdo_without_word", pdo=names[0], word=word))
+        raise Unusable(Text.of("boot.pdos_without_word", pdos=names, word=word))
     found.sort(key=lambda one: 0 not in one.words)
     for pdo, words in zip(direction.pdos, direction.words, strict=True):
         for word in words:
             if direction.process.index(word) in carried:
                 continue
-            why = reasons.get(word) or f"{direction.name}{pdo.number} of the node does not carry it"
+            name = f"{direction.name}{pdo.number}"
+            why = reasons.get(word) or Text.of("boot.pdo_without_it", pdo=name)
             plan.unserved[f"{direction.group}/{word}"] = why
             if word not in reasons:
-                missing = f"{word} is not in {direction.name}{pdo.number}"
-                result.notes.append(f"{drive.slot.name}: {missing}")
+                missing = Text.of("boot.word_not_in_pdo", word=word, pdo=name)
+                result.notes.append(_of(drive.slot.name, missing))
     _leave_out_parts(drive, direction, found, plan, result)
 
 
@@ -168,10 +176,13 @@ def _leave_out_parts(
     for place, refs in direction.known.items():
         for part, mask in missing_parts(refs, mapped):
             word = direction.process[place]
-            why = f"no {direction.name} of the node carries {part}"
+            kind, ref = direction.name, str(part)
+            why = Text.of("boot.not_carried", kind=kind, object=ref)
             if place == 0 and needed & mask:
-                raise MappingError(f"{why}, a part of the {word.replace('_', ' ')}")
-            result.notes.append(f"{drive.slot.name}: {why}, a part of {word}")
+                name = Text.word("word", word)
+                raise Unusable(Text.of("boot.needed_part", kind=kind, object=ref, word=name))
+            note = Text.of("boot.part_not_carried", kind=kind, object=ref, word=word)
+            result.notes.append(_of(drive.slot.name, note))
             for value in family.values_of(drive.slot):
                 bits = _ALL_BITS if value.bit is None else 1 << value.bit
                 if value.group == group and word in value.word_names and bits & mask:
@@ -180,10 +191,10 @@ def _leave_out_parts(
 
 def _check_length(pdo: PdoPlan, words: int) -> None:
     if pdo.codec.length != _BYTES * words:
-        plural = "word" if words == 1 else "words"
-        raise MappingError(
-            f"{pdo.name} maps {pdo.codec.length} bytes; the interface evaluates only {words} {plural}"
-        )
+        length = pdo.codec.length
+        if words == 1:
+            raise Unusable(Text.of("boot.maps_more_than_word", pdo=pdo.name, length=length))
+        raise Unusable(Text.of("boot.maps_more", pdo=pdo.name, length=length, words=words))
 
 
 def _pdo(
@@ -199,12 +210,12 @@ def _pdo(
         yield from set_pdo(PdoObjects(parameter, mapping, default_id), wanted, result)
     has_object = yield from optional(parameter, 1)
     if has_object is None and pdo.optional:
-        raise _Off(f"the node has no {name}")
+        raise _Off(Text.of("boot.has_no", object=name))
     cob_id = number(has_object, default_id)
     if cob_id & cobid.PDO_DISABLED:
-        raise _Off(f"{parameter:04X}h:01: the PDO is switched off in the node")
+        raise _Off(Text.of("boot.object_off", object=f"{parameter:04X}h:01"))
     if cob_id & cobid.PDO_EXTENDED or not cobid.is_for_pdos(cob_id & cobid.COB_ID_MASK):
-        raise MappingError(f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO")
+        raise Unusable(Text.of("boot.no_pdo_id", object=f"{parameter:04X}h:01", id=cob_id))
     kind = number((yield from optional(parameter, 2)), 255, size=U8)
     event_ms = 0
     if direction.bases is _TPDO and kind >= 254:
@@ -213,12 +224,14 @@ def _pdo(
     if not pdo.static:
         count = yield from optional(mapping, 0)
         if count is None:
-            result.notes.append(f"the node has no {mapping:04X}h: taken as the mapping file has it")
+            result.notes.append(Text.of("boot.taken_by_file", object=f"{mapping:04X}h"))
         else:
             entries = yield from read_entries(mapping, number(count, size=U8))
     places = match_words(entries, direction.known)
     told = differences(entries, expected, places)
-    result.notes += [f"{drive.slot.name}: {name}: {difference}" for difference in told]
+    result.notes += [
+        Text.of("boot.of_pdo", slot=drive.slot.name, pdo=name, what=difference) for difference in told
+    ]
     codec = PdoCodec(entries, {(ref.index, ref.sub) for each in direction.pdos for ref in each.signed})
     remote_allowed = not cob_id & cobid.NO_REMOTE
     return PdoPlan(cob_id & cobid.COB_ID_MASK, kind, event_ms, codec, places, remote_allowed, name)
@@ -232,8 +245,9 @@ def refuse_doubles(result: BootResult) -> None:
             users.setdefault(pdo.cob_id, []).append(plan)
     for cob_id, plans in users.items():
         for plan in plans if len(plans) > 1 else ():
-            plan.leave_out(f"{cob_id:03X}h is the identifier of more than one PDO")
-            if plan.problem not in result.notes:
+            why = Text.of("boot.same_id", id=f"{cob_id:03X}h")
+            plan.leave_out(why)
+            if isinstance(plan.problem, Text) and plan.problem not in result.notes:
                 result.notes.append(plan.problem)
 
 
@@ -251,7 +265,9 @@ def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes |
             entries = yield from read_entries(mapping, count)
             codec = PdoCodec(entries, signed)
         except MappingError as error:
-            result.notes.append(f"TPDO{tpdo.number} is not used: {error}")
+            result.notes.append(
+                Text.of("boot.pdo_not_used", pdo=f"TPDO{tpdo.number}", why=why_unusable(error))
+            )
             continue
         found = [polls.get((entry.index, entry.sub)) for entry in entries]
         if any(found):
@@ -265,12 +281,14 @@ def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes |
 def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[PdoEntry, ...]]:
     """The mapping as the node has it. Raises MappingError where it cannot be one, or cannot be read."""
     if count in MPDO_KINDS:
-        raise MappingError(f"{mapping:04X}h:00 is {count:02X}h: {MPDO_KINDS[count]}, which is not supported")
+        kind = MPDO_KINDS[count]
+        raise Unusable(Text.of("boot.mpdo", object=f"{mapping:04X}h:00", count=count, kind=kind))
     if count > MOST_ENTRIES:
-        raise MappingError(f"{mapping:04X}h:00 is {count}, at most {MOST_ENTRIES} objects can be mapped")
+        name = f"{mapping:04X}h:00"
+        raise Unusable(Text.of("boot.too_many_entries", object=name, count=count, most=MOST_ENTRIES))
     entries: tuple[PdoEntry, ...] = ()
     for sub in range(1, count + 1):
-        with told_as(lambda error: MappingError(str(error))):
+        with told_as(lambda error: Unusable(text_of(error))):
             value = number((yield Read(mapping, sub)))
         if value:  # some nodes have a fixed count, and 0 in the places that they do not use
             entries = (*entries, PdoEntry.from_object(value))

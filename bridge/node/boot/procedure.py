@@ -34,6 +34,7 @@ from bridge.node.boot.pdos import plan_drive, plan_node_tpdos, refuse_doubles
 from bridge.node.boot.scales import read_words
 from bridge.node.boot.sdo_servers import open_sdo_servers
 from bridge.node.boot.status import BootError
+from bridge.text import Text
 
 _GOES_OPERATIONAL_S: Final = 2.0
 _SYNCS: Final = 2
@@ -77,7 +78,7 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
             yield from read_held(node.device.outputs.words, result)
             yield from judge_outputs(node, node.device.outputs.words, result)
     yield from set_own_supervision(node, result)
-    yield Step("reading what the words mean", "J")
+    yield Step(Text.of("boot_step.words"), "J")
     for drive in node.drives:
         result.words[drive.name] = yield from read_words(node, drive, result)
     yield from _start(node.table, result)
@@ -89,17 +90,20 @@ def _start(table: NodeTable, result: BootResult) -> Do:
     """Error control first, then NMT start; the node's own messages confirm both. Raises BootError if they do
     not come."""
     not_heard = "F" if table.supervision == "guarding" else "K"
-    yield Step(f"waiting for {table.supervision}", not_heard, needed_by="supervision")
+    what = Text.of("boot_step.wait", supervision=Text.word("supervision", table.supervision))
+    yield Step(what, not_heard, needed_by="supervision")
     yield Signal.START_SUPERVISION
     # It says its state when it is asked, or every so often.
     limit_s = max(_GOES_OPERATIONAL_S, 3 * table.supervision_ms / 1000)
     yield Await(None, limit_s)
     yield Signal.AWAIT_RELEASE
-    yield Step("starting", "J")
+    yield Step(Text.of("boot_step.start"), "J")
     yield Nmt(NmtCommand.START)
     try:
         yield Await(NmtState.OPERATIONAL, limit_s)
     except BootError as error:
         result.memory.did_not_start = True
-        detail = "; ".join(text for text in (error.detail, result.errors.text) if text)
-        raise BootError(error.letter, detail, absent=error.absent) from None
+        what = error.what
+        if result.errors.said:
+            what = Text.of("boot.with_errors", what=what, errors=result.errors.said)
+        raise BootError(error.letter, what, absent=error.absent) from None

@@ -14,6 +14,18 @@ from bridge.drive import Codes, deciding, is_scale, no_scale
 from bridge.mapping.model import Family, Meaning, ObjectRef, Parameter
 from bridge.node.boot.actions import Action, BootResult, WordFacts, go_on_without
 from bridge.node.places.sdo_channels import FIRST, channel_of
+from bridge.text import Text, render
+
+
+class NotANumber(ValueError):
+    """The bytes of a parameter are no number."""
+
+    def __init__(self, said: Text) -> None:
+        super().__init__(said)
+        self.said = said
+
+    def __str__(self) -> str:
+        return render(self.said)
 
 
 def meanings_of(drive: Drive) -> list[tuple[Meaning, int, ObjectRef]]:
@@ -55,7 +67,7 @@ def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action
     asked = meanings_of(drive)
     found.codes = {one.leaf: [None] * drive.family.sets for one, _, _ in asked}
     if channel is None:
-        found.why_unread = "cannot be read: no SDO channel reaches this drive (sdo_channels)"
+        found.why_unread = Text.of("meaning.no_channel")
         return found
     try:
         for one, in_set, ref in asked:
@@ -70,8 +82,8 @@ def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action
         if channel == FIRST:
             raise
         # The drive behind the channel may be away while the node itself is there.
-        result.notes.append(f"{drive.slot.name}: SDO channel {channel} does not answer")
-        found.why_unread = f"cannot be read: SDO channel {channel} does not answer"
+        result.notes.append(Text.of("boot.channel_silent", slot=drive.slot.name, channel=channel))
+        found.why_unread = Text.of("meaning.channel_silent", channel=channel)
     return found
 
 
@@ -93,14 +105,15 @@ def _read_parameters(
         except SdoError as error:
             _go_on_without(error, channel, result)
             value = math.nan
-        except ValueError as error:
-            result.notes.append(f"{drive.slot.name}: {error}")
+        except NotANumber as error:
+            result.notes.append(Text.of("boot.of_slot", slot=drive.slot.name, what=error.said))
             value = math.nan
         found.parameters[parameter.name, in_set] = value
         if value is None or parameter.name not in scaling or not parameter.read:
             continue
         if not is_scale(value):
-            result.notes.append(f"{drive.slot.name}: {no_scale(parameter.name, value)}")
+            what = no_scale(parameter.name, value)
+            result.notes.append(Text.of("boot.of_slot", slot=drive.slot.name, what=what))
         elif in_set == 1:
             _compare(drive, parameter, value, result)
 
@@ -109,18 +122,26 @@ def _compare(drive: Drive, parameter: Parameter, value: float, result: BootResul
     """With what the site file says of set 1."""
     given = drive.given_parameters.get(parameter.name)
     if given is not None and abs(given - value) > 1e-6:
-        result.notes.append(
-            f"{drive.slot.name}: {parameter.name} is {value:g} {parameter.unit} in the drive, "
-            f"{given:g} in the site file; the drive's counts"
+        note = Text.of(
+            "boot.scale_of_drive",
+            slot=drive.slot.name,
+            parameter=parameter.name,
+            value=value,
+            unit=parameter.unit,
+            given=given,
         )
+        result.notes.append(note)
 
 
 def parameter_value(parameter: Parameter, data: bytes) -> float:
-    """The value of a parameter from its bytes, in its unit. Raises ValueError where it is no number."""
+    """The value of a parameter from its bytes, in its unit. Raises NotANumber where it is none."""
     number = NUMBERS.get(parameter.data_type)
     if number is None:
-        raise ValueError(f"{parameter.name} is a {parameter.data_type}, no number")
+        said = Text.of("boot.parameter_no_number", parameter=parameter.name, type=parameter.data_type)
+        raise NotANumber(said)
     try:
         return round(number.decode(data) * parameter.factor, 9)
     except ValueError as error:
-        raise ValueError(f"{parameter.name} is a {parameter.data_type}: {error}") from None
+        name, kind = parameter.name, parameter.data_type
+        said = Text.of("boot.parameter_bytes", parameter=name, type=kind, why=Text.plain(str(error)))
+        raise NotANumber(said) from None

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from functools import partial
 from typing import Final
 
+from bridge.base.sdo_texts import text_of
 from bridge.canopen import cobid
 from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.nmt import NmtCommand
+from bridge.canopen.sdo import SdoError
 from bridge.command.node import Node
 from bridge.mapping.model import SdoServer
 from bridge.node.boot.actions import Action, BootResult, Do, Nmt, Step, number, told_as
 from bridge.node.boot.status import BootError
 from bridge.node.places.sdo_channels import opened_servers
+from bridge.text import Text
 
 _PARAMETER: Final = 0x1200
 _OFF: Final = cobid.PDO_DISABLED
@@ -27,14 +31,17 @@ def open_sdo_servers(node: Node, result: BootResult) -> Do:
     """
     must_stop = False
     for server in opened_servers(node):
-        name = f"SDO channel {server.number}"
-        yield Step(f"opening {name}", "J", needed_by="sdo_channels")
-        with told_as(lambda error, name=name: BootError("J", f"{name} cannot be opened: {error}")):
+        yield Step(Text.of("boot_step.channel", channel=server.number), "J", needed_by="sdo_channels")
+        with told_as(partial(_not_opened, server.number)):
             changed = yield from _open(server, node.table.id, result)
         must_stop = must_stop or (changed and server.after_stop)
     if must_stop:
         yield Nmt(NmtCommand.STOP)
         yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+
+
+def _not_opened(channel: int, error: SdoError) -> BootError:
+    return BootError("J", Text.of("boot.channel_not_opened", channel=channel, why=text_of(error)))
 
 
 def _open(server: SdoServer, node_id: int, result: BootResult) -> Generator[Action, bytes | None, bool]:
@@ -52,10 +59,11 @@ def _open(server: SdoServer, node_id: int, result: BootResult) -> Generator[Acti
         yield Write(index, sub, _bytes(want))
         kept = number((yield Read(index, sub)))
         if kept & _COMPARED != want:
-            raise BootError("J", f"{index:04X}h:{sub:02X} is {kept:08X}h, expected {want:08X}h")
+            name = f"{index:04X}h:{sub:02X}"
+            raise BootError("J", Text.of("boot.id_not_kept", object=name, read=kept, wanted=want))
     if changed:
         ids = f"{server.request + node_id:03X}h/{server.reply + node_id:03X}h"
-        result.notes.append(f"SDO channel {server.number} opened at {ids}")
+        result.notes.append(Text.of("boot.channel_opened", channel=server.number, ids=ids))
     return changed
 
 

@@ -11,6 +11,7 @@ from bridge.image import Value
 from bridge.mapping.own_places import OwnPlace, ends_own_watch, places
 from bridge.parameter import Entry, ParameterError
 from bridge.parameter.codec import encode_value
+from bridge.text import Text
 
 
 class OwnWatch:
@@ -21,7 +22,7 @@ class OwnWatch:
         self._protection = node.names.protection
         self._places = {drive.name: places(drive.family) for drive in node.drives}
 
-    def why_kept(self, drive: HasParameters, entry: Entry, value: Value) -> str:
+    def why_kept(self, drive: HasParameters, entry: Entry, value: Value) -> Text | str:
         """Why this is not written: a drive of the site is stopped by silence, and would not stop."""
         key = entry.address.index, entry.address.sub
         silent: list[str] = []
@@ -32,16 +33,14 @@ class OwnWatch:
                 silent.append(one.name)
         if not silent:
             return ""
-        return (
-            f"{entry.name} would end the watch by which silence stops {' and '.join(silent)}: first another "
-            "on_expiry and no then_silence_ms in the site file"
-        )
+        return Text.of("own.would_end", parameter=entry.name, drives=tuple(silent))
 
-    def forget(self, drive: HasParameters, entry: Entry, what: str, now: float) -> None:
-        """What the boot-up has read of it is not true any more; the next boot-up reads it again."""
+    def forget(self, drive: HasParameters, entry: Entry, now: float, *, is_certain: bool = True) -> None:
+        """What the boot-up has read of it is not true any more, or, where it is not ``is_certain`` that it
+        was written, may not be; the next boot-up reads it again."""
         if not self._protection.tells_own_supervision(entry.address):
             return
-        why = f"{entry.name} {what} since boot: boot the node to have it read again"
+        why = Text.of("own.changed" if is_certain else "own.may_have_changed", parameter=entry.name)
         for one in self._concerned(drive, entry):
             one.on_own_supervision_changed(why, now)
         device = self._node.device

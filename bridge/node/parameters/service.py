@@ -151,10 +151,7 @@ class NodeParameters:
             state = Text.word("node_state", self._state.value)
             return _no(Code.NOT_READY, Text.of("node.state_of_drives", state=state))
         if request.action is not Action.SAVE_PARAMETERS and self._channels[drive.name] is None:
-            return _no(
-                Code.NOT_CONFIGURED,
-                f"{drive.name}: {NO_CHANNEL}",
-            )
+            return _no(Code.NOT_CONFIGURED, Text.of("parameter.of", owner=drive.name, what=NO_CHANNEL))
         return None
 
     def _begin(self, request: Request, drive: HasParameters, now: float, reply: Reply) -> None:
@@ -264,13 +261,13 @@ class NodeParameters:
         self._writing.discard((drive.name, entry.address))
         if isinstance(result, ParameterError):
             if result.why in (Why.NO_ANSWER, Why.NOT_TAKEN):
-                self._own_watch.forget(drive, entry, "may have been changed", self._now)
+                self._own_watch.forget(drive, entry, self._now, is_certain=False)
             conclude(_failed(result))
             return
         reading = result.reading
         self._show(drive, entry, self._as_listed(drive, entry, reading))
         if result.changed:
-            self._own_watch.forget(drive, entry, "was changed", self._now)
+            self._own_watch.forget(drive, entry, self._now)
             told, who = str(reading), str(request.identity)
             said = Text.of("parameter.changed", reading=told, who=who)
             if result.before is not None:

@@ -6,16 +6,17 @@ from collections.abc import Iterable
 from typing import Final
 
 from bridge.command import HasParameters
-from bridge.command.link import NodeState
+from bridge.command.link import REASONS, NodeState
 from bridge.command.node import Node
 from bridge.image import Image, Quality
 from bridge.parameter import Entry, ObjectRef, ParameterError, Reading, Why
+from bridge.text import Text
 
 _FINAL_ABORTS: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0602_0000, 0x0609_0011))
 """Abort codes for what a drive does not have: asking again gives the same answer."""
 
 
-NO_CHANNEL: Final = "no SDO channel reaches it: name its channel in sdo_channels of the site file"
+NO_CHANNEL: Final = Text.of("parameter.no_channel")
 
 
 class ParameterView:
@@ -43,7 +44,7 @@ class ParameterView:
                 quality, self._dead_at = Quality.LOST, now + self._hold_s
             case _:
                 quality = Quality.STALE
-        self._judge(quality, now, f"node {state.value}")
+        self._judge(quality, now, REASONS[state])
 
     def unreached(self, drives: Iterable[HasParameters], now: float) -> None:
         """No open SDO channel leads to these."""
@@ -55,12 +56,12 @@ class ParameterView:
     def on_time(self, now: float) -> None:
         if self._dead_at is not None and now >= self._dead_at:
             self._dead_at = None
-            self._judge(Quality.DEAD, now, f"node {NodeState.LOST.value}")
+            self._judge(Quality.DEAD, now, REASONS[NodeState.LOST])
 
     def next_deadline(self) -> float | None:
         return self._dead_at
 
-    def _judge(self, quality: Quality, now: float, reason: str) -> None:
+    def _judge(self, quality: Quality, now: float, reason: Text) -> None:
         """What never had a value waits on, except where the node is out of service."""
         for index in self._indices.values():
             if self._image[index].quality is not Quality.WAITING or quality is Quality.DISABLED:

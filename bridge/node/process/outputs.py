@@ -13,6 +13,7 @@ from bridge.mapping.fields import ObjectRef
 from bridge.node.boot import BootResult, PdoPlan, SignalPlan
 from bridge.node.process.held import held_s
 from bridge.node.process.process_data import Repetition, Tpdo
+from bridge.text import Text
 
 
 class OutputRpdo:
@@ -100,7 +101,7 @@ def connect_outputs(
     plans: list[PdoPlan] = []
     for one in plan.pdos:
         if is_taken(one.cob_id):
-            why = f"another node has {one.name} on the same identifier, {one.cob_id:03X}h"
+            why = Text.of("boot.pdo_id_taken", pdo=one.name, id=f"{one.cob_id:03X}h")
             result.notes.append(why)
             carried = (ObjectRef(entry.index, entry.sub) for entry in one.codec.entries)
             plan.unserved |= dict.fromkeys(carried, why)

@@ -19,6 +19,7 @@ from bridge.image import Quality
 from bridge.node.boot import BootResult, PdoPlan
 from bridge.node.places.words import WordMap
 from bridge.node.process.held import held_s
+from bridge.text import Text
 
 Reject = Callable[[Frame, str], None]
 
@@ -259,13 +260,14 @@ def connect(
             drive.channel.start_anew(now)
         for (name, in_set), setting in facts.parameters.items():
             drive.news.on_parameter(name, setting, now, in_set)
-        result.notes += [f"{drive.slot.name}: {what}" for what in drive.channel.meanings.unknown()]
+        result.notes += [_of(drive, what) for what in drive.channel.meanings.unknown()]
         plan = result.drives[drive.name]
         if not plan.rpdos or not plan.tpdos or plan.problem:
             continue
         if any(is_taken(pdo.cob_id) for pdo in (*plan.rpdos, *plan.tpdos)):
-            plan.leave_out("another node has its PDO on the same identifier")
-            result.notes.append(f"{drive.slot.name}: {plan.problem}")
+            why = Text.of("boot.id_taken")
+            plan.leave_out(why)
+            result.notes.append(_of(drive, why))
             continue
         pdos = connected[drive.name] = DrivePdos(drive, plan.rpdos, plan.tpdos, reject)
         drive.on_pdos(
@@ -276,21 +278,25 @@ def connect(
             rpdo_type=plan.rpdos[0].transmission_type,
         )
         missing = _without_effect(node.bus, plan.rpdos, plan.tpdos)
-        result.notes += [f"{drive.slot.name}: {why}" for why in missing]
+        result.notes += [_of(drive, why) for why in missing]
     return connected
 
 
-def _without_effect(bus: BusTable, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan]) -> list[str]:
+def _of(drive: Drive, what: Text) -> Text:
+    return Text.of("boot.of_slot", slot=drive.slot.name, what=what)
+
+
+def _without_effect(bus: BusTable, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan]) -> list[Text]:
     """What these PDOs wait for and will not get from us."""
-    found: list[str] = []
+    found: list[Text] = []
     listed = [("RPDO", plan, LAST_SYNCHRONOUS) for plan in rpdos]
     listed += [("TPDO", plan, REMOTE_SYNCHRONOUS) for plan in tpdos]
     for name, plan, last in listed:
         kind = plan.transmission_type
         if not bus.sync_period_ms and (kind <= LAST_SYNCHRONOUS or kind == last):
-            found.append(f"{name} of type {kind} waits for SYNC, which the bridge does not send")
+            found.append(Text.of("boot.waits_for_sync", pdo=name, type=kind))
     for tpdo in tpdos:
         kind = tpdo.transmission_type
         if kind in REMOTE_TYPES and not tpdo.remote_allowed:
-            found.append(f"TPDO of type {kind} with a COB-ID that allows no remote frames")
+            found.append(Text.of("boot.no_remote_frames", type=kind))
     return found

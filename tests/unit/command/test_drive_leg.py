@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from bridge.command import Kind
 from bridge.command.link import Link, NodeState
 from bridge.image import Quality
+from bridge.text import render
 from tests.support.rig import ENABLED, Rig
 
 _PAST = 1e-6
@@ -124,9 +125,9 @@ class TestQuality:
         link_ = link()
         link_.on_node(NodeState.OPERATIONAL, 1.0)
         assert link_.reason(Quality.GOOD) == ""
-        assert link_.reason(Quality.STALE) == "no process data from the drive"
+        assert render(link_.reason(Quality.STALE)) == "no process data from the drive"
         link_.on_node(NodeState.LOST, 2.0)
-        assert link_.reason(Quality.LOST) == "node lost"
+        assert render(link_.reason(Quality.LOST)) == "node lost"
 
 
 class TestTelegramDowntime:

@@ -20,7 +20,7 @@ from bridge.command import (
     Write,
     command_of,
 )
-from bridge.command.link import NodeState
+from bridge.command.link import REASONS, NodeState
 from bridge.command.worst_case import Wire
 from bridge.image import Quality, Reading, Value
 from tests.support import sites
@@ -217,7 +217,7 @@ class TestData:
 
     def test_an_unknown_scale_is_a_configuration_error_and_says_which(self, running: Hall):
         reading = running.read("actual/current")
-        assert reading == Reading(16384.0, Quality.CONFIG_ERROR, 100.0, reading.reason)
+        assert reading == Reading(16384.0, Quality.CONFIG_ERROR, 100.0, reading.why)
         assert reading.reason == "P112 cannot be read and is not in the site file"
 
     def test_a_scale_learned_at_boot_up_counts_from_then_on(self, running: Hall):
@@ -261,7 +261,7 @@ class TestData:
 
     def test_a_lost_node_is_lost_at_once_and_told(self, running: Hall):
         running.plant.on_node(running.node, NodeState.LOST, 100.05)
-        assert running.read("status/state") == Reading(4, Quality.LOST, 100.05, "node lost")
+        assert running.read("status/state") == Reading(4, Quality.LOST, 100.05, REASONS[NodeState.LOST])
         assert [event.kind for event in running.events if event.source == "conveyor"] == [
             Kind.NODE_BACK,
             Kind.NODE_LOST,

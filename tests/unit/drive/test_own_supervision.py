@@ -6,6 +6,7 @@ import pytest
 
 from bridge.config import BusTable, NodeTable
 from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, Watch, judge, why_silence_does_not_stop
+from bridge.text import render
 from tests.support import sites
 
 STOPS, RUNS, UNKNOWN = OwnVerdict.STOPS, OwnVerdict.RUNS_ON, OwnVerdict.UNKNOWN
@@ -96,11 +97,11 @@ def test_silence_of_its_process_data_stops_a_drive_that_watches_them_and_is_alon
     stops = OwnJudgement((watch(STOPS, 100.0, name="P151"),))
     runs = OwnJudgement((watch(RUNS, 0.0, name="P151", why="P151 is 0 (off)"),))
     assert why_silence_does_not_stop(NORD, stops, tables()[1]) == ""
-    assert why_silence_does_not_stop(NORD, runs, tables()[1]) == "P151 is 0 (off)"
+    assert render(why_silence_does_not_stop(NORD, runs, tables()[1])) == "P151 is 0 (off)"
     shared = "P151 watches the RPDOs of all 2 drives of the node: those of the others go on"
-    assert why_silence_does_not_stop(NORD, stops, tables(2)[1]) == shared
+    assert render(why_silence_does_not_stop(NORD, stops, tables(2)[1])) == shared
 
 
 def test_silence_is_no_stop_where_something_else_is_watched() -> None:
     why = why_silence_does_not_stop(sites.family("stoeber/5000"), OwnJudgement(), tables()[1])
-    assert why.endswith("watches life guarding, and not its process data: that goes on")
+    assert render(why).endswith("watches life guarding, and not its process data: that goes on")

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from bridge.drive import ValueCodec, scale_of
 from bridge.mapping.model import ProcessValue
+from bridge.text import render
 
 WORDS = ("first", "second", "third")
 
@@ -75,7 +76,7 @@ def test_an_unknown_scale_gives_the_bare_number_and_says_why() -> None:
     it = codec(scale={"full": "P1", "at": 100})
     assert it.is_unknown
     assert it.from_words([0, 0xFFFF, 0]) == -1.0
-    assert it.why_unknown == "P1 cannot be read and is not in the site file"
+    assert render(it.why_unknown) == "P1 cannot be read and is not in the site file"
 
 
 def test_an_enumeration_takes_its_own_numbers() -> None:

@@ -13,6 +13,7 @@ import pytest
 
 from bridge.command.link import NodeState
 from bridge.sim.core.habit import Habit, Rule
+from bridge.text import render
 from tests.support.bench import Bench, write_site
 from tests.unit.node.test_habits import CONFIGURE, REQUEST, bench_of, is_operational, status
 
@@ -103,7 +104,7 @@ def test_a_name_that_the_site_asks_for_is_needed_and_the_rule_is_named(tmp_path:
 def test_each_step_of_a_boot_up_says_which_rule_needs_it(tmp_path: Path) -> None:
     bench = bench_of(tmp_path, None, CONFIGURE)
     steps: list[str] = []
-    bench.network.nodes[0].say = lambda text, now: steps.append(text)
+    bench.network.nodes[0].say = lambda said, now: steps.append(render(said))
     conclude(bench)
     assert "reading the identity" in steps, "of what nobody asks for there is nothing to say"
     assert "downloading the configuration, 1 of 2 (needed by configure)" in steps

@@ -11,7 +11,7 @@ from bridge.command import Action, Code, Event, Identity, Outcome, Request, Role
 from bridge.command.link import NodeState
 from bridge.command.messages.request import Do
 from bridge.node.nmt_commands import NMT, CommandedNode, answer, carry_out, refusal
-from bridge.text import render
+from bridge.text import Text, render
 from tests.support import sites
 
 OPERATOR = Identity(Source.OPCUA, "ann", Role.OPERATOR)
@@ -120,8 +120,8 @@ class Told:
     def boot_next(self, at: float | None) -> None:
         self.did.append(("boot", at))
 
-    def say(self, text: str, now: float) -> None:
-        self.did.append(text)
+    def say(self, said: Text, now: float) -> None:
+        self.did.append(render(said))
 
     def set_state(self, state: NodeState, now: float) -> None:
         self.did.append(state)

@@ -9,6 +9,7 @@ from bridge.command import Event, Identification
 from bridge.command.link import NodeState
 from bridge.node.boot import BootError
 from bridge.node.view import NodeView
+from bridge.text import Text
 from tests.support import sites
 
 
@@ -35,14 +36,14 @@ def case() -> Case:
 
 def test_a_failed_boot_up_is_an_event_once_until_it_succeeds(case: Case) -> None:
     for _ in range(3):
-        case.view.failed(BootError("B", "1000h"), 10.0)
+        case.view.failed(BootError("B", Text.plain("1000h")), 10.0)
     assert len(case.told()) == 1
-    assert case.point("boot_status") == str(BootError("B", "1000h"))
-    case.view.failed(BootError("B", "1018h"), 10.0)
+    assert case.point("boot_status") == str(BootError("B", Text.plain("1000h")))
+    case.view.failed(BootError("B", Text.plain("1018h")), 10.0)
     assert len(case.told()) == 1, "another way of failing"
     case.view.succeeded("no errors", 11.0)
     assert case.point("boot_status") == "no errors"
-    case.view.failed(BootError("B", "1018h"), 12.0)
+    case.view.failed(BootError("B", Text.plain("1018h")), 12.0)
     assert len(case.told()) == 1
 
 

@@ -15,7 +15,7 @@ import pytest
 from bridge.can.interface import ControllerState
 from bridge.command.link import NodeState
 from bridge.command.messages.request import Action
-from bridge.config import DriveTable
+from bridge.config import DriveTable, NodeTable
 from bridge.drive import DriveState
 from bridge.text import LANGUAGES, Text
 from bridge.text.templates import parse, source, templates
@@ -26,6 +26,8 @@ GROUPS: Final[Mapping[str, Iterable[str]]] = {
     "drive_state": [state.label for state in DriveState],
     "node_state": [state.value for state in NodeState],
     "reaction": get_args(DriveTable.model_fields["on_expiry"].annotation),
+    "supervision": get_args(NodeTable.model_fields["supervision"].annotation),
+    "word": ["control_word", "status_word"],
 }
 """Words out of enumerations."""
 _CODE: Final = re.compile(r"[a-z][a-z0-9_]*(\.[a-z0-9_]+)*")

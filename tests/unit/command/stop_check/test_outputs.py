@@ -10,6 +10,7 @@ import pytest
 from bridge.command.stop_check.outputs import Answer, OutputStopCheck, Question, StoppedOutput
 from bridge.command.stop_check.state import LastStop
 from bridge.mapping.fields import ObjectRef
+from bridge.text import render
 
 NONE, FORWARDED, FOLLOWED, IGNORED = LastStop
 WAY_S, BOUND_S = 0.125, 0.5
@@ -101,10 +102,14 @@ def test_outputs_that_are_read_as_they_are_sent_have_followed() -> None:
     assert line.stop_check.question(WAY_S / 2) is None, "the frame may still be on its way"
     line.answer(line.ask(WAY_S), OFF)
     assert line.state is FORWARDED, "one of two"
-    assert line.stop_check.why == "its outputs have not been read back yet"
+    assert render(line.stop_check.why) == "its outputs have not been read back yet"
     line.answer(line.ask(WAY_S), Answer(50))
     assert line.ended == [(FOLLOWED, WAY_S)]
-    assert (line.stop_check.follows, line.stop_check.why, line.stop_check.is_owed) == (True, "", False)
+    assert (line.stop_check.follows, render(line.stop_check.why), line.stop_check.is_owed) == (
+        True,
+        "",
+        False,
+    )
     assert line.stop_check.next_reading() is None
 
 
@@ -113,7 +118,7 @@ def test_an_output_with_another_value_is_read_again_after_the_bound_and_then_ign
     line.runs(BOUND_S, ON, Answer(50))
     assert line.ended == [(IGNORED, BOUND_S)]
     assert line.asked == [("valves", WAY_S), ("speed", WAY_S), ("valves", BOUND_S), ("speed", BOUND_S)]
-    assert line.stop_check.why == "6200h:01 (valves) holds 81h instead of 00h"
+    assert render(line.stop_check.why) == "6200h:01 (valves) holds 81h instead of 00h"
     assert not line.stop_check.follows
 
 
@@ -135,7 +140,10 @@ def test_one_question_at_a_time() -> None:
 def test_an_output_that_takes_its_time_has_until_the_bound() -> None:
     line = Line(VALVES)
     line.runs(BOUND_S / 2, ON)
-    assert (line.state, line.stop_check.why) == (FORWARDED, "6200h:01 (valves) holds 81h instead of 00h")
+    assert (line.state, render(line.stop_check.why)) == (
+        FORWARDED,
+        "6200h:01 (valves) holds 81h instead of 00h",
+    )
     line.runs(BOUND_S, OFF)
     assert line.ended == [(FOLLOWED, BOUND_S)]
 
@@ -145,7 +153,7 @@ def test_what_the_node_refuses_is_asked_once_more_and_stays_forwarded_with_the_r
     line.runs(BOUND_S - 0.01, REFUSED, Answer(50))
     assert not line.stop_check.is_stuck, "it is asked again after the bound"
     line.runs(1000.0, REFUSED, Answer(50))
-    assert (line.ended, line.state, line.stop_check.why) == ([], FORWARDED, REFUSED.why)
+    assert (line.ended, line.state, render(line.stop_check.why)) == ([], FORWARDED, render(REFUSED.why))
     assert [at for name, at in line.asked if name == "valves"] == [WAY_S, BOUND_S]
     assert line.stop_check.is_stuck
 
@@ -160,7 +168,7 @@ def test_a_silent_node_is_asked_again_and_has_a_bound_of_its_own() -> None:
     """Who does not answer may not have heard the stop."""
     line = Line(VALVES, SPEED)
     line.runs(2.0, SILENT, SILENT)
-    assert (line.state, line.stop_check.why) == (FORWARDED, SILENT.why)
+    assert (line.state, render(line.stop_check.why)) == (FORWARDED, render(SILENT.why))
     assert line.asked == [("valves", WAY_S), ("valves", WAY_S + 1.0)], "not each of them in vain"
     due = WAY_S + 2.0
     assert line.stop_check.next_reading() == due
@@ -177,7 +185,7 @@ def test_a_value_that_was_seen_before_counts_no_more_when_it_cannot_be_read_agai
     line = Line(VALVES)
     line.answer(line.ask(WAY_S), ON)
     line.answer(line.ask(BOUND_S), SILENT)
-    assert (line.state, line.stop_check.why) == (FORWARDED, SILENT.why)
+    assert (line.state, render(line.stop_check.why)) == (FORWARDED, render(SILENT.why))
 
 
 def test_outputs_that_are_ignored_are_looked_at_until_they_follow_after_all() -> None:
@@ -234,7 +242,7 @@ def test_a_node_that_leaves_is_not_judged_and_then_from_when_it_is_back() -> Non
     question = line.ask(WAY_S)
     line.stop_check.on_settled((0, 50), is_there=False)
     assert (line.state, line.stop_check.is_judged, line.stop_check.next_reading()) == (FORWARDED, False, None)
-    assert line.stop_check.why == "the node left operation before its outputs were read back"
+    assert render(line.stop_check.why) == "the node left operation before its outputs were read back"
     assert not line.stop_check.is_stuck
     line.answer(question, ON)
     line.stop_check.on_settled((0, 50), is_there=True)
@@ -249,7 +257,7 @@ def test_who_has_ignored_its_stop_still_does_when_its_node_was_stopped() -> None
     line.runs(BOUND_S, ON)
     line.stop_check.on_settled((0, 50), is_there=False)
     assert (line.state, line.stop_check.follows) == (IGNORED, False)
-    assert line.stop_check.why == "6200h:01 (valves) holds 81h instead of 00h"
+    assert render(line.stop_check.why) == "6200h:01 (valves) holds 81h instead of 00h"
 
 
 def test_a_second_ignored_stop_is_said_to_be_one() -> None:
@@ -305,7 +313,7 @@ def test_a_telegram_after_the_bound_makes_an_ignored_stop() -> None:
 def test_a_tpdo_that_does_not_come_is_the_reason() -> None:
     line = Line(TOLD, SPEED)
     line.runs(1000.0, OFF, Answer(50))
-    assert (line.state, line.stop_check.why) == (FORWARDED, "no TPDO1 from the node")
+    assert (line.state, render(line.stop_check.why)) == (FORWARDED, "no TPDO1 from the node")
     assert not line.stop_check.is_stuck, "it may still come"
     line.tells(0, 1001.0)
     assert line.state is FOLLOWED
@@ -357,7 +365,7 @@ def test_what_is_sent_on_change_counts_beside_the_answers_and_the_newer_one_wins
 def test_what_is_told_of_other_objects_says_nothing() -> None:
     line = Line(SPEED)
     line.tells(0, BOUND_S)
-    assert (line.state, line.stop_check.why) == (FORWARDED, "its outputs have not been read back yet")
+    assert (line.state, render(line.stop_check.why)) == (FORWARDED, "its outputs have not been read back yet")
 
 
 @pytest.mark.parametrize(

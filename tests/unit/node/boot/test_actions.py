@@ -18,15 +18,20 @@ from bridge.node.boot.actions import (
     write_number,
 )
 from bridge.node.boot.status import BootError
+from bridge.text import Text, render
 from tests.support.answering import Answering
 
 SILENCE = SdoError(0x1008, 0, 0x0504_0000, by_server=False)
 REFUSAL = SdoError(0x1008, 0, 0x0602_0000, by_server=True)
 
 
+PDOS = Text.of("boot_step.pdos")
+
+
 def test_a_step_names_the_key_that_asks_for_it() -> None:
-    assert str(Step("reading PDOs", "J")) == "reading PDOs"
-    assert str(Step("reading PDOs", "J", needed_by="drive")) == "reading PDOs (needed by drive)"
+    assert render(Step(PDOS, "J").said) == "reading the process data mapping"
+    said = Step(PDOS, "J", needed_by="drive").said
+    assert render(said) == "reading the process data mapping (needed by drive)"
 
 
 def test_an_error_is_known_again_by_register_and_newest_code() -> None:
@@ -36,9 +41,9 @@ def test_an_error_is_known_again_by_register_and_newest_code() -> None:
 
 def test_of_reasons_to_leave_a_drive_out_the_first_counts() -> None:
     plan = DrivePlan()
-    plan.leave_out("first")
-    plan.leave_out("second")
-    assert plan.problem == "first"
+    plan.leave_out(Text.of("boot.id_taken"))
+    plan.leave_out(Text.of("boot.has_no", object="RPDO1"))
+    assert plan.problem == Text.of("boot.id_taken")
 
 
 @pytest.mark.parametrize(
@@ -78,7 +83,7 @@ def test_who_is_silent_about_two_of_them_is_noted_and_about_three_is_gone() -> N
     for times in (1, 2):
         assert node.run(wish(result, 0x1008)) is None
         assert len(result.notes) == result.silences == times
-    assert result.notes[0].startswith("cannot be read, and is not needed: 1008h:00")
+    assert render(result.notes[0]).startswith("cannot be read, and is not needed: 1008h:00")
     with pytest.raises(SdoError):
         node.run(wish(result, 0x1008))
 
@@ -98,9 +103,9 @@ def test_a_wrong_answer_is_no_silence() -> None:
 
 
 def test_a_refusal_is_told_as_something_else_and_silence_stays_silence() -> None:
-    with pytest.raises(BootError, match="J: no"), told_as(lambda error: BootError("J", "no")):
+    with pytest.raises(BootError, match="J: no"), told_as(lambda error: BootError("J", Text.plain("no"))):
         raise REFUSAL
-    with pytest.raises(SdoError), told_as(lambda error: BootError("J", "no")):
+    with pytest.raises(SdoError), told_as(lambda error: BootError("J", Text.plain("no"))):
         raise SILENCE
 
 

@@ -14,6 +14,7 @@ from bridge.image import Quality
 from bridge.node.boot.actions import BootResult, Read, Step, Write
 from bridge.node.boot.configuration import configuration_stamp, configure
 from bridge.node.boot.status import BootError
+from bridge.text import render
 from tests.support.bench import Bench, write_site
 
 REQUEST = 0x605
@@ -125,7 +126,7 @@ def test_a_node_that_has_our_configuration_date_is_left_alone() -> None:
     device.writes.clear()
     notes = device.configure(SPEED, store=True).notes
     assert device.writes == []
-    assert notes == ["the node has this configuration already (1020h)"]
+    assert [*map(render, notes)] == ["the node has this configuration already (1020h)"]
 
 
 def test_another_configuration_has_another_date() -> None:

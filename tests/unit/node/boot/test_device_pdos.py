@@ -10,6 +10,7 @@ from bridge.command.node import Node
 from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.actions import BootResult
 from bridge.node.boot.device_pdos import plan_device
+from bridge.text import render
 from tests.support.answering import Answering
 from tests.support.devices import ENCODER, IO_BLOCK, OUTPUTS
 from tests.support.nodes import device_plant
@@ -56,17 +57,17 @@ def test_a_tpdo_that_carries_an_input_is_used_with_its_times(encoder: Node) -> N
 def test_inputs_that_none_carries_have_their_reason(encoder: Node) -> None:
     result = planned(encoder, pdo(0x1800, 0x194, 0x6004_0020))
     assert result.inputs is not None
-    assert result.inputs.unserved == {
+    assert {ref: render(why) for ref, why in result.inputs.unserved.items()} == {
         SPEED: "no TPDO of the node carries 6030:01",
         ALARMS: "no TPDO of the node carries 6503:00",
     }
-    assert "no TPDO of the node carries 6030:01" in result.notes
+    assert "no TPDO of the node carries 6030:01" in map(render, result.notes)
 
 
 def test_one_that_is_off_is_the_reason_for_what_it_would_carry(encoder: Node) -> None:
     result = planned(encoder, pdo(0x1800, 0x8000_0194, 0x6004_0020))
     assert result.inputs is not None
-    assert result.inputs.unserved[POSITION] == "TPDO1 is switched off in the node"
+    assert render(result.inputs.unserved[POSITION]) == "TPDO1 is switched off in the node"
 
 
 def test_what_another_carries_is_served_all_the_same(encoder: Node) -> None:
@@ -79,21 +80,21 @@ def test_what_another_carries_is_served_all_the_same(encoder: Node) -> None:
 
 def test_what_nothing_describes_is_noted_and_a_synchronous_one_has_no_timer(encoder: Node) -> None:
     result = planned(encoder, pdo(0x1800, 0x194, 0x6004_0020, 0x2345_0108, kind=1, event_ms=100))
-    assert "TPDO1 carries 2345:01, which nothing here describes" in result.notes
+    assert "TPDO1 carries 2345:01, which nothing here describes" in map(render, result.notes)
     assert result.inputs is not None
     assert (result.inputs.pdos[0].transmission_type, result.inputs.pdos[0].event_timer_ms) == (1, 0)
 
 
 def test_an_identifier_that_is_not_for_pdos_is_used_for_none(encoder: Node) -> None:
     result = planned(encoder, pdo(0x1800, 0x594, 0x6004_0020))
-    assert "1800h:01 is 00000594h: no identifier for a PDO" in result.notes
+    assert "1800h:01 is 00000594h: no identifier for a PDO" in map(render, result.notes)
     assert result.inputs is not None
     assert result.inputs.pdos == []
 
 
 def test_a_mapping_that_fits_into_no_frame_is_told(encoder: Node) -> None:
     result = planned(encoder, pdo(0x1800, 0x194, 0x6004_0020, 0x6004_0020, 0x6004_0020))
-    assert any(note.startswith("TPDO1 is not used: ") for note in result.notes)
+    assert any(render(note).startswith("TPDO1 is not used: ") for note in result.notes)
 
 
 @pytest.mark.parametrize(("place", "is_found"), [(4, True), (5, False)])
@@ -111,8 +112,8 @@ def test_outputs_have_rpdos_and_what_else_those_carry_gets_0(tmp_path: Path) -> 
     result = planned(block, pdo(0x1400, 0x214, 0x6200_0108, 0x2345_0108))
     assert result.outputs is not None
     assert [plan.name for plan in result.outputs.pdos] == ["RPDO1"]
-    assert "RPDO1 carries 2345:01, too, which get 0" in result.notes
-    assert result.outputs.unserved[ObjectRef(0x6411, 1)] == "no RPDO of the node carries 6411:01"
+    assert "RPDO1 carries 2345:01, too, which get 0" in map(render, result.notes)
+    assert render(result.outputs.unserved[ObjectRef(0x6411, 1)]) == "no RPDO of the node carries 6411:01"
 
 
 def test_a_device_without_outputs_has_no_plan_for_them(encoder: Node) -> None:

@@ -19,6 +19,7 @@ from bridge.node.boot.device_watch import (
     read_why_not_safe,
     why_not_safe,
 )
+from bridge.text import Text, render
 from tests.support.answering import Answering
 from tests.support.devices import IO_BLOCK, OUTPUTS
 from tests.support.nodes import device_plant
@@ -54,13 +55,15 @@ def test_an_output_is_safe_where_mode_and_value_say_so(
     one: Place, safe: int, mode: int | None, value: int | None, why: str
 ) -> None:
     """CiA 401: an error mode of 1 takes the error value; digital ones have a bit each."""
-    assert why_not_safe(one, safe, mode, value) == why
+    assert render(why_not_safe(one, safe, mode, value)) == why
 
 
 def test_what_the_mapping_does_not_name_is_not_known() -> None:
     one = place("6200:01", "uint8", has_errors=False)
     why = why_not_safe(one, 0, 0xFF, 0)
-    assert why == "what valves does then is not known: the mapping names no error_mode and error_value"
+    assert (
+        render(why) == "what valves does then is not known: the mapping names no error_mode and error_value"
+    )
     node = Answering()
     assert node.run(read_why_not_safe(one, 0)) == why
     assert node.reads == []
@@ -70,7 +73,7 @@ def test_it_is_judged_by_what_the_node_holds() -> None:
     node = Answering({(0x6206, 1): b"\xff", (0x6207, 1): b"\0"})
     assert node.run(read_why_not_safe(DIGITAL, 0)) == ""
     del node.objects[0x6207, 1]
-    assert node.run(read_why_not_safe(DIGITAL, 0)).endswith("6207:01 cannot be read")
+    assert render(node.run(read_why_not_safe(DIGITAL, 0))).endswith("6207:01 cannot be read")
 
 
 def test_a_node_that_notices_and_keeps_its_outputs_runs_on() -> None:
@@ -134,8 +137,10 @@ def test_one_output_that_is_kept_is_enough_to_run_on(tmp_path: Path) -> None:
     result = judged(tmp_path, {**SAFE, (0x6206, 1): b"\xfe"})
     why = "valves keeps 1 of its bits: 6206:01 is FEh"
     assert result.own["shaft"].verdict is OwnVerdict.RUNS_ON
-    assert result.bridge_stop == (0, why)
-    assert result.notes == [f"outputs are not safe by themselves when the bridge falls silent: {why}"]
+    assert (result.bridge_stop[0], render(result.bridge_stop[1])) == (0, why)
+    assert [*map(render, result.notes)] == [
+        f"outputs are not safe by themselves when the bridge falls silent: {why}"
+    ]
 
 
 def test_what_the_site_accepts_is_no_note(tmp_path: Path) -> None:
@@ -150,4 +155,4 @@ def test_where_all_hold_nothing_is_read(tmp_path: Path) -> None:
     asked, result = Answering(SAFE), BootResult()
     asked.run(judge_outputs(node, words, result))
     assert asked.reads == []
-    assert result.bridge_stop == (0, "all of its outputs hold their values")
+    assert result.bridge_stop == (0, Text.of("outputs.all_hold"))

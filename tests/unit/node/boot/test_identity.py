@@ -10,6 +10,7 @@ import pytest
 from bridge.base.errors import FileFaults
 from bridge.command.link import NodeState
 from bridge.node.boot.status import HINTS
+from bridge.text import render
 from tests.support.quick import Quick, quick_site
 
 IDENTITY = {
@@ -55,7 +56,7 @@ def test_masks_and_patterns_let_pass_what_they_name(tmp_path: Path, rule: str) -
 def test_what_does_not_fit_is_named(tmp_path: Path, rule: str, says: str) -> None:
     quick = booted(tmp_path, rule)
     assert quick.status(1).startswith(says)
-    assert HINTS[says[0]] in quick.status(1)
+    assert render(HINTS[says[0]]) in quick.status(1)
     assert quick.states() == "s"
 
 
@@ -83,7 +84,7 @@ def test_a_silence_is_not_blamed_on_the_identity(tmp_path: Path, sub: int) -> No
     quick.run(2.6)  # reset after the first attempt, it is asked a second time at once
     status = quick.status(1)
     assert status.startswith(f"{'DMNO'[sub - 1]}: the node does not answer: 1018h:0{sub}: no valid answer")
-    assert HINTS["DMNO"[sub - 1]] not in status
+    assert render(HINTS["DMNO"[sub - 1]]) not in status
     assert f"needed by identity.{key}" in status
     assert "did the node restart" in status
     assert quick.core(1).state is NodeState.LOST
@@ -94,7 +95,7 @@ def test_a_lost_heartbeat_says_what_helps(tmp_path: Path) -> None:
     quick.run(3.0)
     quick.nodes[1].present = False
     quick.run(0.5)
-    assert quick.status(1) == f"E: lost: no heartbeat for 300 ms: {HINTS['E']}"
+    assert quick.status(1) == f"E: lost: no heartbeat for 300 ms: {render(HINTS['E'])}"
 
 
 def test_another_device_than_before_is_told(tmp_path: Path) -> None:

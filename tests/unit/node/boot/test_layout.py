@@ -13,6 +13,7 @@ from bridge.node.boot.layout import (
     missing_parts,
 )
 from bridge.node.places.words import Place
+from bridge.text import render
 
 
 def pdo(*objects: list[str], words: list[str] | None = None) -> Pdo:
@@ -84,7 +85,7 @@ def test_a_word_lacks_the_bits_that_no_object_fills() -> None:
 def test_what_the_node_has_otherwise_is_told_entry_by_entry() -> None:
     have = entries((0x6040, 0, 16), (0x6042, 0, 32), (0x2345, 1, 8), (0x0005, 0, 8))
     told = differences(have, factory_entries(ONE), (Place(0), Place(1), None, None))
-    assert told == [
+    assert [*map(render, told)] == [
         "6042:00/32 has 16 bits in the mapping file",
         "2345:01/8 is no word that the mapping file knows",
     ]

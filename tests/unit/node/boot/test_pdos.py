@@ -11,6 +11,7 @@ import pytest
 from bridge.canopen.sdo import SdoError
 from bridge.command import Plant
 from bridge.node import boot
+from bridge.text import render
 from tests.support.bench import NORD, write_site
 
 NOT_THERE = 0x0602_0000
@@ -68,13 +69,13 @@ def test_an_identifier_that_belongs_to_something_else_is_used_for_no_pdo(
 ) -> None:
     result = run(tmp_path, good() | {(parameter, 1): u32(cob_id)})
     first, second = result.drives.values()
-    assert first.problem == f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO"
+    assert render(first.problem) == f"{parameter:04X}h:01 is {cob_id:08X}h: no identifier for a PDO"
     assert second.problem == ""
 
 
 def test_two_drives_on_one_identifier_are_both_not_served(tmp_path: Path) -> None:
     result = run(tmp_path, good() | {(0x1401, 1): u32(0x205)})
-    assert {plan.problem for plan in result.drives.values()} == {
+    assert {render(plan.problem) for plan in result.drives.values()} == {
         "205h is the identifier of more than one PDO"
     }
 
@@ -92,10 +93,10 @@ def test_a_name_of_a_hundred_kilobytes_is_cut(tmp_path: Path) -> None:
 
 def test_a_switched_off_pdo_is_told(tmp_path: Path) -> None:
     result = run(tmp_path, good() | {(0x1801, 1): u32(0xC000_0285)})
-    assert "1801h:01: the PDO is switched off in the node" in result.drives["conveyor/fu2"].problem
+    assert "1801h:01: the PDO is switched off in the node" in render(result.drives["conveyor/fu2"].problem)
 
 
 def test_a_pdo_of_two_words_is_not_evaluated_by_the_interface(tmp_path: Path) -> None:
     """BU 2500 §6.4, note."""
     result = run(tmp_path, good() | {(0x1600, 0): b"\x02"})
-    assert "evaluates only 4 words" in result.drives["conveyor/fu1"].problem
+    assert "evaluates only 4 words" in render(result.drives["conveyor/fu1"].problem)

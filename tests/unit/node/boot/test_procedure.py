@@ -11,6 +11,7 @@ from bridge.canopen.frame import Frame
 from bridge.command.link import NodeState
 from bridge.image import Quality
 from bridge.node.boot.status import HINTS
+from bridge.text import render
 from tests.support.bench import BEGIN_S, Bench, write_site
 
 START = Frame(0, b"\x01\x05")
@@ -46,7 +47,7 @@ def test_another_device_is_named_with_letter_object_expected_and_read(
     bench = booted(tmp_path, node=f"[bus.node.identity]\n{rule}")
     assert status(bench).startswith(f"{letter}: {where} is ")
     assert "expected" in status(bench)
-    assert HINTS[letter] in status(bench)
+    assert render(HINTS[letter]) in status(bench)
     assert bench.plant.drives["conveyor/fu1"].quality is Quality.CONFIG_ERROR
     assert not was_started(bench)
 
@@ -67,7 +68,7 @@ def test_a_node_that_does_not_answer_is_b_and_says_what_to_look_at(tmp_path: Pat
     bench = Bench(write_site(tmp_path), present=False)
     bench.run(3.0)
     assert status(bench).startswith("B: 1000h:00: no valid answer")
-    assert HINTS["B"] in status(bench)
+    assert render(HINTS["B"]) in status(bench)
 
 
 def test_the_node_is_heard_before_it_is_started(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from bridge.canopen.sdo import SdoError
 from bridge.mapping.model import Parameter
 from bridge.node.boot.actions import BootResult
 from bridge.node.boot.scales import code_of, deciding_of, meanings_of, parameter_value, read_words
+from bridge.text import render
 from tests.support import sites
 from tests.support.answering import Answering
 from tests.support.nodes import node_of
@@ -88,7 +89,7 @@ def test_what_is_not_answered_is_no_value_and_is_noted() -> None:
     value = found.parameters[one.name, in_set]
     assert value is not None
     assert math.isnan(value)
-    assert result.notes[0] == f"cannot be read, and is not needed: {silence}"
+    assert render(result.notes[0]) == f"cannot be read, and is not needed: {silence}"
 
 
 def test_the_drives_own_value_counts_beside_that_of_the_site_file() -> None:
@@ -100,7 +101,9 @@ def test_the_drives_own_value_counts_beside_that_of_the_site_file() -> None:
         raw = round(50 / one.factor)
         node.objects[ref.index, ref.sub] = struct.pack("<h", raw)
     node.run(read_words(of_node, drive, result))
-    assert "fu1: P105 is 50 Hz in the drive, 60 in the site file; the drive's counts" in result.notes
+    assert "fu1: P105 is 50 Hz in the drive, 60 in the site file; the drive's counts" in map(
+        render, result.notes
+    )
 
 
 def test_without_a_channel_nothing_is_asked_and_the_key_is_named() -> None:
@@ -109,4 +112,4 @@ def test_without_a_channel_nothing_is_asked_and_the_key_is_named() -> None:
     node = Answering()
     found = node.run(read_words(of_node, drive, BootResult()))
     assert node.reads == []
-    assert found.why_unread == "cannot be read: no SDO channel reaches this drive (sdo_channels)"
+    assert render(found.why_unread) == "cannot be read: no SDO channel reaches this drive (sdo_channels)"

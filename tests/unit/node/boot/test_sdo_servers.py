@@ -8,6 +8,7 @@ from bridge.canopen.nmt import NmtCommand
 from bridge.node.boot.actions import BootResult, Nmt
 from bridge.node.boot.sdo_servers import open_sdo_servers
 from bridge.node.boot.status import BootError
+from bridge.text import render
 from tests.support.answering import Answering
 from tests.support.nodes import node_of
 
@@ -35,7 +36,7 @@ def test_a_channel_that_is_off_is_switched_on_with_the_mappings_identifiers() ->
     node = Answering({(0x1202, 1): number(CLOSED), (0x1202, 2): number(CLOSED)})
     result = opened(node)
     assert node.writes == [(0x1202, 1, number(0x445)), (0x1202, 2, number(0x3C5))]
-    assert result.notes == ["SDO channel 3 opened at 445h/3C5h"]
+    assert [*map(render, result.notes)] == ["SDO channel 3 opened at 445h/3C5h"]
 
 
 def test_one_that_is_open_as_wanted_is_not_touched() -> None:

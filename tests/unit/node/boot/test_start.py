@@ -7,6 +7,7 @@ import pytest
 from bridge.canopen.pdo import MappingError
 from bridge.node.boot.actions import BootResult
 from bridge.node.boot.start import write_start
+from bridge.text import render
 from tests.support import sites
 from tests.support.answering import Answering
 from tests.support.nodes import node_of
@@ -24,7 +25,7 @@ def test_what_differs_is_written_and_told() -> None:
     node, result = Answering({KEY: b"\0\0"}), BootResult()
     node.run(write_start(drive_of(), result))
     assert (*KEY, b"\1\0") in node.writes
-    assert "fu1: 20A8:01 = 1" in result.notes
+    assert "fu1: 20A8:01 = 1" in map(render, result.notes)
 
 
 def test_what_is_there_already_is_neither_written_nor_told() -> None:

@@ -6,6 +6,7 @@ from bridge.image import Value
 from bridge.mapping.own_places import place_of, settable
 from bridge.node.parameters.own_watch import OwnWatch
 from bridge.parameter import Entry
+from bridge.text import render
 from tests.support import sites
 from tests.support.nodes import node_of
 
@@ -32,7 +33,7 @@ def test_a_watch_by_which_silence_stops_a_drive_is_not_ended() -> None:
     case = Case('on_expiry = "silence"')
     definition = case.entry.definition
     assert definition is not None
-    why = case.why_kept(case.off * definition.factor)
+    why = render(case.why_kept(case.off * definition.factor))
     assert why.startswith(f"{case.entry.name} would end the watch by which silence stops {case.drive.name}: ")
     assert "another on_expiry" in why
 

@@ -9,6 +9,7 @@ from bridge.command.link import NodeState
 from bridge.image import Quality
 from bridge.node.parameters.view import NO_CHANNEL, ParameterView
 from bridge.parameter import Entry, ParameterError, Reading, Why
+from bridge.text import render
 from tests.support import sites
 
 DRIVE = "conveyor/fu1"
@@ -95,4 +96,4 @@ def test_by_the_state_of_the_node(case: Case, state: NodeState, quality: Quality
 
 def test_what_no_channel_reaches_is_told(case: Case) -> None:
     case.view.unreached([case.drive], 10.0)
-    assert (case.point.quality, case.point.reason) == (Quality.CONFIG_ERROR, NO_CHANNEL)
+    assert (case.point.quality, case.point.reason) == (Quality.CONFIG_ERROR, render(NO_CHANNEL))

@@ -16,7 +16,6 @@ from bridge.command.link import NodeState
 from bridge.command.messages.request import Code
 from bridge.drive import DriveState
 from bridge.mapping import emcy_codes
-from bridge.node.boot import status
 from tests.support.phrases import SLOT, Book, is_looked_up, read
 from tests.support.said import WORD, WORDS, texts_of
 
@@ -137,8 +136,6 @@ def test_each_word_that_stands_in_messages_has_one() -> None:
         *(state.label.replace("_", " ") for state in DriveState),
         *(str(code) for code in Code),
         *abort.TEXTS.values(),
-        *status.TEXTS.values(),
-        *status.HINTS.values(),
         *emcy_codes.register_text(0xBF).split(", "),
     ]
     known = {english for english, _ in PAIRS}
@@ -186,26 +183,14 @@ def test_german_is_german() -> None:
 @pytest.mark.parametrize(
     ("said", "german"),
     [
-        ("the node does not answer", "der Knoten antwortet nicht"),
-        ("stopped by local:anna#1f", "angehalten von local:anna#1f"),
         (
-            "the drive runs on: C00593/1 is 0 (no reaction): it runs on; "
-            "1016:01 is 0: it watches no heartbeat",
-            "der Antrieb läuft weiter: C00593/1 ist 0 (no reaction): er läuft weiter; "
-            "1016:01 ist 0: er überwacht keinen Heartbeat",
-        ),
-        (
-            "B: 1000h:00: no valid answer: SDO protocol timed out (05040000h)",
-            "B: 1000h:00: keine gültige Antwort: Zeitüberschreitung im SDO-Protokoll (05040000h)",
+            "P102: 2066h:01: no valid answer: SDO protocol timed out (05040000h)",
+            "P102: 2066h:01: keine gültige Antwort: Zeitüberschreitung im SDO-Protokoll (05040000h)",
         ),
         (
             "no acknowledge: nobody else on the bus, or another bit rate; 128 transmit and 0 receive errors",
             "keine Bestätigung (ACK): niemand sonst am Bus, oder eine andere Bitrate; "
             "128 Sende- und 0 Empfangsfehler",
-        ),
-        (
-            "not in the telegram in parameter set 2: P543.2 is 3 (what runs), P546.2 is 1",
-            "nicht im Telegramm in Parametersatz 2: P543.2 ist 3 (what runs), P546.2 ist 1",
         ),
         ("what nobody has written down yet", "what nobody has written down yet"),
         ("", ""),
@@ -220,4 +205,4 @@ def test_each_habit_of_a_device_has_its_german_phrase(count: int) -> None:
     for habit in HABITS.values():
         assert lacking(habit.said(count, 8, 1)) == []
     for way in WAYS_BACK:
-        assert lacking(f"block transfer is not used any more: {way.says}") == []
+        assert lacking(way.says) == []

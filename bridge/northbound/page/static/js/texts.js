@@ -54,6 +54,15 @@ export function worded(text, english) {
   return english;
 }
 
+/** The words of a part of what the bridge says, {code, facts} or words already, of which no English is told. */
+export function inWords(text) {
+  if (typeof text === "string") return translated(text);
+  const known = templates.value[language.value];
+  if (known) return isKnown(text, known) ? rendered(text, known, translated) : text.code;
+  load(language.value, "texts", templates);
+  return "";
+}
+
 const book = signal(null);
 let isOpening = false;
 

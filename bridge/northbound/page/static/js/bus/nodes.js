@@ -4,24 +4,25 @@ import { classes, html, useState } from "../ui.js";
 import { may } from "../session.js";
 import { ask } from "../live.js";
 import { nodes } from "../site.js";
-import { many, t, translated } from "../texts.js";
+import { inWords, many, t } from "../texts.js";
 import { good, goodLabel } from "../drivestate.js";
 import { Icon, shapeOfNode } from "../icons.js";
 import { told } from "../outcome.js";
+import { texts } from "../values.js";
 import { words } from "../words.js";
 
 const STAGES = ["found", "identity", "configuration", "pdos", "supervision", "start"];
-// Which stage a step of the boot-up belongs to (bridge/node/boot). The steps come in the order of the stages: what is
-// before the present one is done.
-/** @type {[string, RegExp][]} */
-const WORDS = [
-  ["found", /^(looking for the node|reading where it listens)/],
-  ["identity", /^reading (the identity|name and version|its errors)/],
-  ["configuration", /^(resetting its communication|comparing the configuration|downloading the configuration|storing the configuration|reading the identifier of emergency messages|opening |setting error control)/],
-  ["pdos", /process data mapping/],
-  ["supervision", /^(reading the (drives'|node's) own supervision|reading what the words mean|waiting for )/],
-  ["start", /^starting/],
-];
+// Which stage a step of the boot-up belongs to, by the code of its text (bridge/node/boot). The steps come in the order
+// of the stages: what is before the present one is done.
+/** @type {Record<string, string[]>} */
+const STEPS = {
+  found: ["look", "listen"],
+  identity: ["identity", "name", "errors"],
+  configuration: ["reset", "compare", "download", "store", "emergency_id", "channel", "error_control"],
+  pdos: ["pdos_of", "pdos"],
+  supervision: ["own_supervision", "node_supervision", "words", "wait"],
+  start: ["start"],
+};
 // At which stage a boot-up ends with an error status of CiA 302-2.
 const ENDS = { B: "found", C: "identity", D: "identity", M: "identity", N: "identity", O: "identity", J: "configuration", E: "supervision", F: "supervision", K: "supervision" };
 
@@ -38,8 +39,8 @@ export function Nodes({ bus }) {
 function Node({ node }) {
   const point = (leaf) => `${node.name}/node/${leaf}`;
   const state = goodLabel(point("state"));
-  const status = good(point("boot_status")) ?? "";
-  const error = /^([A-O]): ([^]*)$/.exec(status);
+  const status = good(point("boot_status")) === null ? undefined : texts(point("boot_status")).value;
+  const error = failureOf(status);
   return html`
     <li class=${classes("busnode", `is-${state}`)}>
       <h3>${node.name} <small>${t("plant.node", { id: node.id })} · ${node.family}</small></h3>
@@ -49,44 +50,69 @@ function Node({ node }) {
       <ol class="stages" aria-label=${t("bus.boot")}>
         ${STAGES.map((stage, place) => html`<${Stage} stage=${stage} is=${standing(place, state, status, error)} />`)}
       </ol>
-      ${error ? html`<p class="is-alarm"><strong>${error[1]}</strong> ${translated(error[2])}</p>` : html`<${Found} status=${status} />`}
+      ${error ? html`<p class="is-alarm"><strong>${error.letter}</strong> ${withoutLetter(words(point("boot_status")))}</p>` : html`<${Found} status=${status} name=${point("boot_status")} />`}
       ${good(point("device_errors")) && html`<p><span class="label">${t("bus.device_errors")}</span> ${words(point("device_errors"))}</p>`}
       ${may("engineer") && html`<${Commands} node=${node.name} />`}
     </li>
   `;
 }
 
+// {letter, what}; null where it did not fail. A drive that was left out is a failure, too.
+function failureOf(status) {
+  if (status?.code.startsWith("boot.failed")) return status.facts;
+  const outcome = status?.code === "boot.noted" ? status.facts.outcome : status;
+  return outcome?.code === "boot.left_out" ? { letter: "J", what: status } : null;
+}
+
+const withoutLetter = (failure) => failure.slice(failure.indexOf(" ") + 1);
+
 // The present step; or what was found and set, one line each.
-function Found({ status }) {
-  const [first, ...notes] = status.split("; ");
-  if (!notes.length) return html`<p class="quiet">${translated(first)}</p>`;
+function Found({ status, name }) {
+  const notes = notesOf(status);
+  if (!notes.length) return html`<p class="quiet">${words(name)}</p>`;
   return html`<details><summary>${many("bus.notes", notes.length)}</summary>
-    <ul class="notes">${notes.map((note) => html`<li>${translated(note)}</li>`)}</ul></details>`;
+    <ul class="notes">${notes.map((note) => html`<li>${inWords(note)}</li>`)}</ul></details>`;
+}
+
+// Those of the boot-up, and of what was found since.
+function notesOf(text) {
+  return text?.code === "boot.noted" ? [...notesOf(text.facts.outcome), ...text.facts.notes] : [];
 }
 
 // "done", "now", "failed" or "open".
 function standing(place, state, status, error) {
-  if (error) return of(place, STAGES.indexOf(endOf(error[1], error[2])), "failed");
+  if (error) return of(place, STAGES.indexOf(endOf(error.letter, error.what)), "failed");
   if (state === "operational" || state === "stopped") return "done";
   if (state !== "booting") return "open";
   return of(place, STAGES.indexOf(stageOf(status)), "now");
 }
 
 const of = (place, present, is) => (place < present ? "done" : place === present ? is : "open");
-const stageOf = (text) => WORDS.find(([, words]) => words.test(text))?.[0] ?? "found";
+const bare = (step) => (step?.code === "boot_step.needed" ? step.facts.step : step);
+
+function stageOf(step) {
+  const name = bare(step)?.code.replace("boot_step.", "");
+  return STAGES.find((stage) => STEPS[stage].includes(name)) ?? "found";
+}
 
 // The stage at which a boot-up ended: that of the step, where it is named; J tells of anything that was to be set.
-function endOf(letter, detail) {
-  const step = /^nothing was heard while (.*)/.exec(detail)?.[1];
-  if (step) return stageOf(step);
-  if (detail.startsWith("the node stays ")) return "start";
-  return letter === "J" && isOfPdos(detail) ? "pdos" : (ENDS[letter] ?? "found");
+function endOf(letter, what) {
+  const ended = what.code === "boot.needed" ? what.facts.what : what;
+  if (ended.code === "boot.nothing_heard") return stageOf(ended.facts.step);
+  if (ended.code === "boot.stays") return "start";
+  return letter === "J" && isOfPdos(ended) ? "pdos" : (ENDS[letter] ?? "found");
 }
 
 // Whether the object that it names first is a parameter or a mapping of a PDO: 1400h … 1BFFh.
-function isOfPdos(detail) {
-  const object = /(?:^|[^0-9A-Za-z])([0-9A-F]{4})h(?![0-9A-Za-z])/.exec(detail)?.[1];
-  return object !== undefined && object >= "1400" && object <= "1BFF";
+function isOfPdos(what) {
+  const object = objectOf(what)?.slice(0, 4) ?? "";
+  return object >= "1400" && object <= "1BFF";
+}
+
+function objectOf(text) {
+  if (typeof text.facts.object === "string") return text.facts.object;
+  const inner = Object.values(text.facts).flat().filter((fact) => fact?.facts);
+  return inner.map(objectOf).find((object) => object);
 }
 
 function Stage({ stage, is }) {

@@ -1,0 +1,60 @@
+"""Why an SDO transfer has failed, as a text: ``canopen`` says it in English."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from bridge.canopen import abort
+from bridge.canopen.sdo_transfer import SdoError
+from bridge.text import Text
+
+_ABORTS: Final[Mapping[int, Text]] = {
+    0x0503_0000: Text.of("abort.toggle"),
+    0x0504_0000: Text.of("abort.timed_out"),
+    0x0504_0001: Text.of("abort.unknown_command"),
+    0x0504_0002: Text.of("abort.block_size"),
+    0x0504_0003: Text.of("abort.sequence"),
+    0x0504_0004: Text.of("abort.crc"),
+    0x0504_0005: Text.of("abort.out_of_memory"),
+    0x0601_0000: Text.of("abort.unsupported_access"),
+    0x0601_0001: Text.of("abort.write_only"),
+    0x0601_0002: Text.of("abort.read_only"),
+    0x0602_0000: Text.of("abort.no_object"),
+    0x0604_0041: Text.of("abort.not_mappable"),
+    0x0604_0042: Text.of("abort.pdo_length"),
+    0x0604_0043: Text.of("abort.parameter_incompatible"),
+    0x0604_0047: Text.of("abort.device_incompatible"),
+    0x0606_0000: Text.of("abort.hardware"),
+    0x0607_0010: Text.of("abort.length"),
+    0x0607_0012: Text.of("abort.length_too_high"),
+    0x0607_0013: Text.of("abort.length_too_low"),
+    0x0609_0011: Text.of("abort.no_sub"),
+    0x0609_0030: Text.of("abort.value"),
+    0x0609_0031: Text.of("abort.value_too_high"),
+    0x0609_0032: Text.of("abort.value_too_low"),
+    0x0609_0036: Text.of("abort.limits"),
+    0x060A_0023: Text.of("abort.no_resource"),
+    0x0800_0000: Text.of("abort.general"),
+    0x0800_0020: Text.of("abort.not_stored"),
+    0x0800_0021: Text.of("abort.local_control"),
+    0x0800_0022: Text.of("abort.device_state"),
+    0x0800_0023: Text.of("abort.no_dictionary"),
+    0x0800_0024: Text.of("abort.no_data"),
+}
+_UNKNOWN: Final = Text.of("abort.unknown")
+
+
+def text_of_abort(code: int) -> Text:
+    """The meaning of an abort code (CiA 301 §7.2.4.3.17)."""
+    return _ABORTS.get(code, _UNKNOWN)
+
+
+def text_of(error: SdoError) -> Text:
+    """The object, who has ended its transfer, and why."""
+    name, why, code = f"{error.index:04X}h:{error.sub:02X}", text_of_abort(error.code), error.code
+    if error.by_server:
+        return Text.of("sdo.aborted", object=name, why=why, code=code)
+    if code == abort.BUSY:
+        return Text.of("sdo.not_asked", object=name, why=why, code=code)
+    return Text.of("sdo.no_answer", object=name, why=why, code=code)

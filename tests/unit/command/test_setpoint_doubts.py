@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bridge.command.setpoint_doubts import InForce, SetpointDoubts, words_of
+from bridge.text import render
 
 
 def speed(value: float, *words: int, places: tuple[int, ...] = (0,), unit: str = "Hz") -> InForce:
@@ -21,7 +22,7 @@ def test_a_value_is_told_with_its_unit_and_no_more_digits_than_it_has() -> None:
 def test_the_same_word_that_means_something_else_is_in_doubt() -> None:
     doubts = SetpointDoubts()
     why = doubts.note("frequency", speed(25.0), speed(50.0))
-    assert why == "written as 25 Hz, and the same word means 50 Hz since the drive was changed"
+    assert render(why) == "written as 25 Hz, and the same word means 50 Hz since the drive was changed"
     assert doubts.why("frequency", (0x2000,)) == why
     assert doubts.has_any((0x2000,))
 
@@ -37,7 +38,7 @@ def test_a_second_change_still_tells_what_was_written() -> None:
     doubts = SetpointDoubts()
     doubts.note("frequency", speed(25.0), speed(50.0))
     why = doubts.note("frequency", speed(50.0), speed(100.0))
-    assert why == "written as 25 Hz, and the same word means 100 Hz since the drive was changed"
+    assert render(why) == "written as 25 Hz, and the same word means 100 Hz since the drive was changed"
 
 
 def test_another_word_in_its_place_ends_the_doubt_as_long_as_it_stands_there() -> None:

@@ -7,6 +7,7 @@ import pytest
 from bridge.command.messages.freshness import GRAIN_MS
 from bridge.command.worst_case import Wire, stop_time, sync_wait_ms, takeover_ms
 from bridge.config import BusTable, DriveTable
+from bridge.text import render
 from tests.support.docs import REPOSITORY
 
 WIRE = Wire(frames_ms=0.54, before_ms=5.06)
@@ -77,7 +78,7 @@ def test_the_sum_is_written_with_three_digits_where_it_is_below_a_millisecond() 
 def test_a_foreign_sync_producer_leaves_no_number(kind: int) -> None:
     stop = stop_time(drive(), bus(sync_period_ms=0), 200, kind, WIRE)
     assert (stop.ms, stop.terms) == (0, ())
-    assert f"transmission type {kind}" in stop.unknown
+    assert f"transmission type {kind}" in render(stop.unknown)
     assert str(stop).startswith("not known: ")
 
 
@@ -98,11 +99,11 @@ def test_with_silence_the_drives_own_time_out_is_in_it() -> None:
         "it gets disable voltage where it has none"
     )
     assert stop_time(drive(), bus(), 200, 255, WIRE, 300.0) == stop_time(drive(), bus(), 200, 255, WIRE)
-    assert "not been read" in stop_time(silent, bus(), 200, 255, WIRE, None).unknown
+    assert "not been read" in render(stop_time(silent, bus(), 200, 255, WIRE, None).unknown)
 
 
 def test_a_full_bus_leaves_no_number() -> None:
-    assert "more than 100 %" in stop_time(drive(), bus(), 200, 255, Wire(0.5, None)).unknown
+    assert "more than 100 %" in render(stop_time(drive(), bus(), 200, 255, Wire(0.5, None)).unknown)
 
 
 @pytest.mark.parametrize("keys", [{"on_expiry": "hold"}, {"telegram_downtime_s": -0.1}])

@@ -16,6 +16,7 @@ from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Request, Role, Source, Start
 from bridge.sim.core.nmt_slave import NmtState
+from bridge.text import Text
 from tests.support.bench import Bench, write_site
 from tests.support.nightly import by_night
 from tests.unit.master.test_farewell import FAMILIES, SLACK_S, SYNC_S, TYPES, moving, speed
@@ -374,8 +375,8 @@ def test_a_fault_of_our_own_while_it_gives_way_keeps_no_drive_running(
     bench = running(tmp_path, "")
     one_frame_after_a_hang(bench)
 
-    def fail(now: float, why: str) -> None:
-        raise RuntimeError(f"{now} {why}")
+    def fail(now: float, why: Text) -> None:
+        raise RuntimeError(f"{now} {why.code}")
 
     monkeypatch.setattr(bench.network, "_forget_bus", fail)
     begin = bench.now

@@ -10,6 +10,7 @@ from bridge.command import Event
 from bridge.master.listening import Listening
 from bridge.master.mastership import BusMastership
 from bridge.node.node import NodeCore
+from bridge.text import Text, render
 from tests.support import sites
 
 
@@ -34,8 +35,8 @@ class Node:
         self.node: Any = self
         self.commanded = [self.drive]
 
-    def say(self, text: str, now: float) -> None:
-        self.said.append(text)
+    def say(self, said: Text, now: float) -> None:
+        self.said.append(render(said))
 
 
 class Case:
@@ -44,7 +45,7 @@ class Case:
         self.told: list[Event] = []
         plant.on_event(self.told.append)
         self.nodes = [Node(), Node(is_out_of_service=True)]
-        self.forgotten: list[str] = []
+        self.forgotten: list[Text] = []
         self.listening = Listening(0.0 if begins_acting else 1.0, lambda: 0.0)
         nodes = cast("list[NodeCore]", self.nodes)
         forget = self._forget
@@ -64,7 +65,7 @@ def case() -> Case:
 
 def test_it_listens_before_it_acts(case: Case) -> None:
     assert not case.mastership.acts()
-    assert case.mastership.why_not == "on can0 the bridge listens before it begins"
+    assert render(case.mastership.why_not) == "on can0 the bridge listens before it begins"
     case.mastership.on_time(11.0)
     assert case.mastership.acts()
     assert case.mastership.why_not == ""
@@ -75,7 +76,7 @@ def test_it_gives_way_to_one_that_is_there_and_says_so_once(case: Case) -> None:
     case.mastership.heard("SYNC", 10.5)
     case.mastership.heard("SYNC", 10.6)
     assert case.mastership.is_passive
-    assert case.forgotten == ["another bridge is in charge of can0"]
+    assert [*map(render, case.forgotten)] == ["another bridge is in charge of can0"]
     (event,) = case.told
     assert event.message == (
         "passive: another bridge is in charge of this bus: it sent SYNC. Nothing is sent until that has been "

@@ -12,6 +12,7 @@ from bridge.canopen.nmt import NmtCommand
 from bridge.command.link import NodeState
 from bridge.command.outputs import Outputs
 from bridge.master.reach import Reach
+from bridge.text import render
 
 
 @dataclass
@@ -23,7 +24,7 @@ class Bus:
 
     def reach(self, *, outputs: bool = False, awaited: bool = False, **node: object) -> Reach:
         one: Any = object.__new__(Outputs) if outputs else SimpleNamespace(name="fu1")
-        one.channel = SimpleNamespace(on_sending=lambda why, now: self.told.append(why))
+        one.channel = SimpleNamespace(on_sending=lambda why, now: self.told.append(render(why)))
         facts: dict[str, object] = {
             "node": SimpleNamespace(commanded=[one]),
             "state": NodeState.OPERATIONAL,

@@ -10,6 +10,7 @@ from bridge.command.node import Enforce
 from bridge.command.outputs import Outputs
 from bridge.command.stop_check.state import LastStop
 from bridge.image import Quality
+from bridge.text import render
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,7 @@ def end(plant: Plant, now: float, enforce: Enforce, *, can_send: bool = True) ->
         len(plant.commanded) - len(plant.drives),
         tuple(one.name for one in ignoring),
         tuple(unheard),
-        tuple(f"{one.name} ({one.stop_check.why})" for one in unproven),
+        tuple(f"{one.name} ({render(one.stop_check.why)})" for one in unproven),
         tuple(dict.fromkeys(_stopped(ignoring, now, enforce))),
     )
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import isfinite
 from typing import Any, Final
 
+from bridge.text.templates import Part, templates
+
 PLAIN: Final = "plain"
 """Code of a sentence that has none."""
+_JOINED_BY: Final = ", "
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +32,10 @@ class Text:
     def word(cls, group: str, word: str) -> Text:
         """A word out of a group of them, such as the name of a state."""
         return cls(f"{group}.{word.replace(' ', '_').replace('-', '_')}")
+
+    def __str__(self) -> str:
+        """In English, as in the log and on every interface that knows one language."""
+        return render(self)
 
     @classmethod
     def plain(cls, said: Text | str) -> Text:
@@ -54,3 +62,36 @@ def _json_of(fact: Fact) -> object:
     if isinstance(fact, float) and not isfinite(fact):
         return str(fact)
     return [_json_of(one) for one in fact] if isinstance(fact, tuple) else fact
+
+
+def render(said: Text | str, language: str = "en") -> str:
+    """``said`` in words; a string is somebody's words already. Raises KeyError for a code that has no
+    template and for facts that a template lacks."""
+    if isinstance(said, str):
+        return said
+    facts = dict(said.facts)
+    return "".join(
+        part.words + (_shown(facts[part.name], part, language) if part.name else "")
+        for part in templates(language)[said.code]
+    )
+
+
+@lru_cache(maxsize=1024)
+def in_english(said: Text | str) -> str:
+    """As ``render``, and remembered: for what many points have in common and is shown again and again."""
+    return render(said)
+
+
+def _shown(fact: Fact, part: Part, language: str) -> str:
+    match fact:
+        case Text():
+            return render(fact, language)
+        case tuple():
+            return (part.format or _JOINED_BY).join(render(one, language) for one in fact)
+        case str():
+            return repr(fact) if part.is_quoted else fact
+        case float() if not part.format:
+            # As a browser shows it, which knows no difference between 1.0 and 1.
+            return f"{fact:.0f}" if fact.is_integer() else repr(fact)
+        case _:
+            return format(fact, part.format)

@@ -39,6 +39,9 @@ class Oracle(Model):
             assert not is_braking, "a start waits for the end of a quick stop"
             self.followed = self.says == "enabled" and self.is_heard
         self.sends = enables
+        if self.is_starting and self.is_heard and self.missing is Missing.NOTHING:
+            assert not (enables and self.says == "inhibited"), "a drive is made ready before it is enabled"
+        assert not (enables and self.is_braking), "a start waits for the end of a quick stop"
         if enables:
             self._check_enabling(word, setpoints)
         else:

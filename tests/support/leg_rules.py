@@ -245,7 +245,7 @@ class Model(Memory):
     # a start
 
     def _end_start(self) -> None:
-        self.is_starting = self.is_plain = self.is_late = False
+        self.is_starting = self.is_plain = self.is_late = self.is_braking = False
         self.start_until = self.news_from = self.news_until = None
 
     def start(self, who: Any) -> None:
@@ -257,6 +257,7 @@ class Model(Memory):
         self.is_starting = True
         self.is_plain = self.is_heard and self.says in LED and not has_waited
         self.is_late = not self.followed
+        self.is_braking = self.is_heard and self.says == "braking"
         self.start_until = self.now + START_S
         waits = not self.is_heard or (not self.sends and (self.says == "enabled" or not self.followed))
         self.missing = Missing.NOTHING
@@ -302,6 +303,7 @@ class Model(Memory):
     def hear(self, says: str, *, is_taken: bool) -> None:
         """The drive says something."""
         before, self.says = self.says, says
+        self.is_braking &= says == "braking"
         was_enabled = before == "enabled" and self.is_heard
         self.is_taken = is_taken
         self.is_heard = True

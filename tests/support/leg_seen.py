@@ -80,6 +80,8 @@ class Seen(NamedTuple):
     "enable"."""
     is_late: bool = False
     """True if the drive, when it began, might still follow an enabling word from before a stop."""
+    is_braking: bool = False
+    """It began while the drive was in its quick stop, and the drive is still in it."""
     has_begun: bool = False
     bit: bool | None = None
     pressed_by: Any = None
@@ -164,6 +166,7 @@ class Memory:
             self.is_starting,
             self.is_plain,
             self.is_late,
+            self.is_braking,
             self.has_begun,
             self.bit,
             self.pressed_by,

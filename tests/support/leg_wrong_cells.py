@@ -16,13 +16,18 @@ _WORDS: Final = {"owner writes a stop", "owner enables", "drive follows", "every
 _STARTS: Final = _WORDS | {"owner starts the drive"}
 _SAYS: Final = {"drive repeats", "drive says: braking", "drive says: fault", "drive says: inhibited"}
 _UNHEARD: Final = {"node lost", "node operational, not heard"}
-_OTHERS: Final = {"node lost", "drive says: fault"} | {
+_OTHERS: Final = {
     "owner resets the fault",
     "stranger stops the drive",
     "owner releases",
     "bridge gap",
+    "node lost",
+    "drive says: fault",
 }
 _BUS: Final = {"node lost", "node operational", "bus back"}
+_EVERY_STATE: Final = {
+    f"drive says: {says}" for says in ("ready", "enabled", "braking", "inhibited", "not ready", "fault")
+}
 _SETS: Final = {"owner writes a setpoint", "owner's control data are not valid", "owner's stop comes late"}
 _IGNORED: Final = {"telegram_downtime_s": -0.1}
 _SILENT: Final = {"then_silence_ms": 300}
@@ -54,25 +59,41 @@ PROFILES: Final[dict[str, dict[str, Any]]] = {
     "starts, telegrams": {"names": _STARTS | _SETS | {"drive says: braking", "drive repeats"}},
     "starts, whatever it says": {
         "names": {"owner starts the drive", "drive repeats", "everything is due"}
-        | {f"drive says: {says}" for says in ("ready", "enabled", "braking", "inhibited", "fault")}
+        | {
+            f"drive says: {says}"
+            for says in ("ready", "enabled", "braking", "inhibited", "not ready", "fault")
+        }
     },
     "starts unheard, whatever it says": {
         "names": {"owner starts the drive", "drive repeats", "everything is due"}
         | _UNHEARD
-        | {f"drive says: {says}" for says in ("ready", "enabled", "braking", "inhibited", "fault")}
+        | {
+            f"drive says: {says}"
+            for says in ("ready", "enabled", "braking", "inhibited", "not ready", "fault")
+        }
     },
     "starts, others": {"names": _STARTS | _OTHERS | {"drive says: braking", "drive says: fault"}},
     "starts, bus": {"names": _STARTS | _BUS | {"drive says: braking", "bridge gap"}},
     "starts unheard, telegrams": {"names": _STARTS | _UNHEARD | _SETS},
     "starts unheard, others": {"names": _STARTS | _UNHEARD | _OTHERS},
     "starts unheard, bus": {"names": _STARTS | _UNHEARD | {"bus back", "drive says: braking"}},
-    "stop, then silence": {"names": _WORDS | _SETS | _OTHERS, "on_expiry": "stop", **_SILENT},
+    "stop, then silence": {
+        "names": _WORDS
+        | {"owner writes a setpoint", "owner releases", "stranger stops the drive", "bridge gap"},
+        "on_expiry": "stop",
+        **_SILENT,
+    },
+    "silence, telegrams": {"names": _WORDS | _SETS | {"stranger stops the drive"}, "on_expiry": "silence"},
     "quick stop, then silence": {
-        "names": _WORDS | _SETS | _OTHERS | {"drive says: fault"},
+        "names": _WORDS | {"owner resets the fault", "stranger stops the drive", "drive says: fault"},
         "on_expiry": "quick_stop",
         **_SILENT,
     },
-    "quick stop, then silence, bus": {"names": _WORDS | _BUS, "on_expiry": "quick_stop", **_SILENT},
+    "quick stop, then silence, bus": {
+        "names": _WORDS | _BUS | {"stranger stops the drive"},
+        "on_expiry": "quick_stop",
+        **_SILENT,
+    },
     "started, then silent": {
         "names": _STARTS | {"stranger stops the drive", "node lost", "node operational"},
         "on_expiry": "silence",
@@ -90,7 +111,7 @@ PROFILES: Final[dict[str, dict[str, Any]]] = {
     },
     "errors ignored, positions": {
         "words": POSITION,
-        "names": _STARTS | {"node operational", "drive takes the setpoint"},
+        "names": _STARTS | {"node operational", "drive takes the setpoint", "owner writes a setpoint"},
         **_IGNORED,
     },
     "positions": {
@@ -124,3 +145,6 @@ def every_fault() -> dict[tuple[Place, str], Cell]:
     return {
         (place, kind): wrong for place in TABLE if place not in NEVER for kind, wrong in wrong_cells(place)
     }
+
+
+EQUIVALENT: Final[dict[tuple[Place, str], str]] = {}

@@ -5,10 +5,11 @@ from __future__ import annotations
 from bridge.command.leg import order
 from bridge.command.leg.deeds import About, happen
 from bridge.command.leg.due import run_out
+from bridge.command.leg.settings import HandshakeSettings
 from bridge.command.leg.state import Motion, Stage
 from bridge.command.leg.table import Stimulus
 from bridge.command.leg.turn import Turn
-from bridge.command.leg.words import output
+from bridge.command.leg.words import send
 from bridge.command.messages.event import Kind
 from bridge.command.messages.request import Code, Outcome
 from bridge.drive import DriveState
@@ -31,20 +32,19 @@ def settle(turn: Turn) -> None:
     if turn.drive is DriveState.FAULT and turn.word & turn.settings.words.acknowledge_mask:
         # It ends with the fault: what was asked for then would hold the motor after it.
         turn.is_asked = False
-    turn.sent = output(turn)
+    send(turn)
     if turn.stage is Stage.BURST:
         turn.trip = turn.trip._replace(burst=turn.sent.words[0])
-    _hand_position_over(turn)
+    handshake = turn.settings.handshake
+    if handshake is not None:
+        _hand_position_over(turn, handshake)
     if turn.is_enabling:
         if not was_enabling:
             turn.motion = Motion.SEEN if turn.is_enabled else Motion.EXPECTED
         turn.is_asked = False
 
 
-def _hand_position_over(turn: Turn) -> None:
-    handshake = turn.settings.handshake
-    if handshake is None:
-        return
+def _hand_position_over(turn: Turn, handshake: HandshakeSettings) -> None:
     turn.order, is_untaken = order.went_on(
         turn.order,
         tuple(turn.setpoints[place] for place in handshake.places),
@@ -52,6 +52,6 @@ def _hand_position_over(turn: Turn) -> None:
         is_taken=turn.is_taken,
         commanded=turn.is_commanded,
     )
-    turn.sent = output(turn)
+    send(turn)
     if is_untaken:
         turn.tell(Kind.REFUSED, 500, Text.of("start.position_not_taken"))

@@ -79,14 +79,13 @@ def initial(settings: LegSettings) -> LegState:
 
 def step(settings: LegSettings, state: LegState, event: Event, now: float) -> tuple[LegState, list[Effect]]:
     """Let ``event`` happen ``now``."""
-    turn = Turn(settings, state, now)
-    if isinstance(event, Connection):
-        owners.on_connection(turn, event)
+    turn, kind = Turn(settings, state, now), type(event)
+    _ON[kind](turn, event)
+    if kind is Connection:
         return turn.end(), turn.effects
-    _ON[type(event)](turn, event)
     settle(turn)
     effects = judged(settings, turn.asked, turn.way, turn.sent, turn.effects)
-    if isinstance(event, StartAnew):
+    if kind is StartAnew:
         reports.on_told_anew(turn)
     after = turn.end()
     return (state if after == state else after), effects
@@ -358,4 +357,5 @@ _ON: Final[dict[type[Event], Callable[[Turn, Any], None]]] = {
     StartAnew: _on_start_anew,
     BridgeGap: _on_gap,
     OwnWatch: _on_own_watch,
+    Connection: owners.on_connection,
 }

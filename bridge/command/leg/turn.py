@@ -26,10 +26,6 @@ class Turn:
         self.settings = settings
         self.now = now
         self._before = state
-        self.begin_anew()
-
-    def begin_anew(self) -> None:
-        """As at the beginning of the step: nothing of what was done since counts."""
         self.effects: list[Effect] = []
         self.asked: Asked | None = None
         """What a request asks of the bus: its answer is judged by that."""
@@ -53,7 +49,11 @@ class Turn:
             self.order,
             self.pulse_until,
             self.silence_stops,
-        ) = self._before
+        ) = state
+
+    def begin_anew(self) -> None:
+        """As at the beginning of the step: nothing of what was done since counts."""
+        Turn.__init__(self, self.settings, self._before, self.now)
 
     def end(self) -> LegState:
         return LegState._make(_values(self))

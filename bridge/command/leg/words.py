@@ -78,10 +78,10 @@ WORD_TABLE: Final[dict[tuple[Stage, Motion], Sends]] = {
 }
 
 
-def output(turn: Turn) -> Output:
-    """Words that the drive gets from now on."""
+def send(turn: Turn) -> None:
+    """Make the words that the drive gets from now on."""
     word, may_hold = WORD_TABLE[turn.stage, turn.motion]
-    return _MADE[word](turn, may_hold)
+    turn.sent = _MADE[word](turn, may_hold)
 
 
 def at_rest(words: ControlWords, word: int) -> int:

@@ -10,7 +10,7 @@ import pytest
 
 from bridge.command.leg import deeds, due, order, owners, reports, start, step, words
 from bridge.command.leg.effect import Heard
-from bridge.command.leg.event import BridgeGap, Event
+from bridge.command.leg.event import BridgeGap, Connection, Event
 from bridge.command.leg.state import Output, Stage
 from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
 from bridge.command.leg.turn import Turn
@@ -213,7 +213,6 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
         "goes_on_as",
         lambda identity, other: identity is other,
     ),
-    "an owner's connection does not end": ("twins", owners, "on_connection", lambda leg, event: None),
     "a half-open connection keeps its user out": (
         "twins, off",
         owners,
@@ -245,7 +244,10 @@ WORDS: Final[dict[str, tuple[str, Word, Callable[[Turn, bool], Output]]]] = {
     "silence speaks": ("silence", Word.SILENCE, _speaks),
     "a reaction keeps setpoints": ("telegrams", Word.REACTION, _moves),
 }
-EVENTS: Final[dict[str, tuple[str, type[Event]]]] = {"a gap is not noticed": ("way", BridgeGap)}
+EVENTS: Final[dict[str, tuple[str, type[Event]]]] = {
+    "a gap is not noticed": ("way", BridgeGap),
+    "an owner's connection does not end": ("twins", Connection),
+}
 
 
 @pytest.mark.parametrize("fault", WORDS)

@@ -165,7 +165,7 @@ def test_the_next_boot_up_reads_it_again(tmp_path: Path) -> None:
 def test_before_the_drive_is_asked_its_time_is_not_known(tmp_path: Path) -> None:
     bench = Silent(tmp_path, TU4, "fu1", SILENCE, P151=300.0)
     bench.drive.own = None
-    assert "has not been read yet" in bench.drive.stop_time().unknown
+    assert "has not been read yet" in str(bench.drive.stop_time().unknown)
 
 
 OFF = [

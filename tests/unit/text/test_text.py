@@ -19,6 +19,11 @@ def test_a_word_has_a_code_of_its_group() -> None:
     assert Text.word("node_state", "not seen yet").code == "node_state.not_seen_yet"
 
 
+def test_a_text_in_a_sentence_reads_in_english() -> None:
+    stop = Text.of("request.by", action=Text.word("action", "stop"), who="local:anna")
+    assert f"({stop})" == f"({render(stop)})"
+
+
 def test_a_sentence_stays_itself_and_a_text_too() -> None:
     assert render(Text.plain("Kabel")) == "Kabel"
     assert Text.plain(Text.of("node.lost")) == Text.of("node.lost")

@@ -56,6 +56,7 @@ APART: Final = (
     "bridge/command/points.py",  # descriptions of points
     "bridge/command/leg/state.py",  # what its states mean, for the documentation
     "bridge/command/leg/table.py",
+    "bridge/command/leg/words.py",
     "bridge/command/stop_check/state.py",
     "bridge/command/stop_check/table.py",
     "bridge/drive/fault_words.py",  # in both languages itself

@@ -114,6 +114,12 @@ NMT_ACTIONS = frozenset(
 """The five commands of NMT (CiA 301 §7.2.8.2.1), on a node or on all nodes of a bus."""
 NODE_ACTIONS = NMT_ACTIONS | {Action.ENABLE, Action.DISABLE}
 PARAMETER_ACTIONS = frozenset((Action.READ_PARAMETER, Action.WRITE_PARAMETER, Action.SAVE_PARAMETERS))
+LEAST_ROLE = dict.fromkeys(Action, Role.OPERATOR) | {
+    Action.READ_PARAMETER: Role.OBSERVER,
+    Action.WRITE_PARAMETER: Role.ENGINEER,
+    Action.SAVE_PARAMETERS: Role.ENGINEER,
+}
+"""The role that a user of a protocol with roles needs, whoever controls the drive."""
 STOP_ACTIONS = frozenset((Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE))
 
 

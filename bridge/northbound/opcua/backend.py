@@ -4,24 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
-from bridge.command.messages.request import Action, Identity, Role
+from bridge.command.messages.request import Identity, Role
 from bridge.northbound.opcua.accounts import Users
 from bridge.northbound.opcua.methods import Caller
-from bridge.northbound.opcua.nodes import pascal_case
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.passwords import ANONYMOUS
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
 from bridge.uaserver.library import ua
-
-_FOR_ENGINEERS: Final = tuple(
-    f"/{pascal_case(action)}" for action in (Action.WRITE_PARAMETER, Action.SAVE_PARAMETERS)
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,11 +67,10 @@ class Backend(ServedApplication[SessionUser]):
         return SessionUser(replace(identity, connection=login.session))
 
     def may(self, user: SessionUser, where: ua.NodeId) -> bool:
-        name = str(where.Identifier)
-        if name.endswith(f"/{pascal_case(Action.READ_PARAMETER)}"):
-            return True
-        for_engineers = "/parameter/" in name or name.endswith(_FOR_ENGINEERS)
-        return user.identity.role >= (Role.ENGINEER if for_engineers else Role.OPERATOR)
+        least = self._caller.least_role(where)
+        if least is None:
+            least = self._writer.least_role(where)
+        return user.identity.role >= (Role.OPERATOR if least is None else least)
 
     async def write(self, user: SessionUser, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
         return await self._writer.write(user.identity, writes)

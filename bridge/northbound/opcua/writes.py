@@ -17,12 +17,14 @@ from asyncua.server.address_space import AddressSpace
 
 from bridge.base.quietlog import about
 from bridge.command.messages.request import (
+    LEAST_ROLE,
     Action,
     Code,
     Command,
     Identity,
     Outcome,
     Request,
+    Role,
     SetTimeout,
     Write,
     WriteParameter,
@@ -96,6 +98,14 @@ class Writer:
         self._view = view
         self._space = space
         self._writable = writable
+
+    def least_role(self, node_id: ua.NodeId) -> Role | None:
+        """The role that writing this variable needs; None where nobody may."""
+        node = self._writable(node_id)
+        if node is None:
+            return None
+        group = node.point.name.rpartition("/")[0].rpartition("/")[2]
+        return LEAST_ROLE[_ALONE.get(group, Write).action]
 
     async def write(self, identity: Identity, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
         """One status code for each of ``writes``, in their order."""

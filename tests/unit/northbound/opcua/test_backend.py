@@ -8,8 +8,12 @@ import pytest
 from asyncua import ua
 from cryptography.hazmat.primitives.asymmetric.rsa import generate_private_key
 
-from bridge.command.messages.request import Identity, Role, Source
+from bridge.command.messages.request import Action, Identity, Role, Source
+from bridge.image import DataType, Point
 from bridge.northbound.opcua.backend import Backend, SessionUser
+from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.nodes import MethodNode, VariableKind, VariableNode
+from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.uaserver.application import NOBODY, LoginAttempt
 
@@ -56,10 +60,18 @@ def backend(told: Any, pulse: Any = None) -> Backend:
         ("conveyor/fu1/WriteParameter", Role.ENGINEER),
         ("conveyor/fu1/SaveParameters", Role.ENGINEER),
         ("conveyor/fu1/ReadParameter", Role.OBSERVER),
+        ("conveyor/fu1/status/status_word", Role.OPERATOR),
     ],
 )
 def test_what_a_user_may_write_and_call_follows_from_the_role(where: str, least: Role) -> None:
-    made = backend(Told())
+    told: Any = Told()
+    method = where.rpartition("/")[2]
+    actions = {"".join(part.title() for part in action.split("_")): action for action in Action}
+    found = MethodNode(where, method, actions[method], "", "") if method in actions else None
+    point = Point(name=where, data_type=DataType.FLOAT, writable="/status/" not in where)
+    variable = VariableNode(where, "", VariableKind.PLAIN, point, 0) if found is None else None
+    writer = Writer(told, told, lambda _: variable if variable and variable.writable else None)
+    made = Backend(told, writer, Caller(told, told, lambda _: found), told, told)
     allowed = [role for role in Role if made.may(user(role=role), ua.NodeId(where, 2))]
     assert allowed == [role for role in Role if role >= least]
 

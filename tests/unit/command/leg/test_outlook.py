@@ -7,22 +7,8 @@ import pytest
 from bridge.command import TakeControl
 from bridge.command.leg.outlook import next_deadline, output_then, trips_at, until, watchdog_state
 from bridge.command.leg.state import WatchdogState
-from bridge.drive import DriveState
-from tests.support.leg import Leg, settings_of
+from tests.support.leg import RUN, SHUT_DOWN, Leg, running_nord, settings_of
 from tests.support.rig import OPERATOR
-
-SHUT_DOWN, RUN = 0x047E, 0x047F
-"""NORD's (BU 2500 §6.8)."""
-
-
-def running(**given: object) -> Leg:
-    """Enabled by an owner that was heard at 100 s."""
-    leg = Leg(settings_of("nord/sk-tu4-cao", **{"fieldbus_timeout_ms": 200, **given}))
-    leg.writes(SHUT_DOWN)
-    leg.writes(RUN, setpoint_1=0x2000)
-    leg.says(DriveState.OPERATION_ENABLED)
-    assert leg.enables
-    return leg
 
 
 def test_the_watchdog_begins_with_the_first_telegram_and_says_when_it_has_tripped() -> None:
@@ -37,14 +23,14 @@ def test_the_watchdog_begins_with_the_first_telegram_and_says_when_it_has_trippe
 
 @pytest.mark.parametrize("given", [{"fieldbus_timeout_ms": 0}, {"telegram_downtime_s": -0.1}])
 def test_without_a_time_or_where_errors_are_ignored_there_is_none(given: dict[str, object]) -> None:
-    leg = running(**given)
+    leg = running_nord(**given)
     assert watchdog_state(leg.settings, leg.state) is WatchdogState.OFF
     assert trips_at(leg.settings, leg.state) is None
     assert until(leg.settings, leg.state) is None
 
 
 def test_a_drive_is_stopped_when_its_owners_time_is_up() -> None:
-    leg = running()
+    leg = running_nord()
     assert trips_at(leg.settings, leg.state) == until(leg.settings, leg.state) == 100.2
     assert next_deadline(leg.state) == 100.2
     leg.trips()
@@ -60,7 +46,7 @@ def test_nothing_ends_where_nothing_enables() -> None:
 
 
 def test_a_drive_that_holds_goes_on_although_the_watchdog_trips() -> None:
-    leg = running(on_expiry="hold")
+    leg = running_nord(on_expiry="hold")
     assert trips_at(leg.settings, leg.state) == 100.2
     assert until(leg.settings, leg.state) is None
 
@@ -78,7 +64,7 @@ def test_the_first_of_lease_and_watchdog_ends_it(ttl_ms: int, end: float) -> Non
 
 @pytest.mark.parametrize("reaction", ["disable_voltage", "quick_stop", "stop", "silence"])
 def test_what_is_sent_then_is_what_the_leg_itself_sends_then(reaction: str) -> None:
-    leg = running(on_expiry=reaction)
+    leg = running_nord(on_expiry=reaction)
     then = output_then(leg.settings, leg.state)
     assert leg.enables, "looking ahead changes nothing"
     leg.trips()

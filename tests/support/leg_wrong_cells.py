@@ -147,4 +147,223 @@ def every_fault() -> dict[tuple[Place, str], Cell]:
     }
 
 
-EQUIVALENT: Final[dict[tuple[Place, str], str]] = {}
+_S, _E = Stage, Stimulus
+_UNNOTICED: Final[tuple[tuple[str, tuple[tuple[Stimulus, str, tuple[Stage, ...]], ...]], ...]] = (
+    (
+        "the next look at a way that is closed does it again",
+        (
+            (_E.WAY_CLOSED, DOES_NOTHING, (_S.LET_GO,)),
+            (
+                _E.WAY_CLOSED,
+                LEAVES_DEED_OUT,
+                (
+                    _S.INTERLOCKED,
+                    _S.READY,
+                    _S.ENABLED,
+                    _S.SETTLING,
+                    _S.ASKING,
+                    _S.PREPARED,
+                    _S.BLIND,
+                    _S.BRAKING,
+                    _S.LEAVING,
+                    _S.LEADING,
+                    _S.HELD,
+                ),
+            ),
+        ),
+    ),
+    (
+        "the stage says the word, and an acknowledge or the owner's next word takes the stop's place",
+        (
+            (
+                _E.ANEW,
+                DOES_NOTHING,
+                (
+                    _S.RAMPING,
+                    _S.TRIPPED,
+                    _S.SILENCED,
+                    _S.BURST,
+                    _S.LET_GO,
+                ),
+            ),
+            (_E.ANEW, LEAVES_DEED_OUT, (_S.HELD,)),
+            (
+                _E.LEFT,
+                DOES_NOTHING,
+                (
+                    _S.RAMPING,
+                    _S.TRIPPED,
+                    _S.SILENCED,
+                    _S.BURST,
+                    _S.LET_GO,
+                ),
+            ),
+            (_E.LEFT, LEAVES_DEED_OUT, (_S.HELD,)),
+        ),
+    ),
+    (
+        "what is over stays over",
+        (
+            (_E.BURST_OVER, LEAVES_DEED_OUT, (_S.BURST,)),
+            (
+                _E.SILENCE_DUE,
+                LEAVES_DEED_OUT,
+                (
+                    _S.RAMPING,
+                    _S.TRIPPED,
+                ),
+            ),
+        ),
+    ),
+    (
+        "a start that does not get on is given up after 3 s: no rule says how fast one has to be",
+        (
+            (_E.BRAKING_OVERDUE, DOES_NOTHING, (_S.SETTLING,)),
+            (
+                _E.REPORT_OVERDUE,
+                DOES_NOTHING,
+                (
+                    _S.ASKING,
+                    _S.PREPARED,
+                ),
+            ),
+            (_E.REPORT_OVERDUE, LEAVES_DEED_OUT, (_S.PREPARED,)),
+            (
+                _E.SAYS_AT_REST,
+                DOES_NOTHING,
+                (
+                    _S.BRAKING,
+                    _S.LEAVING,
+                ),
+            ),
+            (
+                _E.SAYS_AT_REST,
+                LEAVES_DEED_OUT,
+                (
+                    _S.ASKING,
+                    _S.PREPARED,
+                    _S.BRAKING,
+                    _S.LEAVING,
+                ),
+            ),
+            (
+                _E.SAYS_BRAKING,
+                DOES_NOTHING,
+                (
+                    _S.SETTLING,
+                    _S.BLIND,
+                ),
+            ),
+            (
+                _E.SAYS_BRAKING,
+                LEAVES_DEED_OUT,
+                (
+                    _S.SETTLING,
+                    _S.ASKING,
+                    _S.PREPARED,
+                    _S.BLIND,
+                ),
+            ),
+            (
+                _E.SAYS_ENABLED,
+                DOES_NOTHING,
+                (
+                    _S.ASKING,
+                    _S.PREPARED,
+                    _S.BLIND,
+                    _S.BRAKING,
+                    _S.LEAVING,
+                ),
+            ),
+            (
+                _E.SAYS_ENABLED,
+                LEAVES_DEED_OUT,
+                (
+                    _S.BRAKING,
+                    _S.LEAVING,
+                ),
+            ),
+            (
+                _E.START,
+                DOES_NOTHING,
+                (
+                    _S.ASKING,
+                    _S.PREPARED,
+                    _S.BLIND,
+                    _S.BRAKING,
+                    _S.LEAVING,
+                    _S.LEADING,
+                ),
+            ),
+            (
+                _E.START,
+                LEAVES_DEED_OUT,
+                (
+                    _S.ASKING,
+                    _S.PREPARED,
+                    _S.BLIND,
+                    _S.BRAKING,
+                    _S.LEAVING,
+                ),
+            ),
+            (
+                _E.START_BRAKING,
+                DOES_NOTHING,
+                (
+                    _S.SETTLING,
+                    _S.BRAKING,
+                    _S.LEAVING,
+                ),
+            ),
+            (
+                _E.START_BRAKING,
+                LEAVES_DEED_OUT,
+                (
+                    _S.READY,
+                    _S.SETTLING,
+                    _S.LEAVING,
+                ),
+            ),
+            (
+                _E.START_STOPPING,
+                DOES_NOTHING,
+                (
+                    _S.SETTLING,
+                    _S.ASKING,
+                    _S.PREPARED,
+                    _S.BRAKING,
+                    _S.LEAVING,
+                    _S.LEADING,
+                ),
+            ),
+            (
+                _E.START_STOPPING,
+                LEAVES_DEED_OUT,
+                (
+                    _S.READY,
+                    _S.ASKING,
+                    _S.PREPARED,
+                    _S.BRAKING,
+                    _S.LEAVING,
+                    _S.LEADING,
+                ),
+            ),
+            (
+                _E.START_UNHEARD,
+                DOES_NOTHING,
+                (
+                    _S.ASKING,
+                    _S.PREPARED,
+                ),
+            ),
+            (_E.START_UNHEARD, LEAVES_DEED_OUT, (_S.READY,)),
+        ),
+    ),
+)
+UNNOTICED: Final[dict[tuple[Place, str], str]] = {
+    ((stage, stimulus), kind): reason
+    for reason, faults in _UNNOTICED
+    for stimulus, kind, stages in faults
+    for stage in stages
+}
+"""Faults that no rule of the exploration notices, with the reason. All others are found."""

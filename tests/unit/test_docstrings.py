@@ -15,6 +15,7 @@ ROOMS = (
     "canclient",
     "canopen",
     "cli",
+    "command/leg",
     "dbc",
     "derive",
     "dictionary",

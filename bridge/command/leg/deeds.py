@@ -1,5 +1,5 @@
-"""What is done in each cell of the leg's table: ``happen`` looks the cell up, goes to its stage and does its
-deed. Nothing else changes the stage."""
+"""The deeds of the leg's table: ``happen`` looks the cell up, goes to its stage and does its deed. Nothing
+else changes the stage."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from bridge.drive import DriveState
 BELIEVED_S: Final = 1.0
 """Without a report from a drive that sends only changes, its last one is accepted after this time."""
 _PULSE_S: Final = 0.1
-"""How long an acknowledge edge of the bridge's own stays on the bus: longer than any cycle we send with."""
+"""Length of an acknowledge edge of the bridge's own: longer than any cycle we send with."""
 _BURST_S: Final = 0.1
-"""How long a stop breaks the silence: as long, so that the drive has it for certain; then the drive's own
-supervision goes on."""
+"""Time for which a stop breaks the silence: as long, so that the drive has it for certain; then the drive's
+own supervision goes on."""
 _RAMP_LIMIT_S: Final = 10.0
 """After that a quick stop by the watchdog is followed by disable voltage in any case: Lenze's holds the motor
 for ever, and so does CiA 402's with 605Ah = 5 … 8."""
@@ -32,22 +32,22 @@ _CANCELLED: Final = Outcome(Code.CANCELLED)
 
 
 class About(NamedTuple):
-    """What a deed needs to know of the event, beside the leg's state."""
+    """Facts of an event that its deed needs beside the leg's state."""
 
     start_ends: Outcome = _CANCELLED
-    """How a start ends that ends by this."""
+    """The outcome of a start that ends by this."""
     asked: Asked | None = None
-    """What a request asks of the bus."""
+    """Words, stop or edge that a request asks for."""
     done: Outcome = DONE
     """Its answer where that is done."""
     refusal: Refusal | None = None
-    """Why it cannot be done."""
+    """The reason why it cannot be done."""
     word: int = 0
     """The stop that an acknowledge leaves behind."""
     pulse: bool = False
     """The acknowledge is sent to the drive by the bridge, not with the owner's word."""
     due: float = 0.0
-    """When the time-out was over."""
+    """The time at which the time-out was over."""
 
 
 _NOTHING: Final = About()
@@ -116,7 +116,7 @@ def _clear(turn: Turn, about: About) -> None:
 
 
 def _clear_and_stop(turn: Turn, about: About) -> None:
-    """What would go on after a fault of the drive itself is stopped."""
+    """Stop a drive that would go on after a fault of its own."""
     _clear(turn, about)
     turn.stop(about.word)
 
@@ -159,7 +159,7 @@ def _fall_silent(turn: Turn, about: About) -> None:
 
 
 def _wait(turn: Turn, about: About) -> None:
-    """What stops it goes on until it is known to be over: to become ready may mean to coast."""
+    """Hold the stop until it is known to be over: to become ready may mean to coast."""
     turn.lead(at_rest(turn.settings.words, turn.sent.words[0]))
 
 
@@ -173,7 +173,7 @@ def _make_ready(turn: Turn, about: About) -> None:
 
 
 def _begin(turn: Turn, about: About) -> None:
-    """Where a stop was on its way, what was known of the drive was out of date: it is made ready anew."""
+    """Make the drive ready anew: where a stop was on its way, its last report was out of date."""
     turn.lead(turn.settings.words.ready)
     _go_on(turn, about)
 

@@ -1,4 +1,4 @@
-"""What time brings to the leg: the end of the owner's time-out or lease, of a ramp, of what comes before a
+"""Deadlines of the leg: the end of the owner's time-out or lease, of a ramp, of what comes before a
 silence, of a burst."""
 
 from __future__ import annotations

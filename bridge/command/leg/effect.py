@@ -1,4 +1,4 @@
-"""What a step of the leg brings about beside the words that are sent."""
+"""Effects of a step of the leg beside the words that are sent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What happens to the leg: a request, something that the drive says, something about the way to it, time."""
+"""Events of the leg: a request, something that the drive says, something about the way to it, time."""
 
 from __future__ import annotations
 

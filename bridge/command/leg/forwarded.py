@@ -39,7 +39,8 @@ Asked = Words | Stop | Edge
 
 
 def why_not(settings: LegSettings, asked: Asked, way: Way, sent: Output) -> Text | str:
-    """Why the bus does not say what is asked, where ``sent`` goes this ``way``; empty where it does."""
+    """The reason why the bus does not say what is asked, where ``sent`` goes this ``way``; empty where it
+    does."""
     if way.why_unsent:
         return way.why_unsent
     if sent.silent:

@@ -15,9 +15,9 @@ from typing import Final
 from bridge.command.leg.state import Order
 
 _LIMIT_S: Final = 1.0
-"""How long the drive may take to report that it has a position; the profile names no time."""
+"""Time within which the drive has to report that it has a position; the profile names no time."""
 _LOW_S: Final = 0.1
-"""How long the bit stays down after that: longer than any cycle we send with, so that an edge is seen."""
+"""Time for which the bit stays down then: longer than any cycle we send with, so that an edge is seen."""
 
 
 def dropped(order: Order) -> Order:

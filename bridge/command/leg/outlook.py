@@ -1,4 +1,4 @@
-"""What others may see of a leg: its watchdog, and what it will send by itself, and when."""
+"""The view of a leg from outside: its watchdog, and what it will send by itself, and when."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def watchdog_state(settings: LegSettings, state: LegState) -> WatchdogState:
 
 
 def trips_at(settings: LegSettings, state: LegState) -> float | None:
-    """When the drive is stopped unless its owner is heard; None where no time does that."""
+    """The time at which the drive is stopped unless its owner is heard; None where no time does that."""
     return None if state.stage.is_tripped or settings.ignores_errors else state.timer.deadline
 
 
@@ -34,7 +34,7 @@ def until(settings: LegSettings, state: LegState) -> float | None:
 
 
 def output_then(settings: LegSettings, state: LegState) -> Output:
-    """What is sent from ``until`` on, made by the leg itself; what is sent now where ``until`` is None."""
+    """Output from ``until`` on, made by the leg itself; the present one where ``until`` is None."""
     at = until(settings, state)
     if at is None:
         return state.sent
@@ -45,7 +45,7 @@ def output_then(settings: LegSettings, state: LegState) -> Output:
 
 
 def next_deadline(state: LegState) -> float | None:
-    """When ``Time`` is to happen; None for never."""
+    """The time at which ``Time`` is to happen; None for never."""
     times = (
         state.timer.deadline,
         state.owner.lease_until,

@@ -1,4 +1,5 @@
-"""Who may command a drive, and what becomes of it when another does: the twin of P509/P510 (BU 2500 §7.2).
+"""Owners of a drive: who may command it, and what becomes of it when another does. The twin of P509/P510
+(BU 2500 §7.2).
 
 With ``control`` a protocol, the first identity of that protocol whose valid telegram arrives owns the drive
 until it releases it or falls silent. With ``"lease"`` any operator takes the drive for a time and keeps it by
@@ -31,7 +32,7 @@ _NO_TIMES: Final = [None, None, None]
 
 
 def refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> Text | None:
-    """Why ``identity`` may not command the drive now, in one sentence; None where it may."""
+    """The reason why ``identity`` may not command the drive now; None where it may."""
     if identity.role < Role.OPERATOR:
         return Text.of("request.may_only_read", who=str(identity))
     if control == "none":
@@ -54,7 +55,7 @@ def _taken(owner: Identity, identity: Identity) -> Text:
 
 
 def _take_refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> Text | None:
-    """Why ``identity`` may not take control now, None where it may. An engineer always may."""
+    """The reason why ``identity`` may not take control now, None where it may. An engineer always may."""
     if control != "lease":
         may_break = identity.role >= Role.ENGINEER and identity.source.label == control
         return None if may_break else refusal(control, owner, identity, is_replaceable=is_replaceable)
@@ -95,8 +96,8 @@ def _is_quiet_beside(turn: Turn, identity: Identity) -> bool:
 
 
 def _owner_is_gone(turn: Turn) -> bool:
-    """Where no watchdog says so: it has had no connection for ``GONE_S``, or not answered to a stop for so
-    long."""
+    """True if the owner is gone and no watchdog says so: it has had no connection for ``GONE_S``, or not
+    answered to a stop for so long."""
     if turn.timer.timeout_ms:
         return False
     times = turn.owner.absent_until, turn.owner.stopped_until

@@ -1,4 +1,4 @@
-"""What the drive says: its state, and whether it has moved since the last word that enabled it."""
+"""Reports of the drive: its state, and whether it has moved since the last word that enabled it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What does not change while a drive is commanded: its family's words and the site file."""
+"""Settings of a leg, fixed while it runs: its family's words and the site file."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class LegSettings:
     resting: tuple[int, ...] = ()
     """The setpoints while nobody commands them; left out: all 0."""
     life: LifeSign | None = None
-    """What the owner's program has to bring back."""
+    """Tokens that the owner's program has to bring back."""
     acknowledge_resumes: bool = False
     """An acknowledge stands for a word that does not enable, unless somebody has stopped it by a command:
     that asks for such a word of the owner's own."""
@@ -58,8 +58,8 @@ class LegSettings:
 def leg_settings(
     family: Family, table: DriveTable, decode: Decode, life: LifeSign | None = None
 ) -> LegSettings:
-    """Those of a drive of this family, as the site file has it. ``life``: its tokens where it asks for a life
-    sign, random ones by default."""
+    """Settings of a drive of this family, as the site file has it. ``life``: its tokens where it asks for a
+    life sign, random ones by default."""
     slot = family.slot_named(table.slot)
     low_ms, high_ms = table.timeout_range_ms
     return LegSettings(
@@ -82,7 +82,7 @@ def leg_settings(
 
 
 def _handshake(family: Family, slot: Slot) -> HandshakeSettings | None:
-    """How this drive takes over positions, None where it has no handshake."""
+    """The handshake by which this drive takes over positions, None where it has no handshake."""
     model = family.control_word.handshake
     if model is None:
         return None

@@ -20,7 +20,7 @@ from bridge.text import Text
 
 _LIMIT_S: Final = 3.0
 _BRAKING_S: Final = 1.0
-"""How long a quick stop may still take. A drive that stays in it afterwards (605Ah = 5 … 8) leaves it with
+"""Time that a quick stop may still take. A drive that stays in it afterwards (605Ah = 5 … 8) leaves it with
 disable voltage only; at once, that would let a motor coast that is still being stopped."""
 _SETTLES_S: Final = 0.2
 """For this long after a stop, reports may still describe the time before it. A drive that says "enabled"

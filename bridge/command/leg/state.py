@@ -27,7 +27,7 @@ WATCHDOG_STATES: Final = tuple((state.value, state.label) for state in WatchdogS
 
 
 class Stage(StrEnum):
-    """Where the way to the drive stands."""
+    """Stage of one drive's controller leg."""
 
     __hash__ = str.__hash__  # in C: it is looked up at every step
 
@@ -89,7 +89,7 @@ STARTING: Final = frozenset(
 )
 UNHEARD: Final = frozenset((Stage.ASKING, Stage.PREPARED, Stage.BLIND))
 AWAITS_REPORT: Final = UNHEARD | {Stage.SETTLING}
-"""What the drive says next counts, also where it says nothing new."""
+"""Stages in which the next report counts, also where it says nothing new."""
 MUTE: Final = frozenset((Stage.SILENCED, Stage.BURST))
 """Silence stops the drive, where it does."""
 REACTING: Final = MUTE | {Stage.RAMPING, Stage.TRIPPED}
@@ -101,7 +101,7 @@ BLOCKED: Final = frozenset((Stage.CLOSED, Stage.INTERLOCKED, Stage.LET_GO))
 
 
 class Motion(StrEnum):
-    """What the drive's reports say since the last word that enabled it."""
+    """Motion of the drive by its reports since the last word that enabled it."""
 
     __hash__ = str.__hash__
 
@@ -173,8 +173,8 @@ class Start(NamedTuple):
 
 
 class Trip(NamedTuple):
-    """When a quick stop becomes disable voltage at the latest, when nothing is sent any more, and when a stop
-    that breaks the silence ends."""
+    """Times of a trip: when a quick stop becomes disable voltage at the latest, when nothing is sent any
+    more, and when a stop that breaks the silence ends."""
 
     ramps_until: float | None = None
     silent_from: float | None = None
@@ -196,7 +196,7 @@ class Order(NamedTuple):
 
 
 class Way(NamedTuple):
-    """What is known of the way to the drive. ``is_open``: enabling words may go to it as far as its link is
+    """Reachability of the drive. ``is_open``: enabling words may go to it as far as its link is
     concerned, ``why`` else not. ``why_unplaced``: why the drive's own position is not known, empty where it
     is. ``is_heard``: it has reported since its node is operational. ``why_unsent``: why no words to it are on
     the bus at all, empty where they are."""
@@ -209,7 +209,7 @@ class Way(NamedTuple):
 
 
 class LegState(NamedTuple):
-    """What has a value here has it at the start of the bridge: nobody owns the drive."""
+    """State of one leg; defaults are those of a bridge that starts: nobody owns the drive."""
 
     way: Way
     timer: Timer

@@ -68,7 +68,7 @@ _STOPS: Final[Mapping[Action, Callable[[ControlWords, int], int]]] = {
 
 
 def initial(settings: LegSettings) -> LegState:
-    """Of a bridge that starts: nobody owns the drive, and its node has not been seen."""
+    """State of a bridge that starts: nobody owns the drive, and its node has not been seen."""
     rest = settings.resting or (0,) * settings.setpoints
     stopped = settings.words.stopped
     timer = Timer(settings.timeout_ms)
@@ -154,7 +154,7 @@ def _is_stale(turn: Turn, request: Request) -> bool:
 
 
 def _stale(turn: Turn, request: Request) -> Refusal:
-    """Why it does not count that it can have waited for so long."""
+    """The refusal of a request that may have waited too long."""
     limit_ms = limit_ms_of(request, turn.timer.timeout_ms)
     return Refusal(Code.STALE, Text.of("request.may_be_old", limit_ms=limit_ms))
 

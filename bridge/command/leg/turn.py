@@ -28,7 +28,7 @@ class Turn:
         self._before = state
         self.effects: list[Effect] = []
         self.asked: Asked | None = None
-        """What a request asks of the bus: its answer is judged by that."""
+        """Words, stop or edge that a request asks for: its answer is judged by that."""
         (
             self.way,
             self.timer,
@@ -52,7 +52,7 @@ class Turn:
         ) = state
 
     def begin_anew(self) -> None:
-        """As at the beginning of the step: nothing of what was done since counts."""
+        """Go back to the beginning of the step: nothing that was done since counts."""
         Turn.__init__(self, self.settings, self._before, self.now)
 
     def end(self) -> LegState:
@@ -66,7 +66,7 @@ class Turn:
 
     @property
     def is_enabling(self) -> bool:
-        """What is sent enables the drive."""
+        """True if the words that are sent enable the drive."""
         return self.settings.words.enables(self.sent.words[0])
 
     @property
@@ -105,7 +105,7 @@ class Turn:
         self.effects.append(Answer(outcome))
 
     def keep_at_rest(self) -> None:
-        """What was written for a drive that is not enabled yet must not make it jump when it is."""
+        """Setpoints written for a drive that is not enabled yet must not make it jump when it is."""
         follows = self.settings.follows
         if follows and not self.is_commanded:
             setpoints = list(self.setpoints)

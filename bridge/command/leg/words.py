@@ -1,4 +1,4 @@
-"""Which words the drive gets: a table of the leg's stage and of the drive's motion.
+"""Words that the drive gets: a table of the leg's stage and of the drive's motion.
 
 It stands beside the table of what happens, and ``docs/explanation/dead-man-chain.md`` has both printed.
 Nothing that enables a drive gets past it while the watchdog has tripped, the restart interlock is set or the
@@ -102,7 +102,7 @@ def _written(turn: Turn, may_hold: bool) -> Output:
 
 
 def _in_force(turn: Turn, may_hold: bool) -> Output:
-    """What the owner goes on writing does not weaken the stop in force, by whomever that is."""
+    """The owner's later words do not weaken the stop in force, by whomever that is."""
     words, word, is_ours = turn.settings.words, turn.word, turn.is_ours
     if words.enables(word):
         word = at_rest(words, turn.sent.words[0]) | word & words.acknowledge_mask

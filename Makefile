@@ -57,10 +57,11 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 	@exec $(IN) -m bridge demo $(ARGS)
 
 ##@ Test
-# What measures times, or has a browser that gives up waiting, minds when it has to wait for a CPU: one after the
-# other, and never two at a time. Unit tests know no time.
+# What measures times minds when it has to wait for a CPU: one after the other, and never two at a time. Unit tests
+# know no time. A tab of a browser is a controller whose silence stops a drive: beside it nothing else runs.
 test: compiled packages clients ## all tests: unit, foreign, wire, lab, docs, browser, some fuzzing; less of what takes long
-	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab pages browser fuzz-short" "foreign unit"
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab pages fuzz-short" "foreign unit"
+	@$(MAKE) --no-print-directory browser
 
 # One after the other, so that nobody disturbs who measures times; and all of them even if one fails.
 nightly: export NIGHTLY := 1

@@ -35,6 +35,10 @@ def serving(folder: Path, *nodes: str) -> Iterator[int]:
         yield port
 
 
+PAIRED: Final = ("a/fu1", "a/fu2", "b/fu1", "b/fu2")
+"""The drives of two pairs: ``a`` and ``b``."""
+
+
 def pair(name: str, node_id: int) -> str:
     """Of two drives one is left as it is when its controller falls silent, and one is its owner's alone."""
     drives = (
@@ -81,6 +85,19 @@ def hanging(page: Page) -> Iterator[None]:
     finally:
         debugger.send("Debugger.resume")
         debugger.detach()
+
+
+def put_in_order(page: Page, *drives: str) -> None:
+    """What a test has left that failed within: drives that are tripped, and that nobody lets go."""
+    for drive in drives:
+        to(page, f"drive/{drive}")
+        take(page)
+        acknowledge = page.get_by_role("button", name="Acknowledge fault")
+        if acknowledge.is_enabled():
+            acknowledge.click()
+        state(page).not_to_have_text(re.compile("silent|running"))
+        page.get_by_role("button", name="Give back").click()
+        owner(page).to_contain_text("nobody")
 
 
 def state(page: Page) -> Any:

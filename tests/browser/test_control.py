@@ -7,9 +7,11 @@ import re
 from playwright.sync_api import WebSocketRoute, expect
 
 from tests.browser.hands import (
+    PAIRED,
     asked,
     hanging,
     owner,
+    put_in_order,
     start,
     state,
     take,
@@ -129,6 +131,23 @@ def test_a_hold_is_told_as_what_it_is(bench: Desk) -> None:
         take(page)
         page.get_by_role("button", name="Acknowledge fault").click()
         expect(watcher.locator(".sentence")).to_contain_text("in order")
+
+
+def test_what_a_failed_test_leaves_is_put_in_order(bench: Desk) -> None:
+    """Else nothing that failed once could pass when it is tried again."""
+    with bench.sits("operator") as watcher:
+        with bench.sits("operator") as page:
+            for one in (page, watcher):
+                to(one, "drive/a/fu1")
+            take(page)
+            page.get_by_role("button", name="Start", exact=True).click()
+            state(watcher).to_have_text(re.compile("running"))
+            with hanging(page):
+                state(watcher).to_have_text(re.compile("its controller is silent"))
+        put_in_order(watcher, *PAIRED)
+        to(watcher, "drive/a/fu1")
+        state(watcher).not_to_have_text(re.compile("silent|running"))
+        owner(watcher).to_contain_text("nobody")
 
 
 def test_a_refusal_is_not_told_again_on_return(bench: Desk) -> None:

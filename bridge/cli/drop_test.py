@@ -173,7 +173,7 @@ def _carry_out(project: Project, site: Site, families: dict[str, Family], plant:
     async def work() -> None:
         finished = asyncio.Event()
         bus = MutableBus(make_bus(table), lambda frame: made[0].on_frame(frame))
-        network = Network(table, plant, clock.epoch_ns, project.downloads)
+        network = Network(table, plant.side_of(table), clock.epoch_ns, project.downloads)
         test = DropTest(network, plant, node, bus, finished.set)
         made.append(test)
         told = [Phase.DONE]

@@ -4,6 +4,7 @@ from bridge.command.audit import Rejection as Rejection
 from bridge.command.drive import Drive as Drive
 from bridge.command.drive import Identification as Identification
 from bridge.command.messages.event import Event as Event
+from bridge.command.messages.event import EventQueue as EventQueue
 from bridge.command.messages.event import Kind as Kind
 from bridge.command.messages.request import Action as Action
 from bridge.command.messages.request import Code as Code
@@ -22,6 +23,7 @@ from bridge.command.messages.request import TakeControl as TakeControl
 from bridge.command.messages.request import Write as Write
 from bridge.command.messages.request import WriteParameter as WriteParameter
 from bridge.command.messages.request import command_of as command_of
+from bridge.command.node import BusSide as BusSide
 from bridge.command.node import HasParameters as HasParameters
 from bridge.command.node import Node as Node
 from bridge.command.plant import Plant as Plant

@@ -8,12 +8,15 @@ from typing import Protocol
 
 from bridge.command.device import Device
 from bridge.command.drive import Drive
+from bridge.command.link import NodeState
+from bridge.command.messages.event import EventQueue
 from bridge.command.messages.request import Action, Identity
 from bridge.command.outputs import Outputs
 from bridge.config import BusTable, NodeTable
+from bridge.image import Image
 from bridge.mapping.axes import profile_of
 from bridge.mapping.model import Family, ObjectRef
-from bridge.parameter import AxisNames, Names
+from bridge.parameter import AxisNames, Ledger, Names
 from bridge.text import Text
 
 Enforce = Callable[[str, Action, str, float], None]
@@ -89,7 +92,28 @@ class Node:
             return [self.device.outputs] if self.device.outputs else []
         return self.drives
 
+    def on_state(self, state: NodeState, now: float) -> None:
+        """The node is in another state: what is commanded of it, and what it has as a device."""
+        for drive in self.drives:
+            drive.channel.on_node(state, now)
+        if self.device:
+            self.device.on_node(state, now)
+            if self.device.outputs:
+                self.device.outputs.channel.on_node(state, now)
+
     def on_heard_again(self) -> None:
         """The node is heard again, and did not restart in between."""
         for drive in self.drives:
             drive.on_heard_again()
+
+
+@dataclass(frozen=True, slots=True)
+class BusSide:
+    """The plant as the nodes of one bus have it: who they are, where they show their points, report events
+    and count writes of an EEPROM. ``began`` is the monotonic time of what is known from the start."""
+
+    nodes: Sequence[Node]
+    image: Image
+    events: EventQueue
+    eeprom_writes: Ledger
+    began: float

@@ -21,7 +21,7 @@ from bridge.command.device import Device
 from bridge.command.drive import Drive
 from bridge.command.ignored_stop import concluded
 from bridge.command.link import NodeState
-from bridge.command.messages.event import Event, EventGate, Kind
+from bridge.command.messages.event import Event, EventGate, EventQueue, Kind
 from bridge.command.messages.request import (
     NODE_ACTIONS,
     PARAMETER_ACTIONS,
@@ -33,11 +33,11 @@ from bridge.command.messages.request import (
     Reply,
     Request,
 )
-from bridge.command.node import Enforce, Node
+from bridge.command.node import BusSide, Enforce, Node
 from bridge.command.outputs import Outputs
 from bridge.command.points import CONNECTION_COUNTS, NODE_CODES, site_points
 from bridge.command.stop_check.state import Verdict
-from bridge.config import Site
+from bridge.config import BusTable, Site
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Family
 from bridge.parameter import AxisNames, Ledger
@@ -79,6 +79,8 @@ class Plant:
         self.by_unit: dict[int, Drive] = {}
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
+        self.events = EventQueue()
+        """Events of nodes and buses that nobody has been told of yet."""
         self._stop_due: float | None = None
         self._changed: dict[str, set[str]] = {bus.name: set() for bus in site.bus}
         self.unsent_stops: set[Drive | Outputs] = set()
@@ -163,9 +165,14 @@ class Plant:
     def _tripped(self, due: float) -> None:
         self._stop_due = due if self._stop_due is None else min(due, self._stop_due)
 
-    def on_stops_handed_over(self) -> float | None:
-        """The stops of drives that had tripped have been handed to their buses: since when the first of them
-        was due, None where there was none."""
+    def side_of(self, bus: BusTable) -> BusSide:
+        """The plant as the nodes of this bus have it."""
+        nodes = [node for node in self.nodes.values() if node.bus is bus]
+        return BusSide(nodes, self.image, self.events, self.eeprom_writes, self.began)
+
+    def take_stop_due(self) -> float | None:
+        """Time at which the first stop was due of those that were handed to a bus since the last call, of
+        drives that had tripped; None where there was none."""
         due, self._stop_due = self._stop_due, None
         return due
 
@@ -178,6 +185,18 @@ class Plant:
             self._listeners.remove(listener)
 
     def report(self, event: Event) -> None:
+        """Tell the listeners of an event, after those that wait."""
+        if self.events.waiting:
+            self.tell_events()
+        self._tell(event)
+
+    def tell_events(self) -> None:
+        """Tell the listeners what nodes and buses have reported since the last call."""
+        while self.events.waiting:
+            for event in self.events.take():
+                self._tell(event)
+
+    def _tell(self, event: Event) -> None:
         if not self._gate.admits(event):
             return
         with self._guard:
@@ -190,11 +209,7 @@ class Plant:
         self, name: str, value: Value, now: float, quality: Quality = Quality.GOOD, why: Text | str = ""
     ) -> None:
         """Set a point by its full name."""
-        self.image.set(self.image.index[name], value, now, quality, why)
-
-    def say(self, name: str, said: Text | str, now: float) -> None:
-        """Set a point by its full name to a text in words."""
-        self.image.say(self.image.index[name], said, now)
+        self.image.put(name, value, now, quality, why)
 
     def submit(self, request: Request, now: float, reply: Reply, carry_out: CarryOut = on_no_bus) -> bool:
         """Carry out ``request``; ``reply`` is called exactly once, now or later. ``carry_out`` takes what is
@@ -209,6 +224,7 @@ class Plant:
         if request.action in NODE_ACTIONS:
             reply = self._counting_refusals(request, now, reply)
             is_taken = carry_out(request, now, reply)
+            self.tell_events()
             if not is_taken:
                 reply(Outcome(Code.UNKNOWN_TARGET, Text.of("request.no_node", node=request.target)))
             return is_taken
@@ -219,6 +235,7 @@ class Plant:
             return False
         if request.action in PARAMETER_ACTIONS:
             is_taken = carry_out(request, now, reply)
+            self.tell_events()
             if not is_taken:
                 reply = self._counting_refusals(request, now, reply)
                 said = Text.of("request.on_no_bus", target=request.target)
@@ -372,27 +389,6 @@ class Plant:
         if changed:
             self._changed[bus] = set()
         return changed
-
-    def on_handed_over(self, one: Drive | Outputs, now: float) -> None:
-        """What this drive is sent, or these outputs, has been handed to the bus."""
-        self.unsent_stops.discard(one)
-        one.on_handed_over(now)
-
-    def on_node(self, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:
-        """The master says that a node is in another state; ``tell`` makes that an event."""
-        self.image.set(self._node_points[node.name][0], NODE_CODES[state], now)
-        for drive in node.drives:
-            drive.channel.on_node(state, now)
-        if node.device:
-            node.device.on_node(state, now)
-            if node.device.outputs:
-                node.device.outputs.channel.on_node(state, now)
-        if not tell:
-            return
-        if state is NodeState.LOST:
-            self.report(Event(now, Kind.NODE_LOST, node.name, 800, Text.of("node.lost")))
-        elif state is NodeState.OPERATIONAL:
-            self.report(Event(now, Kind.NODE_BACK, node.name, 200, Text.of("node.operational")))
 
 
 class PlantView:

@@ -135,6 +135,12 @@ class Image:
         """The present state of the named point. Raises KeyError where there is none."""
         return self[self.index[name]]
 
+    def put(
+        self, name: str, value: Value, now: float, quality: Quality = Quality.GOOD, why: Text | str = ""
+    ) -> None:
+        """Store a value of the named point, as ``set``. Raises KeyError where there is none."""
+        self.set(self.index[name], value, now, quality, why)
+
     def set(
         self, index: int, value: Value, now: float, quality: Quality = Quality.GOOD, why: Text | str = ""
     ) -> None:

@@ -6,7 +6,7 @@ from typing import Final
 
 from bridge.base.ratelimit import RateLimit
 from bridge.can.interface import BusStatus
-from bridge.command import Event, Kind, Plant
+from bridge.command import BusSide, Event, Kind
 from bridge.config import BusTable
 from bridge.text import Text
 
@@ -16,9 +16,10 @@ _ERRORS_EVERY_S: Final = 10.0
 
 
 class BusPoints:
-    def __init__(self, bus: BusTable, plant: Plant) -> None:
+    def __init__(self, bus: BusTable, side: BusSide) -> None:
         self._bus = bus
-        self._plant = plant
+        self._image = side.image
+        self._events = side.events
         self._measured: tuple[float, int] | None = None
         self._errors_told = 0
         self._error_limit = RateLimit(1, _ERRORS_EVERY_S)
@@ -35,7 +36,7 @@ class BusPoints:
             "last_error": status.last_error,
         }
         for leaf, value in values.items():
-            self._plant.set(f"bus/{self._bus.name}/{leaf}", value, now)
+            self._image.put(f"bus/{self._bus.name}/{leaf}", value, now)
         self._show_load(status, now)
         self._tell_errors(status, now)
 
@@ -47,7 +48,7 @@ class BusPoints:
         since, before = self._measured
         if now >= since + _LOAD_PERIOD_S:
             load = 100 * (bits - before) / (now - since) / self._bus.bitrate
-            self._plant.set(f"bus/{self._bus.name}/load", round(min(100.0, load), 1), now)
+            self._image.put(f"bus/{self._bus.name}/load", round(min(100.0, load), 1), now)
             self._measured = now, bits
 
     def _tell_errors(self, status: BusStatus, now: float) -> None:
@@ -59,4 +60,4 @@ class BusPoints:
             said = Text.of("bus.error_frames", number=number, error=error)
             if number == 1:
                 said = Text.of("bus.error_frame", error=error)
-            self._plant.report(Event(now, Kind.BUS, self._bus.name, 500, said))
+            self._events.report(Event(now, Kind.BUS, self._bus.name, 500, said))

@@ -16,7 +16,7 @@ from bridge.canopen import cobid, nmt
 from bridge.canopen.decode_sdo import SdoListener
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand
-from bridge.command import Drive, Event, Kind, Plant
+from bridge.command import Drive, Event, EventQueue, Kind
 from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.master.answers import Answers
@@ -51,7 +51,7 @@ class Intruders:
         self,
         bus: BusTable,
         nodes: Sequence[NodeCore],
-        plant: Plant,
+        events: EventQueue,
         acts: Callable[[], bool],
         stop: Stop,
     ) -> None:
@@ -60,7 +60,7 @@ class Intruders:
         self.last: Text | str = ""
         self._bus = bus
         self._nodes = nodes
-        self._plant = plant
+        self._events = events
         self._acts = acts
         self._stop = stop
         self._commands: dict[int, tuple[NodeCore, Command]] = {}
@@ -216,7 +216,7 @@ class Intruders:
             self.last = _answered(_met(said(), since), stopped, self._nodes)
             severity = _HARMLESS if affected is None else _SEVERE
             told = Text.of("intruder.seen", what=self.last)
-            self._plant.report(Event(frame.time, Kind.INTRUDER, self._bus.name, severity, told))
+            self._events.report(Event(frame.time, Kind.INTRUDER, self._bus.name, severity, told))
         due = [node for node in stopped if self._is_due(node, frame.time, brings_back=brings_back)]
         running = [node for node in due if not node.is_held]
         if running:
@@ -258,7 +258,7 @@ class Intruders:
     def _reset(self, series: _Series, now: float) -> None:
         node, series.reset_at = series.node, now
         node.hold_by_reset(now)
-        self._plant.report(Event(now, Kind.INTRUDER, node.node.name, _SEVERE, Text.of("intruder.reset")))
+        self._events.report(Event(now, Kind.INTRUDER, node.node.name, _SEVERE, Text.of("intruder.reset")))
 
     def next_deadline(self) -> float | None:
         if not self._series and not self._answers.are_asked:

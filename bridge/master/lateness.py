@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.base.ratelimit import RateLimit
-from bridge.command import Event, Kind, Plant
+from bridge.command import Event, EventQueue, Kind
 from bridge.command.worst_case import REACTION_BOUND_MS
+from bridge.image import Image
 from bridge.text import Text
 
 HANG_MS: Final = 100
@@ -20,8 +21,9 @@ class Lateness:
     """Times are monotonic seconds. The worst of a trip is from its deadline until its stop was handed to the
     bus, that of a round from when it was to begin."""
 
-    def __init__(self, plant: Plant) -> None:
-        self._plant = plant
+    def __init__(self, image: Image, events: EventQueue) -> None:
+        self._image = image
+        self._events = events
         self._trip_ms = 0.0
         self._round_ms = 0.0
         self._hangs = 0
@@ -56,10 +58,10 @@ class Lateness:
             self._tell(said, _SEVERITY_TRIP, now)
 
     def _tell(self, said: Text, severity: int, now: float) -> None:
-        self._plant.report(Event(now, Kind.WATCHDOG, "bridge", severity, said))
+        self._events.report(Event(now, Kind.WATCHDOG, "bridge", severity, said))
 
     def refresh(self, now: float) -> None:
-        self._plant.set("bridge/hangs", self._hangs, now)
-        self._plant.set("bridge/last_hang_ms", self._last_hang_ms, now)
-        self._plant.set("bridge/worst_trip_lateness_ms", round(self._trip_ms, 1), now)
-        self._plant.set("bridge/worst_round_lateness_ms", round(self._round_ms, 1), now)
+        self._image.put("bridge/hangs", self._hangs, now)
+        self._image.put("bridge/last_hang_ms", self._last_hang_ms, now)
+        self._image.put("bridge/worst_trip_lateness_ms", round(self._trip_ms, 1), now)
+        self._image.put("bridge/worst_round_lateness_ms", round(self._round_ms, 1), now)

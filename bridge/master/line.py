@@ -180,7 +180,7 @@ class BusLine:
             (at for wanted in repetitions.values() for at in wanted.hold_at if at > now), default=inf
         )
         if self.plant.unsent_stops:
-            network.on_handed_over(self.clock())
+            network.on_handed_over(self.plant.unsent_stops, self.clock())
 
     def _hand_over(self, due: list[tuple[Repetition, bool]], now: float) -> None:
         """Raises ``StoodStill`` where the process was stopped for so long that the rest is not right any

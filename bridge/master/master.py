@@ -46,7 +46,8 @@ _SEVERITIES = {
 
 
 class Master:
-    """Runs any number of networks on their buses in one event loop.
+    """Runs any number of networks on their buses in one event loop. What nodes and buses report is told when
+    the words of a round are on their way.
 
     ``clock`` gives monotonic seconds; ``alive`` is called at the end of every complete round; ``alarm``
     notices a standstill while frames are handed to the bus; ``suspended`` gives bounds for how long the
@@ -68,7 +69,7 @@ class Master:
         self._clock = clock
         self._alive = alive
         self._suspend = SuspendWatch(suspended)
-        self._lateness = Lateness(plant)
+        self._lateness = Lateness(plant.image, plant.events)
         self._replies = Guard("outcome")
         self._due: float | None = None
         self._timer: LoopTimer | None = None
@@ -174,6 +175,7 @@ class Master:
                 line.flush(now)
             except Exception:  # noqa: BLE001 - nor may it keep the next bus from it
                 _log.exception("bus %s: no stopped words could be sent", line.bus.name)
+        self._plant.tell_events()
 
     async def failed(self) -> None:
         """Wait for ever, or raise ``OperationFailed`` when a fault of our own has ended the running."""
@@ -201,8 +203,10 @@ class Master:
                 line.bus.on_time(now)
         if self._lines_have_news():
             self.pump()
-        else:
-            self._set_timer_for(due)
+            return
+        self._set_timer_for(due)
+        if self._plant.events.waiting:
+            self._plant.tell_events()
 
     def _receive(self, now: float) -> float:
         """Take in what has come; gives the time up to which. The process may have been stopped since it
@@ -245,9 +249,11 @@ class Master:
             line.flush(now)
             if not line.stood_still(now):
                 line.bus.on_time(now)
-        stop_due = self._plant.on_stops_handed_over()
+        stop_due = self._plant.take_stop_due()
         if stop_due is not None:
             self._lateness.on_stop(stop_due, self._clock())
+        if self._plant.events.waiting:
+            self._plant.tell_events()
         self._last_round = now
         self._alive(now)
         self._arm(now)
@@ -277,7 +283,7 @@ class Master:
         if slept_s:
             said = Text.of("bus.machine_suspended", slept_s=slept_s)
         for line in hung:
-            self._plant.report(Event(now, Kind.BUS, line.bus.name, 900, said))
+            self._plant.events.report(Event(now, Kind.BUS, line.bus.name, 900, said))
             line.network.came_back(now)
             for node in line.network.nodes:
                 for one in node.node.commanded:
@@ -319,7 +325,7 @@ class Master:
         if status.state is not ControllerState.OK and status.last_error:
             error = Text.plain(status.last_error)
             said = Text.of("bus.state_after", bus=line.bus.name, state=state, error=error)
-        self._plant.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], said))
+        self._plant.events.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], said))
 
     def _tell_refusal(self, line: BusLine, now: float) -> None:
         """The kernel no longer takes bursts, or takes them again."""
@@ -330,7 +336,7 @@ class Master:
         said = Text.of("bus.bursts_sent_again")
         if refusal:
             said = Text.of("bus.bursts_refused", refusal=Text.plain(refusal))
-        self._plant.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 200, said))
+        self._plant.events.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 200, said))
 
     def _arm(self, now: float) -> None:
         times = [self._refresh_at]

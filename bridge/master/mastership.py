@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-from bridge.command import Event, Kind, Plant
+from bridge.command import Event, EventQueue, Kind
 from bridge.config import BusTable
 from bridge.master.listening import Listening, Part, listen_s
 from bridge.node.node import NodeCore
@@ -12,21 +12,18 @@ from bridge.text import Text
 
 
 class BusMastership:
-    """Mastership of one bus, by ``listening``. ``forget`` drops all that is known of the bus: now,
-    and why."""
+    """Mastership of one bus, by ``listening``."""
 
     def __init__(
         self,
         bus: BusTable,
         nodes: Sequence[NodeCore],
-        plant: Plant,
-        forget: Callable[[float, Text], None],
+        events: EventQueue,
         listening: Listening | None,
     ) -> None:
         self._bus = bus
         self._nodes = nodes
-        self._plant = plant
-        self._forget = forget
+        self._events = events
         self._listening = listening or Listening(listen_s(bus))
 
     def acts(self) -> bool:
@@ -46,14 +43,14 @@ class BusMastership:
         listens = self._listening.part is Part.LISTENING
         return Text.of("bus.listens" if listens else "bus.leaves", bus=self._bus.name)
 
-    def heard(self, sign: str, now: float) -> None:
-        """``sign`` reveals another bridge. If this one gives way it sends nothing more, not even stops."""
+    def heard(self, sign: str, now: float) -> Text | None:
+        """``sign`` reveals another bridge. If this one gives way by that it sends nothing more, not even
+        stops: the reason, with which all that is known of the bus is to be forgotten."""
         if not self._listening.heard(now):
-            return
-        self._forget(now, Text.of("bus.other_in_charge", bus=self._bus.name))
+            return None
         until_ms = self._listening.silence_s * 1000
         self._tell(Text.of("bus.gives_way", sign=Text.plain(sign), until_ms=until_ms), now)
-        self._say_passive(now)
+        return Text.of("bus.other_in_charge", bus=self._bus.name)
 
     def on_time(self, now: float) -> None:
         """Begin to act when it is time: as at any start, with everything stopped."""
@@ -82,12 +79,13 @@ class BusMastership:
     def bus_is_back(self, now: float) -> None:
         self._listening.bus_is_back(now)
         if self.is_passive:
-            self._say_passive(now)
+            self.say_passive(now)
 
-    def _say_passive(self, now: float) -> None:
+    def say_passive(self, now: float) -> None:
+        """Show of each node that another bridge is in charge of it."""
         for node in self._nodes:
             if not node.is_out_of_service:
                 node.say(Text.of("node.passive", bus=self._bus.name), now)
 
     def _tell(self, said: Text, now: float) -> None:
-        self._plant.report(Event(now, Kind.BUS, self._bus.name, 800, said))
+        self._events.report(Event(now, Kind.BUS, self._bus.name, 800, said))

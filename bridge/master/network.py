@@ -15,8 +15,9 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sync import SyncWindow
 from bridge.canopen.time_stamp import TimeProducer
-from bridge.command import Action, Code, Event, Kind, Outcome, Plant, Reply, Request
+from bridge.command import Action, BusSide, Code, Drive, Event, Kind, Outcome, Reply, Request
 from bridge.command.messages.request import NODE_ACTIONS
+from bridge.command.outputs import Outputs
 from bridge.config import BusTable
 from bridge.config.download import Download
 from bridge.master.bus_points import BusPoints
@@ -46,7 +47,7 @@ class Network:
     def __init__(
         self,
         bus: BusTable,
-        plant: Plant,
+        side: BusSide,
         epoch_ns: Callable[[float], int] | None = None,
         downloads: Mapping[str, Sequence[Download]] = NOTHING,
         listening: Listening | None = None,
@@ -54,22 +55,19 @@ class Network:
         """``downloads`` has the configuration of nodes that a file gives, by the node's name. ``listening``
         is as the bus has it, unless given."""
         self.bus = bus
-        self._plant = plant
-        self.nodes = [
-            NodeCore(node, plant, self, downloads.get(node.name, ()))
-            for node in plant.nodes.values()
-            if node.bus is bus
-        ]
+        self._image = side.image
+        self._events = side.events
+        self.nodes = [NodeCore(node, side, self, downloads.get(node.name, ())) for node in side.nodes]
         self._gate = StartGate(bus.mandatory_missing, self.nodes)
         self._schedule = Schedule(self.nodes)
         own_id = bus.master_node_id if bus.heartbeat_ms else None
         known = {node.table.id: node.node.name for node in self.nodes}
-        self.mastership = BusMastership(bus, self.nodes, plant, self._give_way, listening)
+        self.mastership = BusMastership(bus, self.nodes, side.events, listening)
         self.farewell = Farewell(self.nodes)
         self._reach = Reach(self.nodes, self.mastership, self.farewell)
-        self._reach.on_bus(plant.began)
-        self._watch = BusWatch(bus.name, own_id, self.mastership.acts, known, plant)
-        self._intruders = Intruders(bus, self.nodes, plant, self.mastership.acts, self._stop_nodes)
+        self._reach.on_bus(side.began)
+        self._watch = BusWatch(bus.name, own_id, self.mastership.acts, known, side)
+        self._intruders = Intruders(bus, self.nodes, side.events, self.mastership.acts, self._stop_nodes)
         self.ours: frozenset[int] = frozenset()
         """Identifiers on which nobody else may send what we repeat; brought up to date by ``take_routes``."""
         self._has_booted = False
@@ -83,7 +81,7 @@ class Network:
         self._window = SyncWindow(bus.sync_window_us / 1e6) if bus.sync_window_us else None
         self._time = TimeProducer(bus.time_period_s, epoch_ns) if bus.time_period_s and epoch_ns else None
         self._frames: list[Frame] = []
-        self._points = BusPoints(bus, plant)
+        self._points = BusPoints(bus, side)
 
     def on_frames(self, frames: list[Frame], now: float) -> bool:
         """Everything received, in order; gives whether a node has started by it."""
@@ -103,9 +101,14 @@ class Network:
             if frame.can_id == cobid.ERROR_CONTROL + self.bus.master_node_id:
                 self._watch.on_own_id(now)
             if self._intruders.is_sign(frame, acts=self.mastership.acts()):
-                self.mastership.heard(self._intruders.name(frame), now)
+                self._on_other_bridge(self._intruders.name(frame), now)
             self._intruders.on_frame(frame)
         self._pump(now)
+
+    def _on_other_bridge(self, sign: str, now: float) -> None:
+        if why := self.mastership.heard(sign, now):
+            self._give_way(now, why)
+            self.mastership.say_passive(now)
 
     def _pump(self, now: float) -> None:
         """Continue every boot-up that something has happened to, and start nodes that may start."""
@@ -218,7 +221,7 @@ class Network:
             reply(Outcome(Code.NOT_READY, self.mastership.why_not, forwarded=False))
             return True
         name = self.bus.name if is_bus else request.target
-        if node_commands.answer(request, name, nodes, self._plant, now, reply):
+        if node_commands.answer(request, name, nodes, self._events, now, reply):
             self._nmt_for_all = nmt.command(node_commands.NMT[request.action], 0)
         self._reach.tell(nodes, now)
         return True
@@ -253,7 +256,7 @@ class Network:
         """A node is lost without which the others must not go on."""
         self._gate.stopped_by(node)
         said = Text.of("bus.all_stopped", why=why)
-        self._plant.report(Event(now, Kind.BUS, self.bus.name, 800, said))
+        self._events.report(Event(now, Kind.BUS, self.bus.name, 800, said))
         each = self._takes_over(self.nodes)
         for other in self.nodes:
             # The lost one included, if it still hears us.
@@ -341,14 +344,15 @@ class Network:
                 if tpdo.is_synchronous and tpdo.cob_id in self._routes:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
-    def on_handed_over(self, now: float) -> None:
-        """What is to be repeated is on the bus: bounds of stops begin, and outputs are to be read back."""
-        unsent = self._plant.unsent_stops
+    def on_handed_over(self, unsent: set[Drive | Outputs], now: float) -> None:
+        """What is to be repeated is on the bus: bounds of stops begin, and outputs are to be read back. Whose
+        stop is sent by that is taken out of ``unsent``."""
         for node in self.nodes:
             for one in node.node.commanded:
                 is_sent = node.sends_process_data and node.wire.carries(one)
                 if one in unsent and (is_sent or not one.stop_check.awaits_sending):
-                    self._plant.on_handed_over(one, now)
+                    unsent.discard(one)
+                    one.on_handed_over(now)
                     self._schedule.plan(node)
 
     def _give_way(self, now: float, why: Text) -> None:
@@ -402,13 +406,13 @@ class Network:
         """Bring the points of the bus and its nodes up to date; a few times a second."""
         self._points.refresh(status, now)
         top = f"bus/{self.bus.name}"
-        self._plant.set(f"{top}/sync_window_misses", self._window.misses if self._window else 0, now)
-        self._plant.set(f"{top}/nmt_state", int(self.nmt_state), now)
-        self._plant.set(f"{top}/held_by", ", ".join(self._gate.missing), now)
+        self._image.put(f"{top}/sync_window_misses", self._window.misses if self._window else 0, now)
+        self._image.put(f"{top}/nmt_state", int(self.nmt_state), now)
+        self._image.put(f"{top}/held_by", ", ".join(self._gate.missing), now)
         self._watch.refresh(now)
-        self._plant.set(f"{top}/intruders", self._intruders.count, now)
-        self._plant.set(f"{top}/last_intruder", render(self._intruders.last), now)
-        self._plant.set(f"{top}/passive", self.mastership.is_passive, now)
+        self._image.put(f"{top}/intruders", self._intruders.count, now)
+        self._image.put(f"{top}/last_intruder", render(self._intruders.last), now)
+        self._image.put(f"{top}/passive", self.mastership.is_passive, now)
         for node in self.nodes:
             node.wire.refresh(now)
             if node.wire.habits.has_news:

@@ -8,7 +8,7 @@ from typing import Final
 from bridge.base.ratelimit import Pauses
 from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import Frame
-from bridge.command import Event, Kind, Plant
+from bridge.command import BusSide, Event, Kind
 from bridge.text import Text
 
 _NODES: Final = range(1, 128)
@@ -25,7 +25,7 @@ class BusWatch:
         own_id: int | None,
         acts: Callable[[], bool],
         known: dict[int, str],
-        plant: Plant,
+        side: BusSide,
     ) -> None:
         """``own_id`` is the bridge's own node id where it produces a heartbeat; where the bridge does not
         act, another one is the NMT master. ``known`` has the configured nodes."""
@@ -33,7 +33,8 @@ class BusWatch:
         self._own_id = own_id
         self._acts = acts
         self._known = known
-        self._plant = plant
+        self._image = side.image
+        self._events = side.events
         self._master_at = float("-inf")
         self._strangers: dict[int, float] = {}
         self._duplicates: dict[int, float] = {}
@@ -89,14 +90,14 @@ class BusWatch:
 
     def _tell(self, key: str, said: Text, now: float, severity: int) -> None:
         if self._pauses.take(now, key) is not None:
-            self._plant.report(Event(now, Kind.BUS, self._bus, severity, said))
+            self._events.report(Event(now, Kind.BUS, self._bus, severity, said))
 
     def refresh(self, now: float) -> None:
         """Bring the points of the bus up to date."""
         top = f"bus/{self._bus}"
-        self._plant.set(f"{top}/second_master", now - self._master_at < _FORGET_S, now)
-        self._plant.set(f"{top}/unexpected_nodes", _listed(self._strangers, now), now)
-        self._plant.set(f"{top}/duplicate_ids", _listed(self._duplicates, now), now)
+        self._image.put(f"{top}/second_master", now - self._master_at < _FORGET_S, now)
+        self._image.put(f"{top}/unexpected_nodes", _listed(self._strangers, now), now)
+        self._image.put(f"{top}/duplicate_ids", _listed(self._duplicates, now), now)
 
 
 def _listed(seen: dict[int, float], now: float) -> str:

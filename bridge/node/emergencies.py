@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.canopen import emcy
 from bridge.canopen.frame import Frame
-from bridge.command import Drive, Event, Kind, Plant
+from bridge.command import BusSide, Drive, Event, Kind
 from bridge.command.node import Node
 from bridge.drive import EmergencyReader
 from bridge.node.emergency_log import EmergencyLog
@@ -26,12 +26,13 @@ class Emergencies:
     def __init__(
         self,
         node: Node,
-        plant: Plant,
+        side: BusSide,
         reject: Callable[[Frame, str], None],
         told: Callable[[Drive, float], None] = lambda drive, now: None,
     ) -> None:
         self._node = node
-        self._plant = plant
+        self._image = side.image
+        self._events = side.events
         self._reject = reject
         self._told = told
         self._reader = EmergencyReader(node.family)
@@ -61,7 +62,7 @@ class Emergencies:
         if self._node.device or (concerned and not is_of_one_drive):
             severity = _GONE if told.is_gone else _COMES
             said = Text.of("node.emergency", number=told.code, text=Text.plain(told.text))
-            self._plant.report(Event(at, Kind.EMERGENCY, self._node.name, severity, said))
+            self._events.report(Event(at, Kind.EMERGENCY, self._node.name, severity, said))
         for drive in concerned:
             drive.channel.on_emcy(told, at, is_its_own=is_of_one_drive)
             drive.refresh(at)
@@ -71,5 +72,5 @@ class Emergencies:
         top = f"{self._node.name}/node"
         if self._log.changed:
             history = self._log.as_json(lambda one: self._reader.read(one.code, one.vendor).text)
-            self._plant.set(f"{top}/emcy_history", history, now)
-        self._plant.set(f"{top}/emcy_suppressed", self._log.suppressed, now)
+            self._image.put(f"{top}/emcy_history", history, now)
+        self._image.put(f"{top}/emcy_suppressed", self._log.suppressed, now)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from bridge.canopen.nmt import NmtCommand
-from bridge.command import Action, Code, Drive, Event, Kind, Outcome, Plant, Reply, Request, Role
+from bridge.command import Action, Code, Drive, Event, EventQueue, Kind, Outcome, Reply, Request, Role
 from bridge.command.link import NodeState
 from bridge.command.node import Node
 from bridge.command.outputs import Outputs
@@ -59,7 +59,12 @@ class CommandedNode(Protocol):
 
 
 def answer(
-    request: Request, name: str, nodes: Sequence[CommandedNode], plant: Plant, now: float, reply: Reply
+    request: Request,
+    name: str,
+    nodes: Sequence[CommandedNode],
+    events: EventQueue,
+    now: float,
+    reply: Reply,
 ) -> bool:
     """A request for these nodes, ``name`` in the log; True where it was carried out and one frame is to be
     sent to them all.
@@ -78,7 +83,7 @@ def answer(
         return False
     who = str(request.identity)
     told = Text.of("request.by", action=Text.word("action", request.action), who=who)
-    plant.report(Event(now, Kind.OWNER, name, 400, told))
+    events.report(Event(now, Kind.OWNER, name, 400, told))
     each = not is_bus or request.action is Action.START_NODE
     each |= NMT.get(request.action) in CANCELS_WORDS and any(one.leaving.takeover_s for one in nodes)
     for one in nodes:

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Final
 
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.command import Action, Plant
+from bridge.command import Action, BusSide
 from bridge.command.link import NodeState
 from bridge.command.node import Node
 from bridge.config.download import Download
@@ -38,14 +38,14 @@ class NodeCore:
     """Boots one node, keeps it in operation and reacts to its loss."""
 
     def __init__(
-        self, node: Node, plant: Plant, neighbours: Neighbours, downloads: Sequence[Download] = ()
+        self, node: Node, side: BusSide, neighbours: Neighbours, downloads: Sequence[Download] = ()
     ) -> None:
         self.node = node
-        self.plant = plant
+        self._ledger = side.eeprom_writes
         self._neighbours = neighbours
         table = self.table = node.table
         self.state = NodeState.ABSENT
-        self._view = NodeView(node, plant)
+        self._view = NodeView(node, side)
         self._touch = partial(neighbours.touched, self)
         listener = Listener(
             self._on_sign,
@@ -56,11 +56,11 @@ class NodeCore:
         )
         self._memory = boot.BootMemory(count_write=self._count_write)
         configured = (*downloads, *(entry.download for entry in table.configure))
-        self.wire = NodeWire(node, plant, listener, StopWords(node, configured, self._memory))
+        self.wire = NodeWire(node, side, listener, StopWords(node, configured, self._memory))
         self.leaving = Leaving(node, self.wire, self._memory, self._takes_words)
         self.error_control = self.wire.error_control
         self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
-        self.parameters = NodeParameters(node, plant, lambda: self.sdo)
+        self.parameters = NodeParameters(node, side, lambda: self.sdo)
         self.boot_at: float | None = 0.0
         self.has_concluded = False
         """Whether a boot-up has ended, well or not, since the bus is there."""
@@ -77,9 +77,9 @@ class NodeCore:
         self._operational_since = 0.0
         if not table.enabled:
             self.boot_at = None
-            self.set_state(NodeState.DISABLED, plant.began)
-        self.say(Text.of("node.waiting"), plant.began)
-        self._show(plant.began)
+            self.set_state(NodeState.DISABLED, side.began)
+        self.say(Text.of("node.waiting"), side.began)
+        self._show(side.began)
 
     def _on_sign(self, sign: Sign, now: float) -> None:
         """An error control message."""
@@ -415,7 +415,10 @@ class NodeCore:
         if state is self.state:
             return
         self.state = state
-        self.plant.on_node(self.node, state, now, tell=not self._back_off.is_flapping)
+        self._view.is_in(state, now)
+        self.node.on_state(state, now)
+        if not self._back_off.is_flapping:
+            self._view.went(state, now)
         self.parameters.on_node(state, now)
         self._show(now)
 
@@ -440,7 +443,7 @@ class NodeCore:
 
     def _count_write(self, owner: str, address: str, name: str) -> str:
         """The boot-up writes to an EEPROM: counted as of its beginning."""
-        ledger, eeprom = self.plant.eeprom_writes, self.node.family.eeprom
+        ledger, eeprom = self._ledger, self.node.family.eeprom
         cycles = eeprom.cycles if eeprom else None
         ledger.check((owner, address), name, self._last_boot, cycles)
         return ledger.count((owner, address), name, cycles, self._last_boot)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bridge.canopen.nmt import NmtState
-from bridge.command import Event, Identification, Kind, Plant
+from bridge.command import BusSide, Event, Identification, Kind
 from bridge.command.link import NodeState
 from bridge.command.node import Node
+from bridge.command.points import NODE_CODES
 from bridge.node.backoff import BackOff
 from bridge.node.boot import BootError
 from bridge.node.bootloop import BootLoop
@@ -15,9 +16,10 @@ from bridge.text import Text
 
 
 class NodeView:
-    def __init__(self, node: Node, plant: Plant) -> None:
+    def __init__(self, node: Node, side: BusSide) -> None:
         self._node = node
-        self._plant = plant
+        self._image = side.image
+        self._events = side.events
         self._top = f"{node.name}/node"
         self._failure: tuple[str, Text] | None = None
         self._success: Text | str = ""
@@ -26,11 +28,25 @@ class NodeView:
 
     def say(self, said: Text, now: float) -> None:
         """Step or result of the boot-up."""
-        self._plant.say(f"{self._top}/boot_status", said, now)
+        self._say("boot_status", said, now)
+
+    def _say(self, leaf: str, said: Text | str, now: float) -> None:
+        self._image.say(self._image.index[f"{self._top}/{leaf}"], said, now)
+
+    def is_in(self, state: NodeState, now: float) -> None:
+        """Where the master has the node."""
+        self._image.put(f"{self._top}/state", NODE_CODES[state], now)
+
+    def went(self, state: NodeState, now: float) -> None:
+        """Event of a node that is lost, or in operation again."""
+        if state is NodeState.LOST:
+            self._tell(Kind.NODE_LOST, 800, Text.of("node.lost"), now)
+        elif state is NodeState.OPERATIONAL:
+            self._tell(Kind.NODE_BACK, 200, Text.of("node.operational"), now)
 
     def show(self, nmt_state: NmtState, state: NodeState, toggle_errors: int, now: float) -> None:
-        self._plant.set(f"{self._top}/nmt_state", int(nmt_state), now)
-        self._plant.say(f"{self._top}/supervision_state", self._supervision(state, toggle_errors), now)
+        self._image.put(f"{self._top}/nmt_state", int(nmt_state), now)
+        self._say("supervision_state", self._supervision(state, toggle_errors), now)
 
     def _supervision(self, state: NodeState, toggle_errors: int) -> Text:
         kind, shown = (
@@ -58,7 +74,7 @@ class NodeView:
 
     def errors(self, said: Text | str, now: float) -> None:
         """What the node says of its errors, empty where it has none; an event when it is something else."""
-        self._plant.say(f"{self._top}/device_errors", said, now)
+        self._say("device_errors", said, now)
         if said and said != self._errors:
             self._tell(Kind.EMERGENCY, 300, Text.of("node.says", errors=said), now)
         self._errors = said
@@ -103,7 +119,7 @@ class NodeView:
         self._tell(Kind.NODE_BACK, 200, Text.of("node.stays"), now)
 
     def _tell(self, kind: Kind, severity: int, said: Text, now: float) -> None:
-        self._plant.report(Event(now, kind, self._node.name, severity, said))
+        self._events.report(Event(now, kind, self._node.name, severity, said))
 
 
 def _changes(before: Identification, found: Identification) -> tuple[Text, ...]:

@@ -12,7 +12,7 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.habits import HabitCounter, Odd
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoChannel
-from bridge.command import Drive, Event, Kind, Plant
+from bridge.command import BusSide, Drive, Event, Kind
 from bridge.command.node import Node
 from bridge.command.outputs import Outputs
 from bridge.node import boot
@@ -54,10 +54,11 @@ class Listener:
 class NodeWire:
     """``rejected`` counts frames that did not fit what the node says it sends."""
 
-    def __init__(self, node: Node, plant: Plant, listener: Listener, stop_words: StopWords) -> None:
+    def __init__(self, node: Node, side: BusSide, listener: Listener, stop_words: StopWords) -> None:
         self._node = node
         self.stop_words = stop_words
-        self._plant = plant
+        self._image = side.image
+        self._events = side.events
         self._listener = listener
         self.sdo = SdoChannels(node)
         self.rejected = 0
@@ -68,7 +69,7 @@ class NodeWire:
         self.meanings = MeaningWatch(node, self.sdo)
         outputs = node.device.outputs if node.device else None
         self._read_back = ReadBack(outputs, self.sdo) if outputs else None
-        self._emergencies = Emergencies(node, plant, self.reject, self.faults.on_emcy)
+        self._emergencies = Emergencies(node, side, self.reject, self.faults.on_emcy)
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
         self.drives: dict[str, DrivePdos] = {}
@@ -186,7 +187,7 @@ class NodeWire:
         elif frame.can_id == self._emcy_id and len(frame.data) != _EMCY_BYTES:
             self.habits.note(Odd.EMCY_LENGTH, len(frame.data), _EMCY_BYTES)
         said = Text.of("node.frame_does_not_fit", frame=repr(frame), why=Text.plain(why))
-        self._plant.report(Event(frame.time, Kind.CONFIGURATION, self._node.name, 300, said))
+        self._events.report(Event(frame.time, Kind.CONFIGURATION, self._node.name, 300, said))
 
     def on_time(self, now: float) -> None:
         self._emergencies.on_time(now)
@@ -203,7 +204,7 @@ class NodeWire:
         """Something is learned when a transfer ends well, which an answer brings about."""
         for why in self.sdo.take_learned():
             said = Text.of("node.no_block_transfer", why=Text.plain(why))
-            self._plant.report(Event(now, Kind.CONFIGURATION, self._node.name, 300, said))
+            self._events.report(Event(now, Kind.CONFIGURATION, self._node.name, 300, said))
 
     def send_put_off(self, now: float) -> None:
         """The NMT command that waits, if its time has come."""
@@ -237,13 +238,13 @@ class NodeWire:
         self.meanings.stop()
 
     def _show_poll(self, name: str, value: int, now: float) -> None:
-        self._plant.set(f"{self._node.name}/node/{name}", value, now)
+        self._image.put(f"{self._node.name}/node/{name}", value, now)
 
     def connect(self, result: boot.BootResult, now: float) -> None:
         """Take over what the boot-up found."""
         self.error_control.produces_every(result.heartbeat_ms / 1000 or None)
         self._emcy_id = self._usable_emcy_id(result)
-        self._plant.set(f"{self._node.name}/node/software_version", result.software_version, now)
+        self._image.put(f"{self._node.name}/node/software_version", result.software_version, now)
         self.drives = connect(self._node, result, self.reject, self._listener.is_taken, now)
         self._left_out = {name: plan.problem for name, plan in result.drives.items()}
         self._mapped_bytes = {pdo.cob_id: pdo.codec.length for pdo in _tpdos(result)}
@@ -271,7 +272,7 @@ class NodeWire:
         return default
 
     def refresh(self, now: float) -> None:
-        self._plant.set(f"{self._node.name}/node/rejected_frames", self.rejected + self.sdo.unmatched, now)
+        self._image.put(f"{self._node.name}/node/rejected_frames", self.rejected + self.sdo.unmatched, now)
         self._emergencies.refresh(now)
 
 

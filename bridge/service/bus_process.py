@@ -84,7 +84,7 @@ class Service:
         self.audit = AuditLog(self.plant, site, clock.now, clock.epoch_ns)
         self.notifier = Notifier()
         networks = [
-            (make_bus(table), Network(table, self.plant, clock.epoch_ns, project.downloads))
+            (make_bus(table), Network(table, self.plant.side_of(table), clock.epoch_ns, project.downloads))
             for table in site.bus
         ]
         self._networks = [network for _, network in networks]

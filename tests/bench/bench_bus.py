@@ -19,6 +19,7 @@ from tests.bench.figures import cpu_us, milliseconds, show
 from tests.peers.foreign_slave import variable
 from tests.support.bench import Bench, write_site
 from tests.support.load import TIMEOUT_S, loaded
+from tests.support.node_states import node_goes
 from tests.support.process import peer
 
 COUNT = 20_000
@@ -31,7 +32,7 @@ def frames(count: int) -> list[Frame]:
 def test_a_pdo_from_frame_to_image(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path), present=False)
     drive = bench.plant.drives["conveyor/fu1"]
-    bench.plant.on_node(bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
+    node_goes(bench.plant, bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
     entries = tuple(PdoEntry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
     plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), tuple(Place(n) for n in range(4)))
     (tpdo,) = DrivePdos(drive, [plan], [plan], lambda frame, why: None).tpdos

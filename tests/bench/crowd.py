@@ -78,7 +78,7 @@ async def crowd(
     plant = Plant(site, {MAPPING: NORD}, "0", time.monotonic())
     events: list[Event] = []
     plant.on_event(events.append)
-    network = Hearing(site.bus[0], plant)
+    network = Hearing(site.bus[0], plant.side_of(site.bus[0]))
     network.heard = []
     master = Master([(bus, network)], plant, time.monotonic)
     report = folder / "crowd.json"

@@ -135,7 +135,7 @@ class Bench:
         self.bus = self.make_bus()
         # Most tests begin where the bridge has listened already.
         listening = Listening(listen_s(site.bus[0]) if listens else 0.0, lambda: 0.0)
-        self.network = Network(site.bus[0], self.plant, epoch_ns, listening=listening)
+        self.network = Network(site.bus[0], self.plant.side_of(site.bus[0]), epoch_ns, listening=listening)
         self.master = Master([(self.bus, self.network)], self.plant, self.clock)
         self.view = PlantView(self.plant, self.clock, epoch_ns, self.master.carry_out, self.master.wake)
         self.wake_at = self.now

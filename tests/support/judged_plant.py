@@ -10,6 +10,7 @@ from bridge.command.stop_check.state import LastStop
 from bridge.image import Value
 from tests.support import sites
 from tests.support.leg_words import NORD_TU4, LegWords
+from tests.support.node_states import hand_over, node_goes
 from tests.support.rig import PLC
 
 BEGIN = 1024.0
@@ -50,7 +51,7 @@ class JudgedPlant:
         self.node(NodeState.OPERATIONAL)
 
     def node(self, state: NodeState) -> None:
-        self.plant.on_node(self.plant.nodes["conveyor"], state, self.now)
+        node_goes(self.plant, self.plant.nodes["conveyor"], state, self.now)
         self._settle()
 
     def is_cut_off(self) -> None:
@@ -66,7 +67,7 @@ class JudgedPlant:
 
     def _settle(self) -> None:
         if self.drive.stop_check.awaits_sending:
-            self.plant.on_handed_over(self.drive, self.now)
+            hand_over(self.plant, self.drive, self.now)
 
     # the drive
 

@@ -9,6 +9,7 @@ from bridge.command import Drive, Identity, Plant, Source
 from bridge.command.link import NodeState
 from bridge.config import WordOrder
 from tests.support import sites
+from tests.support.node_states import node_goes
 from tests.support.views import dispatcher_of, view_of
 
 _OF_FU3 = "fieldbus_timeout_writable = true\nstop_by_anyone = false"
@@ -46,7 +47,7 @@ class Rig:
         self.fu1 = self.plant.drives["conveyor/fu1"]
 
     def node(self, state: NodeState) -> None:
-        self.plant.on_node(self.plant.nodes["conveyor"], state, self.now)
+        node_goes(self.plant, self.plant.nodes["conveyor"], state, self.now)
 
     def runs(self, *words: int, drive: str = "fu1") -> None:
         """The node is operational and the drive sends these words, the status word first."""

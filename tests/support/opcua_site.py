@@ -16,6 +16,7 @@ from bridge.command.messages.request import DONE, NODE_ACTIONS, Code, Reply
 from bridge.config import OpcUaTable
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support import sites
+from tests.support.node_states import node_goes
 
 SITE = sites.site(
     sites.bus(
@@ -39,7 +40,7 @@ def make_plant() -> Plant:
     plant = sites.plant_of(SITE)
     now = time.monotonic()
     for node in plant.nodes.values():
-        plant.on_node(node, NodeState.OPERATIONAL, now)
+        node_goes(plant, node, NodeState.OPERATIONAL, now)
         for drive in node.drives:
             drive.on_process_data([SWITCH_ON_INHIBITED, 0, 0, 0], now)
             drive.on_identification(Identification(0x38, 1, 2, 3, "SK TU4-CAO"), now)

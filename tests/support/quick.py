@@ -140,7 +140,7 @@ class Quick:
         self.plant = Plant(site, {MAPPING: NORD}, "0", self.now)
         self.plant.on_event(self.events.append)
         # These tests begin where the bridge has listened already.
-        self.network = Network(site.bus[0], self.plant, listening=Listening(0.0))
+        self.network = Network(site.bus[0], self.plant.side_of(site.bus[0]), listening=Listening(0.0))
         self.repeated = Repeated(self.network, self.plant)
         self.nodes = {table.id: QuickNode(table.id) for table in site.bus[0].node}
         self.lose: Callable[[Frame], bool] = lambda frame: False
@@ -174,6 +174,7 @@ class Quick:
             self.network.refresh(BusStatus(), self.now)
         while self._send() or self.deliver():
             pass
+        self.plant.tell_events()
 
     def _send(self) -> bool:
         frames = self.network.take_frames()
@@ -201,6 +202,7 @@ class Quick:
         foreign = [frame._replace(time=self.now) for frame in frames if frame.can_id in self.network.ours]
         if foreign:
             self.network.on_foreign(foreign, self.now)
+        self.plant.tell_events()
 
     def ask(self, action: Action, target: str, identity: Identity = ENGINEER) -> Outcome:
         outcomes: list[Outcome] = []

@@ -7,6 +7,7 @@ import time
 from bridge.command import Drive, Plant
 from bridge.command.link import NodeState
 from tests.support import sites
+from tests.support.node_states import node_goes
 
 SWITCH_ON_INHIBITED, READY, ENABLED = 0x0240, 0x0231, 0x0237
 
@@ -31,7 +32,7 @@ def epoch(monotonic: float) -> int:
 
 def node_is(plant: Plant, state: NodeState) -> None:
     node = next(iter(plant.nodes.values()))
-    plant.on_node(node, state, time.monotonic())
+    node_goes(plant, node, state, time.monotonic())
 
 
 def drive_says(drive: Drive, *words: int) -> None:

@@ -31,6 +31,7 @@ from bridge.zenohlink import Message, zenoh_config
 from bridge.zenohlink.worker import Worker
 from tests.support import sites
 from tests.support.bench import Bench, write_site
+from tests.support.node_states import node_goes
 from tests.support.quiet import QuietLog, quiet_log
 from tests.support.rig import ENABLE, ENGINEER, OTHER_PLC, PLC, SHUT_DOWN, emergency
 from tests.support.views import dispatcher_of, view_of
@@ -58,7 +59,7 @@ class Hall:
         self.plant.on_event(log_event)
         self.log = log
         self.node = self.plant.nodes["conveyor"]
-        self.plant.on_node(self.node, NodeState.OPERATIONAL, self.now)
+        node_goes(self.plant, self.node, NodeState.OPERATIONAL, self.now)
         self.dispatcher = dispatcher_of(self.plant, lambda: self.now)
 
     @property
@@ -141,8 +142,8 @@ def emergencies(hall: Hall, number: int) -> None:
 
 
 def lost_nodes(hall: Hall, number: int) -> None:
-    hall.plant.on_node(hall.node, NodeState.LOST, hall.now)
-    hall.plant.on_node(hall.node, NodeState.OPERATIONAL, hall.now)
+    node_goes(hall.plant, hall.node, NodeState.LOST, hall.now)
+    node_goes(hall.plant, hall.node, NodeState.OPERATIONAL, hall.now)
 
 
 def late_process_data(hall: Hall, number: int) -> None:

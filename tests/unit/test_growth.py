@@ -59,7 +59,7 @@ def loaded(path: Path) -> None:
     project = load_project(path)
     plant = Plant(project.site, project.families, "0", 0.0)
     for table in project.site.bus:
-        Network(table, plant)
+        Network(table, plant.side_of(table))
 
 
 def booted(path: Path) -> None:

@@ -24,6 +24,7 @@ from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.zenoh import ZenohServer
 from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED
+from tests.support.node_states import node_goes
 from tests.support.opcua_site import OPEN, LocalView
 from tests.support.views import view_of
 from tests.support.zenoh_peer import free_port
@@ -49,7 +50,7 @@ def plant_for(control: str) -> Plant:
     drive = sites.drive("fu1", control, TIMEOUT_MS, "unit_id = 1")
     tables = (sites.modbus(0), "[opcua]\n", sites.zenoh())
     plant = sites.plant_of(sites.site(sites.bus(sites.node(drive)), *tables))
-    plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, time.monotonic())
+    node_goes(plant, plant.nodes["conveyor"], NodeState.OPERATIONAL, time.monotonic())
     drive_says(plant, SWITCH_ON_INHIBITED)
     return plant
 

@@ -30,6 +30,7 @@ from bridge.northbound.modbus.units import units_of
 from bridge.service.audit_log import AuditLog
 from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED, float_words, make_plant
+from tests.support.node_states import node_goes
 from tests.support.views import view_of
 
 HOST = "127.0.0.1"
@@ -37,7 +38,7 @@ HOST = "127.0.0.1"
 
 def drive_says(plant: Plant, *words: int) -> None:
     now = time.monotonic()
-    plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, now)
+    node_goes(plant, plant.nodes["conveyor"], NodeState.OPERATIONAL, now)
     plant.drives["conveyor/fu1"].on_process_data([*words, 0, 0, 0][:4], now)
 
 

@@ -15,6 +15,7 @@ from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
 from bridge.witness.numbers import Numbers, Reading
 from tests.support.modbus_site import READY, make_plant
+from tests.support.node_states import node_goes
 from tests.support.views import view_of
 
 HOST = "127.0.0.1"
@@ -46,7 +47,7 @@ async def readings(numbers: Numbers, enough: Callable[[list[Reading]], bool]) ->
 async def test_a_reading_has_the_number_and_the_time_out_in_force() -> None:
     plant = make_plant()
     now = time.monotonic()
-    plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, now)
+    node_goes(plant, plant.nodes["conveyor"], NodeState.OPERATIONAL, now)
     plant.drives[FU3].on_process_data([READY, 0, 0, 0], now)
     plant.submit(Request(PLC, FU3, Do(Action.KEEP_ALIVE)), now, lambda outcome: None)
     plant.submit(Request(PLC, FU3, SetTimeout(timeout_ms=1500)), now, lambda outcome: None)

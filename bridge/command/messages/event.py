@@ -54,6 +54,22 @@ class Event:
         return f"{self.message} (because: {self.cause})" if self.because else self.message
 
 
+class EventQueue:
+    """Events of nodes and buses, in order, until the plant is told to pass them on: nobody who listens to
+    them runs while frames are taken in or words are decided on."""
+
+    def __init__(self) -> None:
+        self.waiting: list[Event] = []
+
+    def report(self, event: Event) -> None:
+        self.waiting.append(event)
+
+    def take(self) -> list[Event]:
+        """The events since the last call."""
+        taken, self.waiting = self.waiting, []
+        return taken
+
+
 REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))
 """Kinds that an outsider can trigger at will; rate-limited."""
 _MOST_A_SECOND: Final = 10

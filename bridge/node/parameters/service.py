@@ -15,13 +15,13 @@ from typing import Final
 from bridge.canopen.sdo import Priority, SdoChannel
 from bridge.command import (
     Action,
+    BusSide,
     Code,
     Event,
     HasParameters,
     Identity,
     Kind,
     Outcome,
-    Plant,
     ReadParameter,
     Reply,
     Request,
@@ -71,11 +71,11 @@ Waiting = list[Callable[[Reading | ParameterError], None]]
 class NodeParameters:
     """``sdo`` gives the channels, and lets whoever holds the node look at its deadlines."""
 
-    def __init__(self, node: Node, plant: Plant, sdo: Callable[[], SdoChannels]) -> None:
+    def __init__(self, node: Node, side: BusSide, sdo: Callable[[], SdoChannels]) -> None:
         self._node = node
-        self._plant = plant
+        self._events = side.events
         self._sdo = sdo
-        self._now = plant.began
+        self._now = side.began
         self._state = NodeState.ABSENT
         self._who = parameter_places(node)
         self._access = {
@@ -84,16 +84,15 @@ class NodeParameters:
                 node.name,
                 node.family,
                 node.names_of(place.who),
-                plant.eeprom_writes,
+                side.eeprom_writes,
                 on_first=place.on_first,
             )
             for place in self._who
         }
         self._channels = {place.who.name: place.channel for place in self._who}
         self._own_watch = OwnWatch(node)
-        self._view = ParameterView(node, plant.image)
-        sharing = sum(other.bus is node.bus for other in plant.nodes.values())
-        self._polling = ParameterPolling(node, sharing, self._poll)
+        self._view = ParameterView(node, side.image)
+        self._polling = ParameterPolling(node, len(side.nodes), self._poll)
         self._deciding = {
             name
             for value in node.family.value
@@ -304,11 +303,11 @@ class NodeParameters:
         if not outcome.ok and request.action is not Action.READ_PARAMETER:
             drive.on_refused(self._now)
             said = refused(request.action, str(request.identity), outcome.said)
-            self._plant.report(Event(self._now, Kind.REFUSED, drive.name, 300, said))
+            self._events.report(Event(self._now, Kind.REFUSED, drive.name, 300, said))
         reply(outcome)
 
     def _tell(self, source: str, severity: int, said: Text) -> None:
-        self._plant.report(Event(self._now, Kind.CONFIGURATION, source, severity, said))
+        self._events.report(Event(self._now, Kind.CONFIGURATION, source, severity, said))
 
     def _warn(self, source: str, warning: str) -> None:
         if warning:

@@ -20,6 +20,7 @@ from bridge.node.process.process_data import DrivePdos
 from tests.bench.canopen_node import with_four_words
 from tests.bench.figures import show
 from tests.support.bench import Bench, write_site
+from tests.support.node_states import node_goes
 from tests.support.process import peer
 
 COUNT = 5000
@@ -43,7 +44,7 @@ async def test_a_pdo_from_the_socket_to_the_image(tmp_path: Path) -> None:
 async def measure_ours(folder: Path) -> float:
     bench = Bench(write_site(folder), present=False)
     drive = bench.plant.drives["conveyor/fu1"]
-    bench.plant.on_node(bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, time.monotonic())
+    node_goes(bench.plant, bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, time.monotonic())
     entries = tuple(PdoEntry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
     plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), tuple(Place(n) for n in range(4)))
     pdos = DrivePdos(drive, (plan,), (plan,), lambda frame, why: None)

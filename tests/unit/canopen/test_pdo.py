@@ -20,6 +20,7 @@ from bridge.node.places.words import Place
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.process.remote_polling import RemotePolling
 from tests.support.bench import Bench, write_site
+from tests.support.node_states import node_goes
 
 NORD = load_family("nord/sk-tu4-cao")
 
@@ -122,7 +123,7 @@ class Words:
 
     def __init__(self, bench: Bench, tpdo: PdoPlan, rpdo: PdoPlan | None = None) -> None:
         self.drive = bench.plant.drives["conveyor/fu1"]
-        bench.plant.on_node(bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
+        node_goes(bench.plant, bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
         self.told: list[str] = []
         self.pdos = DrivePdos(self.drive, [rpdo or tpdo], [tpdo], lambda frame, why: self.told.append(why))
 

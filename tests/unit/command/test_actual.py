@@ -13,6 +13,7 @@ from bridge.command.link import FurtherTpdo, NodeState
 from bridge.command.stop_check.state import LastStop
 from bridge.image import Quality, Reading, Value
 from tests.support import sites
+from tests.support.node_states import hand_over, node_goes
 from tests.support.rig import ENABLED, FAULT, HALF_SPEED, INHIBITED, READY
 from tests.unit.command.test_follow_data import CSP, SITE, Axis
 from tests.unit.command.test_plant import Hall
@@ -82,7 +83,7 @@ def test_a_variant_shows_the_words_that_its_pdos_carry(mapping: str, count: int)
     node = sites.node(sites.drive("drive", "modbus", 0, ""), mapping=mapping)
     plant = sites.plant_of(sites.site(sites.bus(node)), mapping)
     (drive,) = plant.drives.values()
-    plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
+    node_goes(plant, plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
     drive.on_process_data([READY, 11, 12, 13, 14, 15], 100.0)
     raw = [point.name for point in plant.image.points if "/actual/value_" in point.name]
     assert [plant.image.read(name) for name in raw] == [
@@ -105,7 +106,7 @@ class Spread(Axis):
         self.tpdo2 = self.low
         self.high = FurtherTpdo("TPDO3", frozenset((2,)), 0.1)
         self.drive.on_pdos({}, [self.low, self.high], self.now, deadline_s=0.1, rpdo_type=255)
-        self.plant.on_node(self.plant.nodes["axis"], NodeState.OPERATIONAL, self.now)
+        node_goes(self.plant, self.plant.nodes["axis"], NodeState.OPERATIONAL, self.now)
 
     def comes(self, pdo: FurtherTpdo, word: int) -> None:
         (place,) = pdo.places
@@ -212,7 +213,7 @@ def test_a_drive_is_sent_the_position_at_which_it_stands(spread: Spread) -> None
 def test_a_position_that_comes_with_the_status_word_is_followed_as_well() -> None:
     plant = sites.plant_of(SITE, CSP)
     drive = plant.drives["axis/drive"]
-    plant.on_node(plant.nodes["axis"], NodeState.OPERATIONAL, 100.0)
+    node_goes(plant, plant.nodes["axis"], NodeState.OPERATIONAL, 100.0)
     drive.on_process_data((0x0231, 7, 1, *drive.words[3:]), 100.0)
     assert drive.channel.output.words[1:] == (7, 1)
 
@@ -236,7 +237,7 @@ def stopped(deadline_s: float = 0.1) -> Hall:
     hall.run()
     hall.drive.channel.link.pdo_deadline_s = deadline_s
     hall.submit(Action.DISABLE_VOLTAGE)
-    hall.plant.on_handed_over(hall.drive, hall.now)
+    hand_over(hall.plant, hall.drive, hall.now)
     return hall
 
 
@@ -284,11 +285,11 @@ def test_what_a_drive_says_again_counts_when_its_node_is_back() -> None:
     """Nothing has changed but that it is heard: it stands, as it was told."""
     hall = Hall()
     hall.drive.channel.link.pdo_deadline_s = 0.1
-    hall.plant.on_node(hall.node, NodeState.OPERATIONAL, hall.now)
+    node_goes(hall.plant, hall.node, NodeState.OPERATIONAL, hall.now)
     hall.pdo(READY)
-    hall.plant.on_node(hall.node, NodeState.LOST, 100.1)
-    hall.plant.on_node(hall.node, NodeState.OPERATIONAL, 100.2)
-    hall.plant.on_handed_over(hall.drive, 100.2)
+    node_goes(hall.plant, hall.node, NodeState.LOST, 100.1)
+    node_goes(hall.plant, hall.node, NodeState.OPERATIONAL, 100.2)
+    hand_over(hall.plant, hall.drive, 100.2)
     hall.now = 100.25
     unchanged(hall)
     hall.at(100.25)

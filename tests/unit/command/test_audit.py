@@ -27,6 +27,7 @@ from bridge.command.audit import SUMMARY_S, AuditEntry
 from bridge.command.link import NodeState
 from bridge.image import Value
 from tests.support import sites
+from tests.support.node_states import node_goes
 from tests.support.rig import ENABLE, ENGINEER, OBSERVER, OPERATOR, OTHER_PLC, PLC, SHUT_DOWN
 
 FU1 = "conveyor/fu1"
@@ -51,7 +52,7 @@ class Hall:
         self.plant.on_event(self.events.append)
         self.plant.audit.tell_to(self.entries.append, every_telegram=every_telegram)
         self.now = 100.0
-        self.plant.on_node(self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
+        node_goes(self.plant, self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
         self.plant.audit.on_time(self.now)
 
     def ask(self, action: Action, identity: Identity = PLC, target: str = FU1, **more: int) -> Outcome:

@@ -18,6 +18,7 @@ from bridge.command.link import NodeState
 from bridge.image import Value
 from tests.support import sites
 from tests.support.nightly import examples
+from tests.support.node_states import node_goes
 from tests.support.rig import ENABLE, SHUT_DOWN
 from tests.support.views import dispatcher_of
 
@@ -36,7 +37,7 @@ class Hall:
         self.entries: list[AuditEntry] = []
         self.plant.audit.tell_to(self.entries.append)
         self.now = 100.0
-        self.plant.on_node(self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
+        node_goes(self.plant, self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
         self.plant.audit.on_time(self.now)
         self.dispatcher = dispatcher_of(self.plant, lambda: self.now)
 

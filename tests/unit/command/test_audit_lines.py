@@ -19,6 +19,7 @@ from bridge.command import (
 )
 from bridge.command.audit import AuditEntry, Ending
 from bridge.text import Text
+from tests.support.node_states import hand_over
 from tests.support.rig import ENABLE, OPERATOR, OTHER_PLC, PLC, READY, SHUT_DOWN
 from tests.unit.command.test_audit import FU1, SITE, Hall
 from tests.unit.command.test_plant import Hall as RunningHall
@@ -107,7 +108,7 @@ def test_the_end_of_a_stop_has_a_line_of_the_bridges_own() -> None:
     entries: list[AuditEntry] = []
     hall.plant.audit.tell_to(entries.append)
     assert hall.submit(Action.STOP, identity=OPERATOR).ok
-    hall.plant.on_handed_over(hall.drive, hall.now)
+    hand_over(hall.plant, hall.drive, hall.now)
     hall.now = 100.0625
     hall.pdo(READY)
     hall.at(hall.now)

@@ -15,6 +15,7 @@ from bridge.command.plant import Plant
 from bridge.command.stop_check.drive import DriveStopCheck
 from bridge.config import load_site
 from tests.support import sites
+from tests.support.node_states import node_goes
 from tests.support.rig import ENABLED, INHIBITED, READY, Rig
 
 
@@ -179,7 +180,7 @@ def test_a_drive_of_which_nobody_told_is_reported(tmp_path) -> None:
     events: list[Event] = []
     plant.on_event(events.append)
     (drive,) = plant.drives.values()
-    plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, 10.0)
+    node_goes(plant, plant.nodes["conveyor"], NodeState.OPERATIONAL, 10.0)
     assert plant.next_deadline(10.0) is None
     drive.channel.link.pdo_deadline_s = 0.1
     events.clear()

@@ -10,6 +10,7 @@ from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import Watch
 from bridge.image import Quality, Reading
 from tests.support import sites
+from tests.support.node_states import hand_over
 from tests.support.rig import ENABLED
 from tests.unit.command.test_plant import SITE, Hall
 
@@ -209,11 +210,11 @@ def test_when_a_stop_is_judged_is_a_deadline_of_the_plant() -> None:
     hall.run()
     hall.drive.channel.link.pdo_deadline_s = None
     for drive in hall.plant.drives.values():
-        hall.plant.on_handed_over(drive, hall.now)
+        hand_over(hall.plant, drive, hall.now)
     hall.at(hall.now)
     assert hall.drive.next_deadline(hall.now) is None
     hall.submit(Action.STOP)
-    hall.plant.on_handed_over(hall.drive, hall.now)
+    hand_over(hall.plant, hall.drive, hall.now)
     due = hall.drive.next_deadline(hall.now)
     # Three times 0.5 s, one RPDO period, and NORD's 0.25 s and 60 s for a word that may begin a ramp.
     assert due == pytest.approx(100 + 1.5 + 0.01 + 0.25 + 60)
@@ -228,7 +229,7 @@ def test_the_earlier_of_the_trip_and_the_judgement_is_the_next_deadline() -> Non
     hall.run()
     hall.drive.channel.link.pdo_deadline_s = None
     hall.submit(Action.DISABLE_VOLTAGE)
-    hall.plant.on_handed_over(hall.drive, hall.now)
+    hand_over(hall.plant, hall.drive, hall.now)
     assert hall.drive.next_deadline(hall.now) == pytest.approx(100.2)
     hall.at(100.2001)
     after = hall.drive.next_deadline(hall.now)

@@ -8,6 +8,7 @@ from bridge.command import Action, Code, Outcome, Request, command_of
 from bridge.command.link import FurtherTpdo, NodeState
 from bridge.image import Value
 from tests.support import sites
+from tests.support.node_states import node_goes
 from tests.support.rig import PLC
 
 CSP = "cia402/cyclic-position"
@@ -32,8 +33,8 @@ class Axis:
         self.tpdo2 = FurtherTpdo("TPDO2", frozenset((1, 2)), 0.1)
         self.drive.on_pdos({}, [self.tpdo2], self.now, deadline_s=None, rpdo_type=255)
         node = self.plant.nodes["axis"]
-        self.plant.on_node(node, NodeState.BOOTING, self.now)
-        self.plant.on_node(node, NodeState.OPERATIONAL, self.now)
+        node_goes(self.plant, node, NodeState.BOOTING, self.now)
+        node_goes(self.plant, node, NodeState.OPERATIONAL, self.now)
 
     def says(self, status_word: int) -> None:
         words = list(self.drive.words)

@@ -24,6 +24,7 @@ from bridge.command.link import REASONS, NodeState
 from bridge.command.worst_case import Wire
 from bridge.image import Quality, Reading, Value
 from tests.support import sites
+from tests.support.node_states import node_goes
 from tests.support.rig import (
     ACKNOWLEDGE,
     ENABLE,
@@ -106,7 +107,7 @@ class Hall:
 
     def run(self) -> None:
         self.drive.channel.link.pdo_deadline_s = 0.1
-        self.plant.on_node(self.node, NodeState.OPERATIONAL, self.now)
+        node_goes(self.plant, self.node, NodeState.OPERATIONAL, self.now)
         self.pdo(READY)
         self.write(control_word=SHUT_DOWN)
         self.write(control_word=ENABLE, setpoint_1=HALF_SPEED)
@@ -260,7 +261,7 @@ class TestData:
         assert running.read("actual/frequency").quality is Quality.GOOD
 
     def test_a_lost_node_is_lost_at_once_and_told(self, running: Hall):
-        running.plant.on_node(running.node, NodeState.LOST, 100.05)
+        node_goes(running.plant, running.node, NodeState.LOST, 100.05)
         assert running.read("status/state") == Reading(4, Quality.LOST, 100.05, REASONS[NodeState.LOST])
         assert [event.kind for event in running.events if event.source == "conveyor"] == [
             Kind.NODE_BACK,
@@ -268,7 +269,7 @@ class TestData:
         ]
 
     def test_a_disabled_node_is_disabled(self, running: Hall):
-        running.plant.on_node(running.node, NodeState.DISABLED, 100.05)
+        node_goes(running.plant, running.node, NodeState.DISABLED, 100.05)
         assert running.read("actual/value_1").quality is Quality.DISABLED
 
     def test_the_identity_is_shown(self, hall: Hall):
@@ -405,7 +406,7 @@ class TestRequests:
         assert hall.submit(Action.RESET, "lift").code is Code.UNKNOWN_TARGET
 
     def test_a_start_is_shown_when_it_is_done(self, hall: Hall):
-        hall.plant.on_node(hall.node, NodeState.OPERATIONAL, hall.now)
+        node_goes(hall.plant, hall.node, NodeState.OPERATIONAL, hall.now)
         hall.pdo(INHIBITED)
         seen: list[Value] = []
         request = Request(PLC, "conveyor/fu1", Start())
@@ -458,7 +459,7 @@ def test_a_node_has_the_state_that_the_bridge_gives_it(hall: Hall):
     codes = {NodeState.LOST: 3, NodeState.DISABLED: 5, NodeState.OPERATIONAL: 2}
     assert hall.plant.image.read("conveyor/node/state").value == 0
     for state, code in codes.items():
-        hall.plant.on_node(hall.node, state, hall.now)
+        node_goes(hall.plant, hall.node, state, hall.now)
         assert hall.plant.image.read("conveyor/node/state").value == code
 
 

@@ -28,6 +28,7 @@ from bridge.command.link import NodeState
 from bridge.config import Site
 from bridge.image import Quality, Reading
 from tests.support import sites
+from tests.support.node_states import hand_over, node_goes
 from tests.support.outcomes import in_english
 from tests.support.rig import ENABLE, ENABLED, OPERATOR, PLC, READY, SHUT_DOWN
 from tests.unit.command.test_plant import SITE, Hall
@@ -52,6 +53,32 @@ def running(hall: Hall) -> Hall:
 
 def refused(hall: Hall) -> list[tuple[str, str]]:
     return [(event.source, event.message) for event in hall.events if event.kind is Kind.REFUSED]
+
+
+def test_what_a_node_has_reported_is_told_before_what_comes_after_it(hall: Hall) -> None:
+    first, second, third = (Event(1.0, Kind.BUS, "can0", 300, text) for text in ("first", "second", "third"))
+    hall.events.clear()
+    hall.plant.events.report(first)
+    assert hall.events == []
+    hall.plant.report(second)
+    hall.plant.events.report(third)
+    assert [event.message for event in hall.events] == ["first", "second"]
+    hall.plant.tell_events()
+    assert [event.message for event in hall.events] == ["first", "second", "third"]
+
+
+def test_what_a_listener_reports_is_told_too(hall: Hall) -> None:
+    """And nothing is told twice."""
+    hall.events.clear()
+
+    def answer(event: Event) -> None:
+        if event.message == "first":
+            hall.plant.events.report(Event(1.0, Kind.BUS, "can0", 300, "second"))
+
+    hall.plant.on_event(answer)
+    hall.plant.events.report(Event(1.0, Kind.BUS, "can0", 300, "first"))
+    hall.plant.tell_events()
+    assert [event.message for event in hall.events] == ["first", "second"]
 
 
 def counted(hall: Hall) -> object:
@@ -182,11 +209,11 @@ def test_the_bus_is_told_even_if_who_carries_it_out_fails(running: Hall) -> None
 def test_a_stop_is_unsent_until_it_has_been_handed_over(running: Hall) -> None:
     plant = running.plant
     for drive in plant.drives.values():
-        plant.on_handed_over(drive, running.now)
+        hand_over(plant, drive, running.now)
     assert plant.unsent_stops == set()
     running.submit(Action.STOP)
     assert plant.unsent_stops == {running.drive}
-    plant.on_handed_over(running.drive, running.now)
+    hand_over(plant, running.drive, running.now)
     assert plant.unsent_stops == set()
 
 
@@ -202,18 +229,18 @@ def test_a_drive_trips_at_its_deadline_and_not_a_moment_later() -> None:
 @pytest.mark.parametrize("first", [FU1, INFEED])
 def test_how_late_stops_are_counts_from_the_first_that_was_due(first: str) -> None:
     hall = Hall(BOTH)
-    hall.plant.on_node(hall.node, NodeState.OPERATIONAL, hall.now)
+    node_goes(hall.plant, hall.node, NodeState.OPERATIONAL, hall.now)
     for drive in (FU1, INFEED):
         hall.plant.drives[drive].on_process_data((READY, 0, 0, 0), hall.now)
         hall.view.submit(Request(PLC, drive, Write({"control_word": SHUT_DOWN})), lambda outcome: None)
-    assert hall.plant.on_stops_handed_over() is None
+    assert hall.plant.take_stop_due() is None
     hall.at(100.5)
-    assert hall.plant.on_stops_handed_over() == 100.125
-    assert hall.plant.on_stops_handed_over() is None
+    assert hall.plant.take_stop_due() == 100.125
+    assert hall.plant.take_stop_due() is None
     hall.now = 101.0
     hall.view.submit(Request(PLC, first, Do(Action.RESET_FAULT)), lambda outcome: None)
     hall.at(102.0)
-    due = hall.plant.on_stops_handed_over()
+    due = hall.plant.take_stop_due()
     assert due == 101.0 + hall.plant.drives[first].channel.timeout_ms / 1000
 
 
@@ -311,17 +338,17 @@ def test_a_client_that_goes_is_told_to_every_drive() -> None:
 def test_who_has_gone_is_told_no_more_and_may_go_twice(hall: Hall) -> None:
     gone: list[Event] = []
     hall.view.on_event(gone.append)
-    hall.plant.on_node(hall.node, NodeState.OPERATIONAL, 1.0)
+    node_goes(hall.plant, hall.node, NodeState.OPERATIONAL, 1.0)
     hall.view.forget(gone.append)
     hall.view.forget(gone.append)
-    hall.plant.on_node(hall.node, NodeState.LOST, 2.0)
+    node_goes(hall.plant, hall.node, NodeState.LOST, 2.0)
     assert [(event.kind, event.severity) for event in gone] == [(Kind.NODE_BACK, 200)]
     told = [(event.kind, event.severity) for event in hall.events if event.source == "conveyor"]
     assert told == [(Kind.NODE_BACK, 200), (Kind.NODE_LOST, 800)]
 
 
 def test_a_state_that_is_not_told_is_shown_all_the_same(hall: Hall) -> None:
-    hall.plant.on_node(hall.node, NodeState.OPERATIONAL, 1.0, tell=False)
+    node_goes(hall.plant, hall.node, NodeState.OPERATIONAL, 1.0, tell=False)
     assert hall.events == []
     assert hall.plant.image.read("conveyor/node/state").value == 2
 

@@ -8,6 +8,7 @@ from bridge.command import Action, Plant, Request, Write
 from bridge.command.link import NodeState
 from bridge.image import Quality, Value
 from tests.support import sites
+from tests.support.node_states import hand_over, node_goes
 from tests.support.rig import PLC, READY
 from tests.unit.command.test_plant import SITE, Hall
 
@@ -26,7 +27,7 @@ def test_a_drive_that_was_heard_again_is_stale_at_its_next_deadline(nodes: int) 
     plant = plant_of(nodes)
     drive = plant.drives["n1/fu1"]
     drive.channel.link.pdo_deadline_s = 0.1
-    plant.on_node(plant.nodes["n1"], NodeState.OPERATIONAL, 100.0)
+    node_goes(plant, plant.nodes["n1"], NodeState.OPERATIONAL, 100.0)
     drive.on_process_data((READY, 0, 0, 0), 100.0)
     plant.on_time(100.1)
     assert drive.quality is Quality.STALE
@@ -50,7 +51,7 @@ def quiet() -> Hall:
     hall.run()
     hall.drive.channel.link.pdo_deadline_s = None
     for drive in hall.plant.drives.values():
-        hall.plant.on_handed_over(drive, hall.now)
+        hand_over(hall.plant, drive, hall.now)
     hall.at(hall.now)
     return hall
 
@@ -62,7 +63,7 @@ def test_what_a_drive_says_may_bring_a_deadline_forward() -> None:
     plant = sites.plant_of(sites.site(sites.bus(node)), mapping)
     (drive,) = plant.drives.values()
     ready, enabled, taken = 0x0231, 0x0237, 0x1000
-    plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
+    node_goes(plant, plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
 
     def says(word: int) -> None:
         drive.on_process_data([word, *drive.words[1:]], 100.0)
@@ -75,7 +76,7 @@ def test_what_a_drive_says_may_bring_a_deadline_forward() -> None:
     write(control_word=0x002F)
     says(enabled | taken)
     write(position=5000)
-    plant.on_handed_over(drive, 100.0)
+    hand_over(plant, drive, 100.0)
     before = plant.next_deadline(100.0)
     assert before is None
     says(enabled)
@@ -85,7 +86,7 @@ def test_what_a_drive_says_may_bring_a_deadline_forward() -> None:
 def test_a_stop_that_is_handed_over_begins_its_time(quiet: Hall) -> None:
     quiet.submit(Action.STOP)
     before = quiet.plant.next_deadline(quiet.now)
-    quiet.plant.on_handed_over(quiet.drive, quiet.now)
+    hand_over(quiet.plant, quiet.drive, quiet.now)
     after = quiet.plant.next_deadline(quiet.now)
     assert before is None
     assert after is not None

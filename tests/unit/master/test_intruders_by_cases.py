@@ -12,7 +12,7 @@ from typing import Any, Final, cast
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Event
+from bridge.command import EventQueue
 from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.master import intruders
@@ -101,11 +101,11 @@ class Bus:
         table = BusTable.model_validate({"name": "can0", "interface": "virtual", **keys})
         self.nodes = nodes
         self.acts = True
-        self.events: list[Event] = []
+        queue = EventQueue()
+        self.events = queue.waiting
         self.stopped: list[tuple[list[str], str]] = []
-        plant = SimpleNamespace(report=self.events.append)
         cores = [cast(NodeCore, node) for node in nodes]
-        self.core = Intruders(table, cores, cast(Any, plant), lambda: self.acts, self._stop)
+        self.core = Intruders(table, cores, queue, lambda: self.acts, self._stop)
         self.taken = {one: lambda frame: None for one in taken}
         self.watched = self.core.watched(cast(Any, self.taken))
         self.passed: list[Frame] = []

@@ -42,17 +42,15 @@ class Node:
 class Case:
     def __init__(self, *, begins_acting: bool = False) -> None:
         plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "none", 0)))))
-        self.told: list[Event] = []
-        plant.on_event(self.told.append)
+        self.events = plant.events
         self.nodes = [Node(), Node(is_out_of_service=True)]
-        self.forgotten: list[Text] = []
         self.listening = Listening(0.0 if begins_acting else 1.0, lambda: 0.0)
         nodes = cast("list[NodeCore]", self.nodes)
-        forget = self._forget
-        self.mastership = BusMastership(plant.site.bus[0], nodes, plant, forget, self.listening)
+        self.mastership = BusMastership(plant.site.bus[0], nodes, plant.events, self.listening)
 
-    def _forget(self, now: float, why: str) -> None:
-        self.forgotten.append(why)
+    @property
+    def told(self) -> list[Event]:
+        return self.events.waiting
 
 
 @pytest.fixture
@@ -73,10 +71,11 @@ def test_it_listens_before_it_acts(case: Case) -> None:
 
 
 def test_it_gives_way_to_one_that_is_there_and_says_so_once(case: Case) -> None:
-    case.mastership.heard("SYNC", 10.5)
-    case.mastership.heard("SYNC", 10.6)
+    why = case.mastership.heard("SYNC", 10.5)
+    assert why is not None and render(why) == "another bridge is in charge of can0"
+    assert case.mastership.heard("SYNC", 10.6) is None
     assert case.mastership.is_passive
-    assert [*map(render, case.forgotten)] == ["another bridge is in charge of can0"]
+    case.mastership.say_passive(10.5)
     (event,) = case.told
     assert event.message == (
         "passive: another bridge is in charge of this bus: it sent SYNC. Nothing is sent until that has been "
@@ -99,9 +98,8 @@ def test_it_takes_over_when_the_other_has_been_silent_and_begins_with_all_stoppe
 
 def test_one_that_has_acted_for_longer_than_it_listens_stays(case: Case) -> None:
     case.mastership.on_time(11.0)
-    case.mastership.heard("SYNC", 13.0)
+    assert case.mastership.heard("SYNC", 13.0) is None
     assert case.mastership.acts()
-    assert case.forgotten == []
 
 
 def test_a_bus_that_is_back_is_still_the_others() -> None:

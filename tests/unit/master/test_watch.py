@@ -14,14 +14,18 @@ class Case:
     def __init__(self, own_id: int | None = 127) -> None:
         text = sites.site(sites.bus(sites.node(sites.drive("fu1", "none", 0))))
         self.plant = sites.plant_of(text)
-        self.told: list[Event] = []
-        self.plant.on_event(self.told.append)
         self.acts = True
-        self.watch = BusWatch("can0", own_id, lambda: self.acts, {5: "conveyor"}, self.plant)
+        self.watch = BusWatch(
+            "can0", own_id, lambda: self.acts, {5: "conveyor"}, self.plant.side_of(self.plant.site.bus[0])
+        )
         self.routes = self.watch.routes()
 
     def comes(self, can_id: int, data: bytes, time: float) -> None:
         self.routes[can_id](Frame(can_id, data, time))
+
+    @property
+    def told(self) -> list[Event]:
+        return self.plant.events.waiting
 
     def point(self, leaf: str, now: float) -> object:
         self.watch.refresh(now)

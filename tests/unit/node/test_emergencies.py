@@ -17,19 +17,21 @@ class Case:
         drives = [sites.drive(slot, "none", 0, "") for slot in slots]
         text = sites.site(sites.bus(sites.node(*drives, mapping=mapping)))
         self.plant = sites.plant_of(text, mapping)
-        self.events: list[Event] = []
-        self.plant.on_event(self.events.append)
         self.rejected: list[str] = []
         self.about: list[str] = []
         self.emergencies = Emergencies(
             self.plant.nodes["conveyor"],
-            self.plant,
+            self.plant.side_of(self.plant.site.bus[0]),
             lambda frame, why: self.rejected.append(why),
             lambda drive, now: self.about.append(drive.name),
         )
 
     def comes(self, data: str, time: float = 10.0) -> None:
         self.emergencies.on_frame(Frame(0x085, bytes.fromhex(data), time))
+
+    @property
+    def events(self) -> list[Event]:
+        return self.plant.events.waiting
 
     def code(self, slot: str) -> object:
         return self.plant.image.read(f"conveyor/{slot}/status/emcy_code").value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.nmt import NmtState
-from bridge.command import Event, Identification
+from bridge.command import Identification
 from bridge.command.link import NodeState
 from bridge.node.boot import BootError
 from bridge.node.view import NodeView
@@ -16,17 +16,13 @@ from tests.support import sites
 class Case:
     def __init__(self) -> None:
         self.plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "none", 0)))))
-        self.events: list[Event] = []
-        self.plant.on_event(self.events.append)
-        self.view = NodeView(self.plant.nodes["conveyor"], self.plant)
+        self.view = NodeView(self.plant.nodes["conveyor"], self.plant.side_of(self.plant.site.bus[0]))
 
     def point(self, leaf: str) -> object:
         return self.plant.image.read(f"conveyor/node/{leaf}").value
 
     def told(self) -> list[str]:
-        found = [event.message for event in self.events]
-        self.events.clear()
-        return found
+        return [event.message for event in self.plant.events.take()]
 
 
 @pytest.fixture

@@ -17,6 +17,7 @@ from bridge.image import Value
 from bridge.northbound.opcua.values import point_value
 from bridge.northbound.zenoh.commands import BadCommand, Commands
 from tests.support import sites
+from tests.support.node_states import node_goes
 from tests.support.views import dispatcher_of
 
 SITE = sites.site(
@@ -63,7 +64,7 @@ _JSON = st.one_of(
 
 def plant() -> Plant:
     made = sites.plant_of(SITE)
-    made.on_node(made.nodes["conveyor"], NodeState.OPERATIONAL, 0.0)
+    node_goes(made, made.nodes["conveyor"], NodeState.OPERATIONAL, 0.0)
     return made
 
 

@@ -18,6 +18,7 @@ from bridge.service.event_log import log_event
 from bridge.service.plant_condition import PlantCondition
 from tests.support import sites
 from tests.support.condition import families_of
+from tests.support.node_states import node_goes
 from tests.support.views import view_of
 
 PLC = Identity(Source.MODBUS, "plc")
@@ -36,7 +37,7 @@ class Box:
         self.condition = PlantCondition(self.plant, families, lambda: self.now, lambda at: round(at * 1e9))
         self.plant.set("bus/can0/state", 0, self.now)
         for node in self.plant.nodes.values():
-            self.plant.on_node(node, NodeState.OPERATIONAL, self.now, tell=False)
+            node_goes(self.plant, node, NodeState.OPERATIONAL, self.now, tell=False)
             for drive in node.drives:
                 self.plant.set(f"{drive.name}/status/state", 4, self.now)
         self.look(100.0)
@@ -50,7 +51,7 @@ class Box:
         return self.plant.image.read(name).value
 
     def lose(self, name: str) -> None:
-        self.plant.on_node(self.plant.nodes[name], NodeState.LOST, self.now)
+        node_goes(self.plant, self.plant.nodes[name], NodeState.LOST, self.now)
 
 
 @pytest.fixture

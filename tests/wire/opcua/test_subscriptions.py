@@ -18,6 +18,7 @@ from bridge.command.points import site_points
 from bridge.image import Point, Quality
 from bridge.image.point import DataType
 from bridge.northbound.opcua.server import OpcUaServer
+from tests.support.node_states import node_goes
 from tests.support.opcua_site import OPEN, LocalView, connected, make_plant, namespace, serving
 from tests.support.rig import emergency
 
@@ -244,8 +245,8 @@ class TestEvents:
         kind = client.get_node(ua.NodeId("DriveEventType", space))
         await (await subscribe(client, told)).subscribe_events(client.nodes.server, kind)
         conveyor = view.plant.nodes["conveyor"]
-        view.plant.on_node(conveyor, NodeState.LOST, time.monotonic())
-        view.plant.on_node(conveyor, NodeState.OPERATIONAL, time.monotonic())
+        node_goes(view.plant, conveyor, NodeState.LOST, time.monotonic())
+        node_goes(view.plant, conveyor, NodeState.OPERATIONAL, time.monotonic())
         with pytest.raises(ua.uaerrors.BadUserAccessDenied):
             await (await node(client, "conveyor/fu2/command/control_word")).write_value(
                 ua.Variant(0x047E, ua.VariantType.UInt16)

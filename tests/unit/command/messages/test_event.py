@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from bridge.command import Event, Kind
-from bridge.command.messages.event import EventGate
+from bridge.command.messages.event import EventGate, EventQueue
 
 
 def event(kind: Kind, time: float, source: str = "conveyor/fu1") -> Event:
@@ -26,6 +26,15 @@ def test_who_floods_hides_nobody_else():
         gate.admits(event(Kind.REFUSED, 5.0))
     assert gate.admits(event(Kind.REFUSED, 5.0, "conveyor/fu2"))
     assert gate.admits(event(Kind.EMERGENCY, 5.0))
+
+
+def test_events_wait_in_order_until_they_are_taken():
+    queue = EventQueue()
+    first, second = event(Kind.BUS, 1.0), event(Kind.BUS, 0.5)
+    queue.report(first)
+    queue.report(second)
+    assert queue.take() == [first, second]
+    assert queue.take() == queue.waiting == []
 
 
 REPEATING = (Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER)

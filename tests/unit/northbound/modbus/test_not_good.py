@@ -22,6 +22,7 @@ from tests.support import sites
 from tests.support.invented import SPIN, spin_bench, spindle
 from tests.support.modbus_site import PLC
 from tests.support.nightly import examples
+from tests.support.node_states import node_goes
 from tests.support.views import dispatcher_of
 
 UNIT = 1
@@ -92,7 +93,7 @@ class Model:
         }
         """Words that tell what others mean, as the mapping takes them to do."""
         self.came: dict[int, float] = {}
-        self.plant.on_node(self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
+        node_goes(self.plant, self.plant.nodes["conveyor"], NodeState.OPERATIONAL, self.now)
         self.drive.on_pdos({}, self.further, self.now, deadline_s=DEADLINE_S, rpdo_type=255)
 
     @property

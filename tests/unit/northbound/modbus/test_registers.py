@@ -27,6 +27,7 @@ from tests.support import sites
 from tests.support.devices import ENCODER, IO_BLOCK, OUTPUTS, device_bench, encoder, io_block
 from tests.support.modbus_runs import Run, runs_of
 from tests.support.modbus_site import PLC, Rig
+from tests.support.node_states import node_goes
 from tests.support.views import dispatcher_of
 
 NOW: Final = 100.0
@@ -59,7 +60,7 @@ def family_plant(mapping: str) -> Plant:
     drives = [sites.drive(slot.name, "modbus", 0, scales) for slot in family.slot]
     plant = sites.plant_of(sites.site(sites.bus(sites.node(*drives, mapping=mapping))), mapping)
     for node in plant.nodes.values():
-        plant.on_node(node, NodeState.OPERATIONAL, NOW)
+        node_goes(plant, node, NodeState.OPERATIONAL, NOW)
     for drive in plant.drives.values():
         drive.on_pdos({}, [], NOW, deadline_s=1.0, rpdo_type=255)
         drive.on_process_data(telling(drive), NOW)

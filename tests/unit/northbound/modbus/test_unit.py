@@ -15,6 +15,7 @@ from tests.support.modbus_site import (
     READY,
     Rig,
 )
+from tests.support.node_states import node_goes
 from tests.support.views import view_of
 
 NO_FUNCTION, NO_ADDRESS = -1, -2
@@ -68,8 +69,8 @@ def test_a_node_that_is_out_of_service_says_nothing_of_the_module():
         )
     )
     plant.set("bus/can0/state", 0, 100.0)
-    plant.on_node(plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
-    plant.on_node(plant.nodes["spare"], NodeState.DISABLED, 100.0)
+    node_goes(plant, plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
+    node_goes(plant, plant.nodes["spare"], NodeState.DISABLED, 100.0)
     unit = BridgeUnit(units_of(plant), view_of(plant, lambda: 100.0))
     (state,) = unit.read_words(Table.INPUT_REGISTER, 0, 1, PLC)
     assert state == 0x02, "operational, and nothing else"
@@ -79,7 +80,7 @@ def test_a_node_whose_first_drive_has_no_process_data_is_not_in_operation():
     rig = Rig()
     rig.plant.set("bus/can0/state", 0, 100.0)
     node = rig.plant.nodes["conveyor"]
-    rig.plant.on_node(node, NodeState.OPERATIONAL, 100.0)
+    node_goes(rig.plant, node, NodeState.OPERATIONAL, 100.0)
     assert rig.read(4, 0, 1, 255)[0] & 0x03 == 0x02
     node.drives[1].channel.on_node(NodeState.CONFIG_ERROR, 100.0)
     assert rig.read(4, 0, 1, 255)[0] & 0x03 == 0x02, "the first one has them"

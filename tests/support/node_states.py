@@ -1,0 +1,25 @@
+"""What the CANopen side does to a plant, where a test has none: a node changes its state, words are handed to
+the bus."""
+
+from __future__ import annotations
+
+from bridge.command import Drive, Node, Plant
+from bridge.command.link import NodeState
+from bridge.command.outputs import Outputs
+from bridge.node.view import NodeView
+
+
+def node_goes(plant: Plant, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:
+    """The node is in another state, as ``NodeCore`` says it; ``tell`` makes that an event."""
+    view = NodeView(node, plant.side_of(node.bus))
+    view.is_in(state, now)
+    node.on_state(state, now)
+    if tell:
+        view.went(state, now)
+    plant.tell_events()
+
+
+def hand_over(plant: Plant, one: Drive | Outputs, now: float) -> None:
+    """What this drive is sent, or these outputs, is on the bus."""
+    plant.unsent_stops.discard(one)
+    one.on_handed_over(now)

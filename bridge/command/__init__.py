@@ -1,6 +1,7 @@
 """Who may command which drive, what is sent to it, and what happens when the controller falls silent."""
 
 from bridge.command.audit import Rejection as Rejection
+from bridge.command.commanded import Commanded as Commanded
 from bridge.command.drive import Drive as Drive
 from bridge.command.drive import Identification as Identification
 from bridge.command.messages.event import Event as Event

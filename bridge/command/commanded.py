@@ -1,17 +1,133 @@
-"""Timing common to drives and the outputs of other nodes: how long their words take."""
+"""Whatever an owner commands, a drive or the outputs of another node; and how long its words take."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, Protocol
 
+from bridge.command.channel import Channel
+from bridge.command.stop_check.state import LastStop, Verdict
 from bridge.command.worst_case import Wire, sync_wait_ms, takeover_ms
 from bridge.config import BusTable
+from bridge.config.model import StoppedTable
+from bridge.text import Text
 
 _ASYNCHRONOUS: Final = 255
 
 
-class Commanded:
-    """Times are in seconds unless the name says otherwise."""
+class StopCheck(Protocol):
+    """How the last stop of something that is commanded has ended, as far as that is known."""
+
+    @property
+    def follows(self) -> bool:
+        """No stop has been ignored since the last one that was followed."""
+        ...
+
+    @property
+    def last_stop(self) -> LastStop: ...
+
+    @property
+    def is_judged(self) -> bool:
+        """A stop is on the bus, and the node is in operation."""
+        ...
+
+    @property
+    def awaits_sending(self) -> bool:
+        """A stop is to be sent, and has not been handed to the bus yet."""
+        ...
+
+    def sent_for_s(self, now: float) -> float:
+        """Time for which the stop has been on the bus; 0 if there is none, or that is not known."""
+        ...
+
+
+class Commanded(Protocol):
+    """A drive, or the outputs of a node that is none: a channel with an owner, a stop that is judged, points
+    in the image. Times are monotonic seconds."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def node_name(self) -> str: ...
+
+    @property
+    def table(self) -> StoppedTable: ...
+
+    @property
+    def channel(self) -> Channel: ...
+
+    @property
+    def stop_check(self) -> StopCheck: ...
+
+    @property
+    def burst_s(self) -> float:
+        """How far ahead the bus may have been told what to send."""
+        ...
+
+    @property
+    def takeover_s(self) -> float:
+        """How long a stopped word may wait for SYNC."""
+        ...
+
+    @property
+    def is_heard(self) -> bool:
+        """It says by itself what it does, and is heard."""
+        ...
+
+    @property
+    def unproven(self) -> Text | str | None:
+        """Reason why nothing more will be known of its last stop; None while that may be."""
+        ...
+
+    @property
+    def says(self) -> Text:
+        """Words for what it does now, beside a stop."""
+        ...
+
+    def why_ignored(self, verdict: Verdict, took_s: float) -> Text:
+        """Words for a stop that it has ignored, after ``took_s``."""
+        ...
+
+    def on_wire(self, wire: Wire, now: float) -> None:
+        """What is predicted of its bus."""
+        ...
+
+    def on_handed_over(self, now: float) -> None:
+        """What the channel puts out has been handed to the bus."""
+        ...
+
+    def on_time(self, now: float) -> Sequence[Verdict]:
+        """Let everything happen that is due by ``now``; how stops have ended."""
+        ...
+
+    def next_deadline(self, now: float) -> float | None:
+        """When ``on_time`` is to be called; None for never."""
+        ...
+
+    def refresh(self, now: float) -> None:
+        """Bring every point up to date; called when something has changed."""
+        ...
+
+    def look(self, now: float) -> None:
+        """Bring to this moment what changes by itself."""
+        ...
+
+
+def has_followed(one: Commanded) -> bool:
+    """The last stop is known to be followed."""
+    return one.stop_check.last_stop is LastStop.FOLLOWED
+
+
+def is_enabling(one: Commanded) -> bool:
+    """What is sent enables it."""
+    output = one.channel.output
+    return not output.silent and one.channel.words.enables(output.words[0])
+
+
+class WordTiming:
+    """How long the words of something that is commanded take. Times are in seconds unless the name says
+    otherwise."""
 
     def __init__(self, bus: BusTable) -> None:
         self.bus = bus

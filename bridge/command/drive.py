@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from bridge.command.actual import ActualData
-from bridge.command.commanded import Commanded
+from bridge.command.commanded import WordTiming
 from bridge.command.deadlines import NOW
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.link import FurtherTpdo
@@ -18,6 +18,7 @@ from bridge.command.messages.request import Identity
 from bridge.command.setpoint_doubts import InForce, in_force
 from bridge.command.stop_check.drive import DriveStopCheck
 from bridge.command.stop_check.state import Verdict
+from bridge.command.stop_check.words import drive_says, ignored_by_drive
 from bridge.command.worst_case import StopTime, Wire, stop_time
 from bridge.config import BusTable, DriveTable, NodeTable
 from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
@@ -62,7 +63,7 @@ class _Command(NamedTuple):
     lack: Lack | None
 
 
-class Drive(Commanded):
+class Drive(WordTiming):
     """One drive: its channel, and where its points stand in the image.
 
     All that is not process data is shown when the channel says that it has settled.
@@ -309,6 +310,24 @@ class Drive(Commanded):
     def on_cut_off(self, now: float) -> None:
         """The bridge takes its node out of operation, with stopped words before it."""
         self.stop_check.on_cut_off(now, self.rpdo_period_ms, self.own)
+
+    # its stops
+
+    @property
+    def is_heard(self) -> bool:
+        return self.quality is Quality.GOOD
+
+    @property
+    def unproven(self) -> Text | str | None:
+        """None: a drive that is heard says whether it follows."""
+        return None
+
+    @property
+    def says(self) -> Text:
+        return drive_says(self.channel)
+
+    def why_ignored(self, verdict: Verdict, took_s: float) -> Text:
+        return ignored_by_drive(self.channel, self.node_name, verdict, took_s)
 
     # into the image
 

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from bridge.command.commanded import Commanded
 from bridge.command.device import Device
 from bridge.command.drive import Drive
 from bridge.command.link import NodeState
 from bridge.command.messages.event import EventQueue
 from bridge.command.messages.request import Action, Identity
-from bridge.command.outputs import Outputs
 from bridge.config import BusTable, NodeTable
 from bridge.image import Image
 from bridge.mapping.axes import profile_of
@@ -86,7 +86,7 @@ class Node:
         return [self.device] if self.device else self.drives
 
     @property
-    def commanded(self) -> Sequence[Drive | Outputs]:
+    def commanded(self) -> Sequence[Commanded]:
         """Its drives, or the outputs of the device that it is."""
         if self.device:
             return [self.device.outputs] if self.device.outputs else []

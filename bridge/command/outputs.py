@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from bridge.command.channel import Channel
-from bridge.command.commanded import Commanded
+from bridge.command.commanded import WordTiming
 from bridge.command.deadlines import NOW
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import Output as Sent
@@ -22,6 +22,7 @@ from bridge.command.messages.request import Action, Code, Outcome, Reply, Reques
 from bridge.command.output_words import ACTIVE, OutputWords
 from bridge.command.stop_check.outputs import Answer, OutputStopCheck, Question, StoppedOutput
 from bridge.command.stop_check.state import Verdict
+from bridge.command.stop_check.words import ignored_by_outputs
 from bridge.command.worst_case import StopTime, Wire, output_stop_time
 from bridge.config import BusTable, NodeTable, OutputsTable
 from bridge.drive import ControlWords, OwnJudgement
@@ -130,7 +131,7 @@ class OutputChannel(Channel):
         return Text.of("watchdog.outputs_safe")
 
 
-class Outputs(Commanded):
+class Outputs(WordTiming):
     """The outputs of one node, and where its points stand in the image. Times are monotonic seconds."""
 
     def __init__(
@@ -238,6 +239,22 @@ class Outputs(Commanded):
         self.refresh(now)
 
     # its stops
+
+    @property
+    def is_heard(self) -> bool:
+        """False: what they hold is read, they do not say it."""
+        return False
+
+    @property
+    def unproven(self) -> Text | str | None:
+        return self.stop_check.why if self.stop_check.is_stuck else None
+
+    @property
+    def says(self) -> Text:
+        return Text.of("stop.outputs_as_sent")
+
+    def why_ignored(self, verdict: Verdict, took_s: float) -> Text:
+        return ignored_by_outputs(self.stop_check, verdict, took_s)
 
     def on_handed_over(self, now: float) -> None:
         """What the channel puts out has been handed to the bus."""

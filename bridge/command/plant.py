@@ -16,6 +16,7 @@ from bridge.base.errors import Fault, FileFaults
 from bridge.base.guard import Guard
 from bridge.base.ratelimit import RateLimit
 from bridge.command.audit import AuditTrail, Rejection
+from bridge.command.commanded import Commanded
 from bridge.command.deadlines import Deadlines
 from bridge.command.device import Device
 from bridge.command.drive import Drive
@@ -74,7 +75,7 @@ class Plant:
         self.drives: dict[str, Drive] = {}
         self.devices: dict[str, Device] = {}
         """Nodes that are no drives, by their names."""
-        self._commanded: dict[str, Drive | Outputs] = {}
+        self._commanded: dict[str, Commanded] = {}
         """All drives, and the outputs of devices by their nodes."""
         self.by_unit: dict[int, Drive] = {}
         self.eeprom_writes = Ledger()
@@ -83,9 +84,9 @@ class Plant:
         """Events of nodes and buses that nobody has been told of yet."""
         self._stop_due: float | None = None
         self._changed: dict[str, set[str]] = {bus.name: set() for bus in site.bus}
-        self.unsent_stops: set[Drive | Outputs] = set()
+        self.unsent_stops: set[Commanded] = set()
         """Drives and outputs with a stop that has not been handed to the bus yet."""
-        self._deadlines = Deadlines[Drive | Outputs]()
+        self._deadlines = Deadlines[Commanded]()
         self._missed_limit = RateLimit(_MISSED_EVENTS, _MISSED_EVERY_S)
         self._listeners: list[Callable[[Event], None]] = []
         self._outcomes: deque[tuple[Reply, Outcome]] = deque()
@@ -147,12 +148,12 @@ class Plant:
         """Callback for the deadlines of the next object that is added."""
         return partial(self._deadlines.due, len(self._commanded))
 
-    def _add(self, one: Drive | Outputs) -> None:
+    def _add(self, one: Commanded) -> None:
         self._deadlines.add(one)
         self._commanded[one.name] = one
 
     @property
-    def commanded(self) -> Collection[Drive | Outputs]:
+    def commanded(self) -> Collection[Commanded]:
         """All drives, and the outputs of devices."""
         return self._commanded.values()
 
@@ -317,7 +318,7 @@ class Plant:
             for verdict in one.on_time(now):
                 self._conclude(one, verdict, now, enforce)
 
-    def _conclude(self, one: Drive | Outputs, verdict: Verdict, now: float, enforce: Enforce) -> None:
+    def _conclude(self, one: Commanded, verdict: Verdict, now: float, enforce: Enforce) -> None:
         conclusion = concluded(self.nodes[one.node_name], one, verdict, now)
         self.audit.stop_ended(one.name, verdict.outcome.label, conclusion.logged, now)
         if conclusion.event is not None:
@@ -363,9 +364,7 @@ class Plant:
             self.unsent_stops.add(outputs)
         self._show_node(node, [outputs], outputs.channel.link.node, now)
 
-    def _show_node(
-        self, node: Node, commanded: Sequence[Drive | Outputs], is_now: NodeState, now: float
-    ) -> None:
+    def _show_node(self, node: Node, commanded: Sequence[Commanded], is_now: NodeState, now: float) -> None:
         silent = any(one.channel.is_tripped and one.channel.controller_is_overdue for one in commanded)
         fault = node.family.faults.bridge_timeout if silent else 0.0
         state, current, last = self._node_points[node.name]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from bridge.command import Action, Drive, Plant
+from bridge.command import Action, Commanded, Plant
+from bridge.command.commanded import has_followed
 from bridge.command.node import Enforce
-from bridge.command.outputs import Outputs
-from bridge.command.stop_check.state import LastStop
-from bridge.image import Quality
 from bridge.text import render
 
 
@@ -51,8 +49,7 @@ class Ending:
 def waits_for(plant: Plant) -> bool:
     """Whether something whose node is in operation is not known yet to follow its stop, and may be."""
     return any(
-        one.stop_check.is_judged and not _has_followed(one) and not _is_unproven(one)
-        for one in plant.commanded
+        one.stop_check.is_judged and not has_followed(one) and one.unproven is None for one in plant.commanded
     )
 
 
@@ -61,23 +58,23 @@ def end(plant: Plant, now: float, enforce: Enforce, *, can_send: bool = True) ->
     failed (not ``can_send``) sends nothing and hears nobody."""
     ignoring = [one for one in plant.commanded if can_send and _ignores(one)]
     left = [one for one in plant.commanded if one not in ignoring]
-    unproven = [one for one in left if isinstance(one, Outputs) and _is_unproven(one)]
+    unproven = {one.name: one.unproven for one in left if one.unproven is not None}
     unheard = [
         one.name
         for one in left
-        if one not in unproven and not (one.stop_check.is_judged and _has_followed(one))
+        if one.name not in unproven and not (one.stop_check.is_judged and has_followed(one))
     ]
     return Ending(
         len(plant.drives),
         len(plant.commanded) - len(plant.drives),
         tuple(one.name for one in ignoring),
         tuple(unheard),
-        tuple(f"{one.name} ({render(one.stop_check.why)})" for one in unproven),
+        tuple(f"{name} ({render(why)})" for name, why in unproven.items()),
         tuple(dict.fromkeys(_stopped(ignoring, now, enforce))),
     )
 
 
-def _stopped(ignoring: Sequence[Drive | Outputs], now: float, enforce: Enforce) -> Iterator[str]:
+def _stopped(ignoring: Sequence[Commanded], now: float, enforce: Enforce) -> Iterator[str]:
     why = "the bridge at its end: {} does not follow its stop"
     for one in ignoring:
         if one.table.reacts_to_ignored_stop != "report":
@@ -86,17 +83,6 @@ def _stopped(ignoring: Sequence[Drive | Outputs], now: float, enforce: Enforce) 
             yield one.node_name
 
 
-def _has_followed(one: Drive | Outputs) -> bool:
-    return one.stop_check.last_stop is LastStop.FOLLOWED
-
-
-def _is_unproven(one: Drive | Outputs) -> bool:
-    """The node has refused to let the outputs be read: nothing more will be known of them."""
-    return isinstance(one, Outputs) and one.stop_check.is_stuck
-
-
-def _ignores(one: Drive | Outputs) -> bool:
-    if isinstance(one, Outputs):
-        return not one.stop_check.follows
-    is_heard = one.stop_check.is_judged and one.quality is Quality.GOOD
-    return not one.stop_check.follows or (is_heard and not _has_followed(one))
+def _ignores(one: Commanded) -> bool:
+    is_known = one.stop_check.is_judged and one.is_heard
+    return not one.stop_check.follows or (is_known and not has_followed(one))

@@ -15,9 +15,8 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sync import SyncWindow
 from bridge.canopen.time_stamp import TimeProducer
-from bridge.command import Action, BusSide, Code, Drive, Event, Kind, Outcome, Reply, Request
+from bridge.command import Action, BusSide, Code, Commanded, Event, Kind, Outcome, Reply, Request
 from bridge.command.messages.request import NODE_ACTIONS
-from bridge.command.outputs import Outputs
 from bridge.config import BusTable
 from bridge.config.download import Download
 from bridge.master.bus_points import BusPoints
@@ -344,7 +343,7 @@ class Network:
                 if tpdo.is_synchronous and tpdo.cob_id in self._routes:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
-    def on_handed_over(self, unsent: set[Drive | Outputs], now: float) -> None:
+    def on_handed_over(self, unsent: set[Commanded], now: float) -> None:
         """What is to be repeated is on the bus: bounds of stops begin, and outputs are to be read back. Whose
         stop is sent by that is taken out of ``unsent``."""
         for node in self.nodes:

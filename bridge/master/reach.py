@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bridge.canopen import nmt
-from bridge.command import Drive
-from bridge.command.outputs import Outputs
+from bridge.command import Commanded
 from bridge.master.farewell import Farewell
 from bridge.master.mastership import BusMastership
 from bridge.node.node import BUS_IS_DOWN, NodeCore
@@ -52,11 +51,9 @@ class Reach:
         return _no_words(node)
 
 
-def _why_left_out(node: NodeCore, one: Drive | Outputs) -> Text | str:
-    """Why nothing is sent to this one though its node gets words; empty where it is."""
-    if isinstance(one, Outputs):
-        return "" if node.wire.outputs else _unbooted(node) or Text.of("unsent.no_rpdo")
-    return "" if one.name in node.wire.drives else _unbooted(node) or node.wire.why_left_out(one)
+def _why_left_out(node: NodeCore, one: Commanded) -> Text | str:
+    """Reason why nothing is sent to ``one`` though its node gets words; empty where it is."""
+    return "" if node.wire.carries(one) else _unbooted(node) or node.wire.why_left_out(one)
 
 
 def _unbooted(node: NodeCore) -> Text | str:

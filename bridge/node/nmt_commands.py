@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from bridge.canopen.nmt import NmtCommand
-from bridge.command import Action, Code, Drive, Event, EventQueue, Kind, Outcome, Reply, Request, Role
+from bridge.command import Action, Code, Commanded, Event, EventQueue, Kind, Outcome, Reply, Request, Role
 from bridge.command.link import NodeState
 from bridge.command.node import Node
-from bridge.command.outputs import Outputs
 from bridge.node.leaving import Leaving
 from bridge.node.put_off import CANCELS_WORDS
 from bridge.node.wire import NodeWire
@@ -92,7 +91,7 @@ def answer(
     return not each
 
 
-def refusal(request: Request, commanded: Sequence[Drive | Outputs]) -> Text | None:
+def refusal(request: Request, commanded: Sequence[Commanded]) -> Text | None:
     """Why this identity may not command the node now, or None if it may.
 
     A command on the node touches all its drives, so nobody gives one while another identity controls

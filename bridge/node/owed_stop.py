@@ -7,10 +7,8 @@ here.
 
 from __future__ import annotations
 
-from bridge.command.drive import Drive
+from bridge.command.commanded import Commanded, has_followed, is_enabling
 from bridge.command.node import Node
-from bridge.command.outputs import Outputs
-from bridge.command.stop_check.state import LastStop
 
 
 class OwedStop:
@@ -19,30 +17,21 @@ class OwedStop:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._enabled: set[Drive | Outputs] = set()
+        self._enabled: set[Commanded] = set()
 
     def note(self) -> None:
         """What the channels put out is about to be repeated on the bus."""
         for one in self._node.commanded:
-            if _enables(one):
+            if is_enabling(one):
                 self._enabled.add(one)
-            elif one in self._enabled and _has_followed(one):
+            elif one in self._enabled and has_followed(one):
                 self._enabled.discard(one)
 
     @property
     def is_open(self) -> bool:
         """Something may still run as the bridge has told it."""
-        return any(_enables(one) or not _has_followed(one) for one in self._enabled)
+        return any(is_enabling(one) or not has_followed(one) for one in self._enabled)
 
     def settle(self) -> None:
         """The node has had its stop, or has started anew."""
         self._enabled.clear()
-
-
-def _enables(one: Drive | Outputs) -> bool:
-    output = one.channel.output
-    return not output.silent and one.channel.words.enables(output.words[0])
-
-
-def _has_followed(one: Drive | Outputs) -> bool:
-    return one.stop_check.last_stop is LastStop.FOLLOWED

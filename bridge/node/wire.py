@@ -12,9 +12,8 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.habits import HabitCounter, Odd
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoChannel
-from bridge.command import BusSide, Drive, Event, Kind
+from bridge.command import BusSide, Commanded, Event, Kind
 from bridge.command.node import Node
-from bridge.command.outputs import Outputs
 from bridge.node import boot
 from bridge.node.emergencies import Emergencies
 from bridge.node.error_control import ErrorControl, Sign
@@ -93,7 +92,7 @@ class NodeWire:
             routes[self._emcy_id] = self._on_emcy
         return routes
 
-    def carries(self, one: Drive | Outputs) -> bool:
+    def carries(self, one: Commanded) -> bool:
         """The boot-up has found RPDOs by which it is commanded."""
         return self.outputs is not None or one.name in self.drives
 
@@ -102,9 +101,11 @@ class NodeWire:
         """By which the node is commanded."""
         return [self.outputs] if self.outputs else [*self.drives.values()]
 
-    def why_left_out(self, drive: Drive) -> Text:
-        """Why the boot-up has found no PDOs by which this drive can be commanded."""
-        why = self._left_out.get(drive.name, "")
+    def why_left_out(self, one: Commanded) -> Text:
+        """Reason why the boot-up has found no PDOs by which ``one`` can be commanded."""
+        if self._node.device:
+            return Text.of("unsent.no_rpdo")
+        why = self._left_out.get(one.name, "")
         return Text.of("unsent.no_pdos_because", why=why) if why else Text.of("unsent.no_pdos")
 
     def take_routes(self) -> dict[int, Handler]:

@@ -3,9 +3,8 @@ the bus."""
 
 from __future__ import annotations
 
-from bridge.command import Drive, Node, Plant
+from bridge.command import Commanded, Node, Plant
 from bridge.command.link import NodeState
-from bridge.command.outputs import Outputs
 from bridge.node.view import NodeView
 
 
@@ -19,7 +18,7 @@ def node_goes(plant: Plant, node: Node, state: NodeState, now: float, *, tell: b
     plant.tell_events()
 
 
-def hand_over(plant: Plant, one: Drive | Outputs, now: float) -> None:
+def hand_over(plant: Plant, one: Commanded, now: float) -> None:
     """What this drive is sent, or these outputs, is on the bus."""
     plant.unsent_stops.discard(one)
     one.on_handed_over(now)

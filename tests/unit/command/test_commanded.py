@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command.commanded import Commanded
+from bridge.command.commanded import WordTiming
 from bridge.config import BusTable
 
 
-def commanded(kind: int | None = None) -> Commanded:
+def commanded(kind: int | None = None) -> WordTiming:
     keys = {
         "name": "can0",
         "interface": "virtual",
@@ -16,7 +16,7 @@ def commanded(kind: int | None = None) -> Commanded:
         "rpdo_period_ms": 10,
         "deadman_ms": 100,
     }
-    one = Commanded(BusTable.model_validate(keys))
+    one = WordTiming(BusTable.model_validate(keys))
     if kind is not None:
         one.rpdo_type = kind
     return one

@@ -10,20 +10,19 @@ import pytest
 
 from bridge.canopen.nmt import NmtCommand
 from bridge.command.link import NodeState
-from bridge.command.outputs import Outputs
 from bridge.master.reach import Reach
 from bridge.text import render
 
 
 @dataclass
 class Bus:
-    """One node with a drive called ``fu1`` or with outputs; each reason that is told."""
+    """One node with a drive called ``fu1``; each reason that is told."""
 
     acts: bool = True
     told: list[str] = field(default_factory=list[str])
 
-    def reach(self, *, outputs: bool = False, awaited: bool = False, **node: object) -> Reach:
-        one: Any = object.__new__(Outputs) if outputs else SimpleNamespace(name="fu1")
+    def reach(self, *, awaited: bool = False, **node: object) -> Reach:
+        one = SimpleNamespace(name="fu1")
         one.channel = SimpleNamespace(on_sending=lambda why, now: self.told.append(render(why)))
         facts: dict[str, object] = {
             "node": SimpleNamespace(commanded=[one]),
@@ -32,7 +31,7 @@ class Bus:
             "sends_process_data": True,
             "is_held": False,
             "told": None,
-            "wire": self.wire("fu1", has_outputs=True),
+            "wire": self.wire("fu1"),
         }
         core = SimpleNamespace(**(facts | node))
         charge = SimpleNamespace(acts=lambda: self.acts, why_not="another bridge is in charge")
@@ -40,10 +39,10 @@ class Bus:
         return Reach([cast(Any, core)], cast(Any, charge), cast(Any, farewell))
 
     @staticmethod
-    def wire(*drives: str, has_outputs: bool = False) -> SimpleNamespace:
-        connected = dict.fromkeys(drives)
+    def wire(*carried: str) -> SimpleNamespace:
         return SimpleNamespace(
-            drives=connected, outputs=has_outputs, why_left_out=lambda one: f"{one.name} has no RPDO"
+            carries=lambda one: one.name in carried,
+            why_left_out=lambda one: f"{one.name} has no RPDO",
         )
 
     def why(self, **node: Any) -> str:
@@ -53,7 +52,6 @@ class Bus:
 
 def test_words_reach_a_node_that_gets_them() -> None:
     assert Bus().why() == ""
-    assert Bus().why(outputs=True) == ""
 
 
 def test_it_is_told_when_something_has_changed_and_not_else() -> None:
@@ -93,11 +91,9 @@ def test_of_a_node_that_gets_no_words_its_state_and_the_command_are_said(
     assert why == f"the drive's node is {state.value}; {said}"
 
 
-@pytest.mark.parametrize("outputs", [True, False])
 @pytest.mark.parametrize("is_operational", [True, False])
-def test_who_is_left_out_of_a_node_that_gets_words_is_told_why(outputs: bool, is_operational: bool) -> None:
+def test_who_is_left_out_of_a_node_that_gets_words_is_told_why(is_operational: bool) -> None:
     state = NodeState.OPERATIONAL if is_operational else NodeState.BOOTING
     facts = {"is_operational": is_operational, "state": state, "wire": Bus.wire()}
-    booted = "no RPDO of the node carries its outputs" if outputs else "fu1 has no RPDO"
     not_booted = f"the drive's node is {state.value}; no words are sent to it"
-    assert Bus().why(outputs=outputs, **facts) == (booted if is_operational else not_booted)
+    assert Bus().why(**facts) == ("fu1 has no RPDO" if is_operational else not_booted)

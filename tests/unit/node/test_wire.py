@@ -1,0 +1,37 @@
+"""What one node sends and is sent: whether it carries what is commanded, and why not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bridge.master.network import Network
+from bridge.node.node import NodeCore
+from bridge.text import render
+from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
+from tests.support.nodes import device_plant
+from tests.support.quick import Quick, quick_site
+
+
+def why_not_carried(core: NodeCore) -> str:
+    (one,) = core.node.commanded
+    assert not core.wire.carries(one)
+    return render(core.wire.why_left_out(one))
+
+
+def test_outputs_without_an_rpdo_are_left_out(tmp_path: Path) -> None:
+    plant = device_plant(tmp_path, IO_BLOCK, OUTPUTS)
+    (core,) = Network(plant.site.bus[0], plant.side_of(plant.site.bus[0])).nodes
+    assert why_not_carried(core) == "no RPDO of the node carries its outputs"
+
+
+def test_outputs_that_the_boot_up_has_found_are_carried(tmp_path: Path) -> None:
+    bench = device_bench(tmp_path, io_block(), IO_BLOCK, OUTPUTS)
+    bench.run(2.0)
+    (core,) = bench.network.nodes
+    (outputs,) = core.node.commanded
+    assert core.wire.carries(outputs)
+
+
+def test_a_drive_that_has_not_been_found_is_left_out(tmp_path: Path) -> None:
+    core = Quick(quick_site(tmp_path, 1)).core(1)
+    assert why_not_carried(core) == "no PDOs of the drive can be used"

@@ -1,4 +1,4 @@
-"""Users of the site file and their roles, and the endpoints that they may come by."""
+"""Users of the site file and their roles, and the endpoints by which they may connect."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ class Users:
 
     @property
     def tokens(self) -> list[type]:
-        """The kinds of identity tokens to offer. Without users and anonymous, nobody gets in."""
+        """Identity tokens to offer. With neither users nor anonymous access, the list is empty and nobody
+        gets in."""
         tokens: list[type] = [ua.UserNameIdentityToken] if self._accounts else []
         if self._anonymous is not None:
             tokens.append(ua.AnonymousIdentityToken)
@@ -58,8 +59,8 @@ class Users:
     async def identify(
         self, token: object, nonce: bytes, key: RSAPrivateKey, address: str, *, encrypted: bool
     ) -> Identity:
-        """Whose identity token this is; ``nonce``, ``key`` and ``encrypted`` as for ``read_password``. Raises
-        ServiceError."""
+        """Identity that an identity token stands for; ``nonce``, ``key`` and ``encrypted`` as for
+        ``read_password``. Raises ServiceError."""
         if isinstance(token, ua.UserNameIdentityToken):
             password = read_password(token, nonce, key, encrypted=encrypted)
             return await self.login(get(token, "UserName") or "", password, address)
@@ -69,13 +70,14 @@ class Users:
         raise ServiceError(StatusCodes.BadIdentityTokenRejected)
 
     def anonymous(self, address: str) -> Identity:
-        """Raises ServiceError where the site file wants everyone to have a name."""
+        """Identity of an anonymous session. Raises ServiceError where the site file wants every user to have
+        a name."""
         if self._anonymous is None:
             raise ServiceError(StatusCodes.BadIdentityTokenRejected)
         return Identity(Source.OPCUA, ANONYMOUS, self._anonymous, address)
 
     async def login(self, name: str, password: str, address: str) -> Identity:
-        """Raises ServiceError where name and password do not belong together."""
+        """Identity of the named user. Raises ServiceError where name and password do not belong together."""
         account = self._accounts.get(name)
         known = account.password_hash if account else None
         is_right = len(password) <= _LONGEST_PASSWORD and await self._checks.is_right(

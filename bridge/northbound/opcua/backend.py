@@ -52,7 +52,7 @@ class ConnectionArrivals:
 
 
 class Backend(ServedApplication[SessionUser]):
-    """``pulse`` is that of the event loop."""
+    """Users, writes and calls of the server's sessions. ``pulse`` is that of the event loop."""
 
     def __init__(self, users: Users, writer: Writer, caller: Caller, view: View, pulse: Pulse) -> None:
         self._users = users

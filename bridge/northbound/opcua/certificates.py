@@ -85,7 +85,7 @@ def uris_of(certificate: x509.Certificate) -> list[str]:
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Whole or not at all, and never readable for others, not even for a moment."""
+    """Write the file whole or not at all; others can never read it, not even for a moment."""
     new = path.with_name(f"{path.name}.new")
     with contextlib.suppress(FileNotFoundError):
         new.unlink()
@@ -118,7 +118,7 @@ def fingerprint(certificate: x509.Certificate) -> str:
 
 
 def reason(error: Exception) -> str:
-    """What went wrong, as the end of a sentence."""
+    """The error as the end of a sentence, for the log."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
     return str(error)
@@ -157,7 +157,7 @@ class TrustedCertificates:
         self._known = frozenset(known)
 
     def refusal(self, certificate: x509.Certificate) -> str | None:
-        """Why this certificate is not trusted, or None if it is."""
+        """Reason why this certificate is not trusted, None if it is."""
         content = certificate.public_bytes(Encoding.DER)
         if content not in self._known:
             with contextlib.suppress(OSError, FileFaults):

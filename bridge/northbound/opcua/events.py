@@ -21,8 +21,8 @@ from bridge.uaserver.subscriptions import Subscriptions
 BASE_TYPE: Final = "DriveEventType"
 _BURST: Final = 20
 _EVERY_S: Final = 0.1
-"""Of one kind so many go out at once and then one in so many seconds. Each kind has its own limit, so that
-somebody who has writes refused all day hides no watchdog trip."""
+"""Limit of each kind of event: a burst of ``_BURST``, then one in ``_EVERY_S`` seconds. Each kind has its
+own, so that writes that are refused all day hide no watchdog trip."""
 _WAITING: Final = 200
 
 
@@ -88,7 +88,7 @@ class EventSender:
         return objects.get(name) or objects.get(f"bus/{name}") or objects["bridge"]
 
     def _emitters(self, name: str) -> list[ua.NodeId]:
-        """An event of a drive is heard at the drive, at its node and at the server."""
+        """Objects that send the event: for one of a drive, the drive, its node and the server."""
         above = self._objects.get(name.partition("/")[0]) if "/" in name else None
         found = [node_id(ObjectIds.Server), self._source(name)]
         return [*found, above] if above else found

@@ -67,7 +67,7 @@ def server_identity(settings: OpcUaTable, folder: Path) -> ServerIdentity:
 
 
 def _kept_or_new(settings: OpcUaTable, folder: Path) -> OwnCertificate:
-    """Raises OSError and FileFaults."""
+    """The files in the folder, made where there are none. Raises OSError and FileFaults."""
     certificate, key = folder / CERTIFICATE, folder / KEY
     if certificate.exists():
         try:
@@ -87,7 +87,7 @@ def _first_uri() -> str:
 
 
 def _kept_uri(folder: Path) -> str:
-    """The one of before, where a certificate has been taken away to be renewed."""
+    """The former application URI, where a certificate was taken away to be renewed."""
     try:
         return (folder / URI).read_text(encoding="utf-8", errors="replace").strip()
     except FileNotFoundError:
@@ -95,7 +95,8 @@ def _kept_uri(folder: Path) -> str:
 
 
 def _uri_of(certificate: x509.Certificate, file: str, settings: OpcUaTable, folder: Path) -> str:
-    """A client compares the application URI with the one in the certificate (Part 4 §6.1.3)."""
+    """Application URI of the server, that of the certificate: clients compare the two (Part 4 §6.1.3). Raises
+    FileFaults where the site file names another one."""
     held, wanted = uris_of(certificate), settings.application_uri
     if wanted and held and wanted not in held:
         hint = f"leave it out, or take {file} away: another one is made, which clients have to trust anew"
@@ -105,7 +106,7 @@ def _uri_of(certificate: x509.Certificate, file: str, settings: OpcUaTable, fold
 
 
 def _look_at(certificate: x509.Certificate, file: str, settings: OpcUaTable) -> None:
-    """Say what clients may find wrong with a certificate that is used as it is."""
+    """Log what clients may object to in a certificate that is used as it is."""
     renew = "take it away and the bridge makes a new one with the same key, which clients have to trust anew"
     if settings.certificate:
         renew = "renew it"

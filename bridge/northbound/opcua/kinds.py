@@ -1,4 +1,5 @@
-"""What all nodes of a kind have in common: made once, by asyncua, as it would be for each of them."""
+"""Attributes and references that all nodes of a kind share: made once, by asyncua, instead of for each of
+them."""
 
 from __future__ import annotations
 
@@ -46,7 +47,7 @@ _TYPE_DEFINITION: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """``to_type`` is the reference to the type ``type_id``; a method has none."""
+    """One kind of node. ``to_type`` is the reference to the type ``type_id``; a method has none."""
 
     attributes: Mapping[AttributeIds, AttributeValue]
     node_class: ua.NodeClass
@@ -56,7 +57,7 @@ class Kind:
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """What follows from a name: drives have nodes of the same names."""
+    """Attributes that follow from a name, made once: drives have nodes of the same names."""
 
     qualified: ua.QualifiedName
     text: ua.LocalizedText
@@ -65,7 +66,7 @@ class Name:
 
 
 class Kinds:
-    """What the nodes of a tree in ``space`` have in common. Nobody can write any of it."""
+    """Shared parts of the nodes of a tree in ``space``. No client can write any of them."""
 
     def __init__(self, space: AddressSpace) -> None:
         self._space = space

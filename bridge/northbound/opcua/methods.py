@@ -33,7 +33,7 @@ from bridge.uaserver.library import AttributeIds, ServiceError, StatusCodes, get
 
 _DIRECTIONS: Final = (-1, 0, 1)
 _AT_FAULT: Final = {Code.UNKNOWN_PARAMETER: 0, Code.READ_ONLY: 0, Code.WRITE_ONLY: 0, Code.OUT_OF_RANGE: 1}
-"""Which argument of a method for parameters an outcome is about."""
+"""Position of the argument at fault in a parameter method, by outcome code."""
 
 
 class Caller:
@@ -88,7 +88,7 @@ class Caller:
     def _rejected(
         self, identity: Identity, call: ua.CallMethodRequest, code: int, faults: Sequence[int] = ()
     ) -> ua.CallMethodResult:
-        """The result of a call that becomes no request, once it was told."""
+        """Result of a call that becomes no request; the rejection is reported to the audit log."""
         method = self._method(get(call, "MethodId"))
         action = method.action if method else "call"
         target = method.target if method else str(get(call, "ObjectId").Identifier)

@@ -16,10 +16,10 @@ from bridge.command.messages.request import Action
 from bridge.image import Point
 
 GROUPS: Final = ("command", "status", "actual", "parameter", "supervision", "identity")
-"""Every drive has these folders, whether or not they hold a point."""
+"""Folders that every drive has, whether or not they hold a point."""
 
 DEVICE_GROUPS: Final = ("input", "output", "parameter", "supervision")
-"""Of a node that is no drive, beside ``node``."""
+"""Folders of a node that is no drive, beside ``node``."""
 _IN_DEVICE: Final = 3
 """Words in the name of a point in one of these groups."""
 
@@ -50,7 +50,7 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class MethodNode:
-    """``target`` is the drive, node or bus that ``action`` is done to."""
+    """A method. ``target`` is the drive, node or bus that ``action`` is done to."""
 
     id: str
     browse_name: str
@@ -140,7 +140,7 @@ _NODE_METHODS: Final[_Methods] = (
     (Action.DISABLE, (), (), "take the node out of service"),
 )
 _DEVICE_METHODS: Final[_Methods] = (*_NODE_METHODS, *_PARAMETER_METHODS)
-"""Of a node that is no drive."""
+"""Methods of a node that is no drive."""
 _OUTPUT_METHODS: Final[_Methods] = (
     (Action.STOP, (), (), "make every output safe"),
     (Action.RESET_FAULT, (), (), "acknowledge a watchdog trip; the outputs stay safe"),
@@ -149,7 +149,7 @@ _OUTPUT_METHODS: Final[_Methods] = (
     (Action.KEEP_ALIVE, (), (), "a telegram without a value: restarts the watchdog's timer"),
     *_DEVICE_METHODS,
 )
-"""Of one that has outputs."""
+"""Methods of a node that is no drive and has outputs."""
 _BUS_METHODS: Final[_Methods] = (
     (Action.RESET, (), (), "NMT reset node to all nodes"),
     (Action.RESET_COMMUNICATION, (), (), "NMT reset communication to all nodes"),
@@ -234,7 +234,7 @@ def _methods(target: str, table: _Methods) -> tuple[MethodNode, ...]:
 
 
 _MOST_STATES: Final = 256
-"""EnumStrings is a list from code 0 on (Part 8 §5.3.3.3): for codes beyond this one it says nothing."""
+"""Highest code with an entry in EnumStrings, a list from code 0 on (Part 8 §5.3.3.3)."""
 
 
 def _variable(point: Point, index: int) -> VariableNode:

@@ -1,4 +1,4 @@
-"""Names and addresses by which clients reach the server: those that its certificate has to have.
+"""Names and addresses by which clients reach the server, all of which its certificate has to have.
 
 Without asyncua: the bus process asks for them, too.
 """
@@ -45,7 +45,7 @@ def own_addresses(ipv4: Path = _IPV4, ipv6: Path = _IPV6) -> Iterator[str]:
 
 
 def _read(path: Path) -> str:
-    """Nothing where the kernel has no such file: it was made without IPv6."""
+    """Content of the file; empty where the kernel has none, as one that was built without IPv6."""
     with contextlib.suppress(OSError):
         return path.read_text(encoding="ascii")
     return ""
@@ -60,7 +60,7 @@ def general_name(name: str) -> x509.GeneralName:
 
 
 def missing_in(certificate: x509.Certificate, names: Sequence[str]) -> list[str]:
-    """Those of ``names`` that the certificate does not have."""
+    """The ``names`` that the certificate lacks."""
     try:
         found = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     except x509.ExtensionNotFound:

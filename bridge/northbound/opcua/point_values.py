@@ -27,7 +27,7 @@ class Watched:
 
 
 AllWatched = dict[int, dict[int, Watched]]
-"""By the index of the point, and then by the bit, -1 for the whole point."""
+"""Watched variables by index of the point, then by bit, -1 for the whole point."""
 
 
 class PointValue(AttributeValue):

@@ -1,4 +1,4 @@
-"""What the OPC UA server needs of the site file and the disk, looked at before a bus is opened.
+"""Check of what the OPC UA server needs of the site file and the disk, before a bus is opened.
 
 The bus process does it, so asyncua is not imported here.
 """
@@ -16,8 +16,8 @@ from bridge.northbound.passwords import check_users
 
 
 def check_opcua(settings: OpcUaTable, state_dir: Path, site: Path) -> None:
-    """Raises ``FileFaults`` for users, certificate, key or ``trusted_dir`` that cannot be used, and
-    ``Unavailable`` where a certificate has to be made and ``state_dir`` does not take it."""
+    """Check the files. Raises ``FileFaults`` for users, certificate, key or ``trusted_dir`` that cannot be
+    used, and ``Unavailable`` where a certificate has to be made and ``state_dir`` does not take it."""
     try:
         check_users(settings.user)
         own = server_identity(settings, state_dir / "opcua")

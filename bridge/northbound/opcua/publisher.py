@@ -1,4 +1,4 @@
-"""Tells clients what has changed: at each look the newest value, only where somebody watches."""
+"""Publisher of changes: at each look the newest value of every variable that a client watches."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from bridge.northbound.opcua.ownnames import general_name
 KEY_BITS: Final = 2048
 _VALID_DAYS: Final = 3650
 _LONGEST_NAME: Final = 64
-"""Of a common name (RFC 5280, ub-common-name)."""
+"""Most characters of a common name (RFC 5280, ub-common-name)."""
 
 
 def new_key() -> tuple[RSAPrivateKey, bytes]:
@@ -31,7 +31,8 @@ def new_key() -> tuple[RSAPrivateKey, bytes]:
 
 
 def self_signed(key: RSAPrivateKey, application_uri: str, names: Sequence[str]) -> x509.Certificate:
-    """``names`` are host names and addresses by which the server is reached."""
+    """A certificate signed with ``key``. ``names`` are host names and addresses by which the server is
+    reached."""
     host = socket.gethostname()
     name = x509.Name(
         [

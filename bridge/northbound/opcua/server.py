@@ -101,8 +101,8 @@ class OpcUaServer:
         self._tell()
 
     async def failed(self) -> None:
-        """Wait for ever, or raise ``OperationFailed`` when nobody can connect any more, or nobody is told of
-        changes."""
+        """Wait for ever, or raise ``OperationFailed`` when no client can connect any more or changes are not
+        published."""
         if self._socket is None or self._publisher is None:
             return
         deaf = asyncio.create_task(until_deaf(self._socket, "opcua.listen"))
@@ -212,6 +212,6 @@ def _event_type(inner: Server, where: ua.NodeId, parent: ua.NodeId) -> ua.NodeId
 
 
 def built_at() -> datetime:
-    """When the newest of the program's files was written."""
+    """Modification time of the newest of the program's files, UTC."""
     files = Path(bridge.__file__).parent.rglob("*.py")
     return datetime.fromtimestamp(max(file.stat().st_mtime for file in files), UTC)

@@ -1,4 +1,4 @@
-"""What the properties of variables and methods hold, and the attributes of new nodes."""
+"""Content of the properties of variables and methods, and the attributes of new nodes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _ARGUMENT_TYPE: Final = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Property:
-    """One for all nodes that have the same."""
+    """A property, one object for all nodes that have the same."""
 
     name: str
     value: ua.Variant

@@ -28,8 +28,8 @@ _HAS_NOTIFIER: Final = node_id(ObjectIds.HasNotifier)
 
 
 class _TreeNode:
-    """What asyncua calls NodeData, as far as anybody looks at it. ``reference`` is the type of the reference
-    to it from ``above``, which is None below the Objects folder."""
+    """A node in place of asyncua's NodeData, with as much of it as is used. ``reference`` is the type of the
+    reference to it from ``above``, which is None below the Objects folder."""
 
     __slots__ = ("_below", "_kind", "_tree", "above", "node", "reference")
 
@@ -128,7 +128,7 @@ class Tree:
         self.notifiers: dict[str, ua.NodeId] = {}
         self.watched: AllWatched = {}
         self.never_called: Callbacks = {}
-        """Of what never changes."""
+        """Callbacks of attributes that never change: one empty table for all of them."""
         for tree in trees:
             self._add(tree, None, _ORGANIZES)
         self._attach(space, [self._nodes[tree.id] for tree in trees])
@@ -166,7 +166,7 @@ class Tree:
         return found.node if found else None
 
     def _name(self, where: ua.NodeId) -> str:
-        """The id in the layout; "" where there can be none."""
+        """Id in the layout; "" for a NodeId that can have none."""
         name = where.Identifier
         return name if where.NamespaceIndex == self.namespace and isinstance(name, str) else ""
 
@@ -210,7 +210,7 @@ def _description(node: Node) -> str:
 
 
 def _parts(node: Node) -> Iterator[tuple[ua.NodeId, Node]]:
-    """What is below a node besides its properties, and by which reference."""
+    """Children of a node besides its properties, each with the type of the reference to it."""
     match node:
         case ObjectNode():
             for method in node.methods:

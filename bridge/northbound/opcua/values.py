@@ -55,7 +55,7 @@ _REJECTION_CODE: Final = {
     StatusCodes.BadNotExecutable: Code.NOT_CONFIGURED,
     StatusCodes.BadOutOfRange: Code.OUT_OF_RANGE,
 }
-"""Outcomes that say what the server itself refuses; all else is ``NOT_VALID``."""
+"""Outcomes for what the server itself refuses, by status code; every other code is ``NOT_VALID``."""
 _LONGEST: Final = 200
 
 VARIANT_TYPE: Final = {
@@ -101,7 +101,7 @@ ABORT_STATUS: Final = {
     0x0800_0021: StatusCodes.BadInvalidState,
     0x0800_0022: StatusCodes.BadInvalidState,
 }
-"""What a drive means by an SDO abort code, where OPC UA has a word for it."""
+"""Status codes by SDO abort code, where OPC UA has one that fits."""
 
 
 def outcome_status(outcome: Outcome) -> ua.StatusCode:
@@ -114,7 +114,7 @@ def outcome_status(outcome: Outcome) -> ua.StatusCode:
 def rejection(
     identity: Identity, target: str, action: str, code: int, values: Mapping[str, Value]
 ) -> Rejection:
-    """For the audit log: a write or call that the server has answered with ``code`` by itself. Names and
+    """Entry of the audit log: a write or call that the server has answered with ``code`` by itself. Names and
     texts, which are the client's, are cut."""
     ending = _REJECTION_CODE.get(code, Code.NOT_VALID)
     shown = {name[:_LONGEST]: _cut(value) for name, value in values.items()}
@@ -156,7 +156,7 @@ def present_value(
 
 
 def point_value(point: Point, written: ua.Variant) -> Value:
-    """What a client wrote, as a value to ask for.
+    """Value of a point for what a client wrote.
 
     Raises TypeError for a type that does not fit, ValueError for a number that is none (NaN, infinity).
 

@@ -40,16 +40,17 @@ from bridge.uaserver.library import GOOD, AttributeIds, ServiceError, StatusCode
 _log = logging.getLogger(__name__)
 
 ANSWER_LIMIT_S: Final = 10.0
-"""No request takes longer (a start takes 3 s); after this the link to the bus counts as broken."""
+"""Longest wait for an outcome, seconds. No request takes longer (a start takes 3 s): after this the link to
+the bus counts as broken."""
 
 
 _ALONE: Final = {"parameter": WriteParameter, "supervision": SetTimeout}
-"""Groups whose points are written one by one, and are no telegram."""
+"""Groups whose points are written one by one, not in a telegram."""
 
 
 @dataclass(slots=True)
 class _Telegram:
-    """What one drive is told. ``places`` are the positions in the call that it answers."""
+    """One telegram to one drive. ``places`` are the positions in the call that it answers."""
 
     target: str
     kind: type[Write | WriteParameter | SetTimeout]
@@ -57,7 +58,7 @@ class _Telegram:
     places: list[int] = field(default_factory=list[int])
     fault: int = StatusCodes.Good
     misfits: dict[str, Value] = field(default_factory=dict[str, Value])
-    """What was written that is the fault, as far as it is a value at all."""
+    """Written values that are at fault, by point, as far as they are values at all."""
 
     def command(self) -> Command:
         if self.kind is Write:
@@ -144,7 +145,7 @@ class Writer:
     async def _send(
         self, identity: Identity, telegrams: Sequence[_Telegram], results: list[ua.StatusCode]
     ) -> None:
-        """The telegrams of one drive, one after the other."""
+        """Send the telegrams of one drive, one after the other."""
         for telegram in telegrams:
             # One bad value refuses the others, too: there is no half a telegram.
             code = status(telegram.fault)
@@ -159,7 +160,7 @@ class Writer:
                 results[place] = code
 
     def _reject(self, identity: Identity, write: ua.WriteValue, code: int) -> None:
-        """Tell of a write that is none to any command point."""
+        """Report a write that addresses no command point."""
         name = str(get(write, "NodeId").Identifier)
         node_name, _, rest = name.partition("/")
         drive, _, point = rest.partition("/")
@@ -167,7 +168,7 @@ class Writer:
         self._view.rejected(rejection(identity, target, Action.WRITE, code, _shown(leaf, write)))
 
     def _refusal(self, write: ua.WriteValue) -> int:
-        """Why this cannot be written by anyone."""
+        """Status code for a write that no user may make."""
         node = self._space.get(get(write, "NodeId"))
         if node is None:
             return StatusCodes.BadNodeIdUnknown
@@ -177,7 +178,7 @@ class Writer:
 
 
 def _shown(leaf: str, write: ua.WriteValue) -> dict[str, Value]:
-    """What was written, where it is a single value."""
+    """The written value by point name; empty where it is not a single value."""
     written: ua.DataValue = get(write, "Value")
     try:
         return {} if written.Value is None else {leaf: plain_value(written.Value)}

@@ -21,6 +21,8 @@ ROOMS = (
     "dictionary",
     "eds",
     "northbound/modbus",
+    "northbound/opcua",
+    "northbound/page",
     "northbound/zenoh",
     "parameter",
     "sim",

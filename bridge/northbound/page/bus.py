@@ -24,16 +24,17 @@ _encode = msgspec.json.Encoder().encode
 
 @dataclass(frozen=True, slots=True)
 class Captured:
-    """The content of a file. ``is_cut``: there was more than is kept, and the file ends before its time."""
+    """Content of a captured file. ``is_cut`` is true where more came than is kept: the file ends before its
+    time."""
 
     content: bytes
     is_cut: bool = False
 
 
 IsGone = Callable[[], Awaitable[bool]]
-"""Whether nobody waits any more."""
+"""True once nobody waits for the capture any more."""
 Capture = Callable[[str, float, str, IsGone], Awaitable[Captured]]
-"""Listens to this bus for so many seconds, and makes a file in this format. Raises ``OperationFailed``."""
+"""Captures a bus for so many seconds into a file of this format. Raises ``OperationFailed``."""
 
 
 class Bus:
@@ -102,12 +103,12 @@ class Bus:
 
 
 def _seconds(text: str) -> int:
-    """0 where it is no such number."""
+    """Seconds of a capture as the request gives them; 0 where that is no such number."""
     return int(text) if text.isdecimal() and len(text) <= len(str(LONGEST_S)) else 0
 
 
 async def _parts(content: bytes) -> AsyncIterator[bytes]:
-    """Compressed as a whole, a long file would hold up every tab."""
+    """The file in parts: compressed as a whole, a long one would hold up every tab."""
     for begin in range(0, len(content), _PART):
         yield content[begin : begin + _PART]
         await asyncio.sleep(0)

@@ -1,4 +1,5 @@
-"""What the page has to know of a site once: its buses, nodes and drives, and the nature of its points."""
+"""Description of a site that the page gets once: its buses, nodes and drives, and the nature of its
+points."""
 
 from __future__ import annotations
 
@@ -18,9 +19,9 @@ _encode = msgspec.json.Encoder().encode
 
 
 def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str, Any]:
-    """For JSON. ``places`` has for each drive, bus, node and the bridge which of ``natures`` has its points,
-    by their names there. Drives of a kind have one in common, so that a plant of hundreds is loaded as soon
-    as a small one. What is empty is left out of a point."""
+    """Description of the site, for JSON. ``places`` has for each drive, bus, node and the bridge which of
+    ``natures`` has its points, by their names there. Drives of a kind have one in common, so that a plant of
+    hundreds is loaded as soon as a small one. What is empty is left out of a point."""
     layout = layout_of(image.points, site, families)
     places, natures = _natures(image.points, layout, _scaled(image, site, families))
     nodes: list[dict[str, Any]] = []
@@ -121,8 +122,8 @@ def _point(point: Point) -> dict[str, Any]:
 
 
 def _stops_in(family: Family) -> str:
-    """The state in which a drive ends that is stopped: that of the word which is made ready, where the stop
-    takes back as much."""
+    """State in which a stopped drive ends: that of the ready word, where the stop takes the drive back that
+    far."""
     control = family.control_word
     word = control.run & ~control.stop.mask | control.stop.value
     return "ready" if word & 0xF == control.ready & 0xF else "switched_on"

@@ -1,4 +1,4 @@
-"""What each answer of the page carries, and which requests are not even looked at."""
+"""Headers that each answer of the page carries, and requests that are refused unread."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 MOST_BODY: Final = 65_536
-"""Bytes of a request's body."""
+"""Largest body of a request, bytes."""
 MOST_FILE: Final = 4 << 20
-"""Bytes of a file that is sent."""
+"""Largest file in a request, bytes."""
 _FILES: Final = ("/api/set/", "/api/backup/")
 """Paths to which files are sent."""
 MOST_HEAD: Final = 16_384
-"""Bytes of its head."""
+"""Largest head of a request, bytes."""
 _POLICY: Final = "; ".join(
     (
         "default-src 'none'",
@@ -43,7 +43,8 @@ _ONE_YEAR: Final = "max-age=31536000"
 
 
 class Guards:
-    """Around the application: names the browser's rules, and refuses what no page of ours has sent.
+    """Middleware around the application: sets the browser's security headers, and refuses requests that no
+    page of ours has sent.
 
     ``names`` are the host names by which the page may be reached, beside ``localhost`` and addresses. A
     request by another name is how a foreign page reads ours through a name of its own (DNS rebinding); an

@@ -1,4 +1,4 @@
-"""What a tab is shown of the traffic on a bus: frame by frame as it filters them, or counted by identifier.
+"""Traffic on a bus as a tab sees it: frame by frame as the tab filters them, or counted by identifier.
 Sans-IO.
 
 Each frame is decoded once for all tabs. A tab that asks for all of a busy bus gets the first of each beat,
@@ -20,17 +20,17 @@ from bridge.base.errors import OperationFailed
 MOST_ROWS: Final = 100
 """Frames in one message."""
 _WINDOW_S: Final = 5.0
-"""Rates and loads are those of about so long."""
+"""Time over which rates and loads are smoothed, about, seconds."""
 _MOST_IDENTIFIERS: Final = 2048
 _MOST_KINDS: Final = 16
 _MOST_NODES: Final = 127
 _RETRY_S: Final = 1.0
-"""How long a bus that could not be heard is left alone."""
+"""Pause before a bus that could not be heard is tried again, seconds."""
 _encode = msgspec.json.Encoder().encode
 
 
 class Heard(msgspec.Struct, frozen=True, array_like=True):
-    """One frame with what it says. ``at_ms`` is in ms since 1970; ``bits`` is what it took of the bus."""
+    """One frame and its decoded text. ``at_ms`` is in ms since 1970; ``bits`` is what it took of the bus."""
 
     at_ms: float
     identifier: str
@@ -43,14 +43,14 @@ class Heard(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Ear(Protocol):
-    """Listens to one bus while it is open, and says what it hears."""
+    """Source of the frames of one bus, while it is open."""
 
     def open(self) -> None:
-        """Raises ``OperationFailed``."""
+        """Begin to listen. Raises ``OperationFailed``."""
         ...
 
     def take(self) -> list[Heard]:
-        """Raises ``OperationFailed`` where nothing is heard any more."""
+        """Frames since the last call. Raises ``OperationFailed`` where the bus cannot be heard any more."""
         ...
 
     @property
@@ -60,7 +60,7 @@ class Ear(Protocol):
 
 
 class Wish(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """What a tab wants to hear; no kinds or no nodes are all of them."""
+    """Filter of a tab; no kinds or no nodes are all of them."""
 
     bus: str
     view: str = "frames"
@@ -84,7 +84,7 @@ class _Count:
 
 
 class Hearing:
-    """One bus of ``bitrate`` bit/s, heard by whoever wants to."""
+    """Traffic of one bus of ``bitrate`` bit/s, for every tab that shows it."""
 
     def __init__(self, bus: str, bitrate: int, ear: Ear) -> None:
         self._bus = bus
@@ -98,7 +98,8 @@ class Hearing:
         self._new: list[Heard] = []
 
     def listen(self, now: float, *, is_wanted: bool) -> None:
-        """Take what has come. ``now`` is monotonic; while nobody wants to hear, the ear is closed."""
+        """Take the frames received since the last call. ``now`` is monotonic; while no tab wants any, the tap
+        is closed."""
         self._new = []
         if not is_wanted:
             self.close()
@@ -131,7 +132,7 @@ class Hearing:
         self._measured = now
 
     def frames_for(self, wish: Wish) -> bytes | None:
-        """The message about what is new for this tab; None where nothing is."""
+        """JSON message with the new frames for this tab; None where there are none."""
         if self._failure:
             return self._told({"failure": self._failure})
         wanted = [heard for heard in self._new if wish.takes(heard)]
@@ -141,8 +142,8 @@ class Hearing:
         return self._told({"frames": rows, "more": len(wanted) - len(rows)})
 
     def identifiers_for(self, wish: Wish) -> bytes:
-        """The message with a row for each identifier so far: identifier, label, frames, frames a second, load
-        in percent, shortest and longest gap in ms, newest data and its text."""
+        """JSON message with a row for each identifier so far: identifier, label, frames, frames a second,
+        load in percent, shortest and longest gap in ms, newest data and its text."""
         if self._failure:
             return self._told({"failure": self._failure})
         rows = [
@@ -212,7 +213,8 @@ class Hearings:
         *,
         counts: bool,
     ) -> None:
-        """Tell each tab what it wants to hear; ``counts``: those who look at identifiers, too."""
+        """Send each tab the frames that its filter lets through, and with ``counts`` those that show
+        identifiers theirs."""
         wanted = list(wishes)
         for name, hearing in self._hearings.items():
             own = [(wish, show) for wish, show in wanted if wish.bus == name]

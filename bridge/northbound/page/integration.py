@@ -1,5 +1,5 @@
-"""For who programs against the site: how its servers are reached, and all that they serve, to look at and to
-download."""
+"""Page for programmers of PLC, SCADA and fleet: how the servers are reached and all that they serve, to look
+at and to download."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bridge.base.errors import OperationFailed
 from bridge.config import Site
 
 Export = Callable[[], str]
-"""Makes the text of a file; raises ``OperationFailed`` where that needs what is not here."""
+"""Makes the text of a file; raises ``OperationFailed`` where a library that it needs is not installed."""
 
 _MEDIA: Final = {
     "csv": "text/csv; charset=utf-8",
@@ -66,7 +66,7 @@ class Integration:
 
 
 def servers_of(site: Site) -> dict[str, Any]:
-    """For JSON: where each protocol is served and how; None for one that is not."""
+    """Servers of the site, for JSON: where each protocol is served and how; None for one that is not."""
     modbus, opcua, zenoh = site.modbus, site.opcua, site.zenoh
     return {
         "modbus": modbus and {"listen": modbus.listen, "word_order": modbus.word_order},

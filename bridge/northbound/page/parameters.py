@@ -1,5 +1,5 @@
-"""Parameters of a drive or node, for a page that reads and writes them by its tab: which there are, how often
-each was written, and sets of them as files."""
+"""Parameters of a drive or node for the page, which reads and writes them by its tab: list, number of writes
+of each, and sets of them as files."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from bridge.parameter.factory import DESCRIPTIONS, factory
 from bridge.parameter.set_file import read_set
 
 Counts = Callable[[], Mapping[tuple[str, str], int]]
-"""How often the EEPROM was written, by the drive's or node's name and the object."""
+"""Writes to the EEPROM, by the drive's or node's name and the object."""
 ReadBody = Callable[[Request, int], Awaitable[bytes]]
-"""The body of a request, of so many bytes at most; raises ``ValueError`` or ``TimeoutError``."""
+"""Reads the body of a request, of so many bytes at most; raises ``ValueError`` or ``TimeoutError``."""
 
 _log = logging.getLogger(__name__)
 
@@ -39,8 +39,8 @@ _encode = msgspec.json.Encoder().encode
 
 
 class _Set(msgspec.Struct, forbid_unknown_fields=True):
-    """What a tab has read of a drive. ``values`` are by name, ``unreadable`` says why others were not
-    read."""
+    """Parameters of a drive as a tab has read them. ``values`` are by name, ``unreadable`` gives the reason
+    for each of the others."""
 
     values: dict[str, bool | int | float | str]
     missing: list[str] = []
@@ -63,7 +63,7 @@ class Holder:
 
 
 def holders_of(site: Site, families: Mapping[str, Family]) -> dict[str, Holder]:
-    """By the names that commands have for them."""
+    """Drives and devices with parameters, by the names that commands have for them."""
     known = {name: AxisNames(family) for name, family in families.items()}
     found: dict[str, Holder] = {}
     for bus in site.bus:
@@ -116,7 +116,7 @@ class Parameters:
         return None
 
     async def _list(self, request: Request) -> Response:
-        """Which parameters there are, with the range and the wear of each."""
+        """List of the parameters, with the range and the wear of each."""
         if refusal := self._refusal(request):
             return refusal
         holder = self._holders[request.path_params["holder"]]
@@ -126,7 +126,7 @@ class Parameters:
         return Response(_encode(told), headers=headers, media_type="application/json")
 
     def _factory(self, holder: Holder) -> dict[str, Value]:
-        """The factory settings that the maker's description has, as far as there is one."""
+        """Factory settings by the maker's description; empty without one."""
         if holder.name not in self._factories:
             file = self._dictionaries.get(holder.node.mapping_key)
             try:
@@ -138,7 +138,7 @@ class Parameters:
         return self._factories[holder.name]
 
     async def _backup(self, request: Request) -> Response:
-        """What a tab has read, as a file that ``drivebridge parameters`` reads."""
+        """Values that a tab has read, as a file that ``drivebridge parameters`` reads."""
         if refusal := self._refusal(request):
             return refusal
         holder = self._holders[request.path_params["holder"]]
@@ -152,7 +152,7 @@ class Parameters:
         return Response(text, headers=headers, media_type="application/toml")
 
     async def _set(self, request: Request) -> Response:
-        """The values in a backup or in a device description, which fit this drive."""
+        """Answer with the values of a backup or device description that fit this drive."""
         if refusal := self._refusal(request):
             return refusal
         holder = self._holders[request.path_params["holder"]]
@@ -174,7 +174,7 @@ class Parameters:
 def listed(
     holder: Holder, counts: Mapping[tuple[str, str], int], factory: Mapping[str, Value]
 ) -> dict[str, Any]:
-    """For JSON: the parameters in the order of the mapping file, and what the family has for all of them."""
+    """Parameters for JSON, in the order of the mapping file, and what the family has for all of them."""
     settings = {entry.name for entry in backups.settings(holder.names, on_first=holder.on_first)}
     eeprom = holder.family.eeprom
     ram_only = eeprom.ram_only if eeprom else None
@@ -220,7 +220,7 @@ def backup_of(
 
 
 def _as_held(entry: Entry, value: Value) -> Value:
-    """JSON as browsers write it has no 2.0."""
+    """The value in the drive's type: JSON as browsers write it has 2 for 2.0."""
     is_whole = isinstance(value, int) and not isinstance(value, bool)
     return (
         float(value)
@@ -235,7 +235,7 @@ def _comment(entry: Entry) -> str:
 
 
 def _entry(holder: Holder, entry: Entry, counts: Mapping[tuple[str, str], int]) -> dict[str, Any]:
-    """What is empty is left out."""
+    """JSON object for one parameter; empty facts are left out."""
     definition = entry.definition
     if definition is None:
         return {"name": entry.name, "object": str(entry.address)}
@@ -262,7 +262,7 @@ def _entry(holder: Holder, entry: Entry, counts: Mapping[tuple[str, str], int]) 
 
 
 def _read(content: bytes, name: str, holder: Holder) -> dict[str, Any]:
-    """Raises ``FileFaults``, which name the file as it is called at the reader's."""
+    """Parameters of a file. Raises ``FileFaults``, which name the file as the sender calls it."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / f"set{PurePath(name).suffix.lower()}"
         file.write_bytes(content)

@@ -1,4 +1,4 @@
-"""What the page needs of the disk, looked at before a bus is opened."""
+"""Check of what the page needs of the disk, before a bus is opened."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PEM: Final = "a PEM file; of a certificate with those between it and its author
 
 
 def check_page(table: PageTable, site: Path) -> None:
-    """Raises ``FileFaults`` for a certificate or key that cannot be used."""
+    """Check the files. Raises ``FileFaults`` for a certificate or key that cannot be used."""
     if table.certificate is None or table.private_key is None:
         return
     keys: dict[str | None, str] = {

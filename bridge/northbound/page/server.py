@@ -24,21 +24,21 @@ from bridge.northbound.page.viewer import MOST_BYTES
 from bridge.northbound.page.web import Page
 
 _HEADERS_S: Final = 10.0
-"""How long the head of a request may take to come, the first of a connection included."""
+"""Longest time for the head of a request to come, the first of a connection included, seconds."""
 _IDLE_S: Final = 30
 _STALLED_S: Final = 20.0
-"""How long a tab may take nothing while its connection's buffers are full."""
+"""Longest time in which a tab takes nothing while its connection's buffers are full, seconds."""
 _CLOSING_S: Final = 12.0
-"""How long a tab's connection may last when nothing is served on it any more: uvicorn waits 10 s for the
-client's part of closing it."""
+"""Longest time that a tab's connection lasts once nothing is served on it any more, seconds: uvicorn waits 10
+s for the client's part of closing it."""
 
 
 class _Protocol(H11Protocol):
-    """uvicorn waits for ever for the head of a request that has begun, or never begins, and lets in whoever
-    comes first."""
+    """HTTP/1.1 with limits: uvicorn waits for ever for the head of a request, begun or not, and serves
+    connections first come, first served."""
 
     _shares: Connections[asyncio.Transport]
-    """Of this server: a class of its own for each has it."""
+    """Connections of this server: each server has a subclass of its own, which holds them."""
     _deadline: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: Any) -> None:
@@ -72,7 +72,7 @@ class _Protocol(H11Protocol):
 
     @property
     def _request(self) -> RequestResponseCycle | None:
-        """The newest, None before the first."""
+        """Newest request, None before the first."""
         return self.cycle
 
     def _expect_head(self, limit_s: float = _HEADERS_S) -> None:
@@ -86,7 +86,8 @@ class _Protocol(H11Protocol):
 
 
 class _LiveProtocol(WebSocketsSansIOProtocol):
-    """uvicorn waits for ever for a client that takes nothing, even to close its connection."""
+    """WebSocket with limits: uvicorn waits for ever for a client that takes nothing, even to close its
+    connection."""
 
     _shares: Connections[asyncio.Transport]
     _deadline: asyncio.TimerHandle | None = None
@@ -126,7 +127,7 @@ class _LiveProtocol(WebSocketsSansIOProtocol):
 class _Server(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None]:
-        """Signals are our process's own."""
+        """Leave signals alone: they are our process's own."""
         yield
 
 
@@ -173,7 +174,7 @@ class PageServer:
         return self._bound.getsockname()[1]
 
     async def start(self) -> None:
-        """Raises ``OperationFailed`` where it cannot be started."""
+        """Begin to serve. Raises ``OperationFailed`` where that fails."""
         serving = self._serving = asyncio.create_task(
             self._server.serve(sockets=[self._bound]), name="page server"
         )

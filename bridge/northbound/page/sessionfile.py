@@ -38,7 +38,8 @@ class _File(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def credential_of(role: str, password_hash: str) -> str:
-    """What a session rests on: who has another password or role now has to log in again."""
+    """Hash of the role and password that a session rests on: when either changes, the user has to log in
+    again."""
     return hashlib.sha256(f"{role} {password_hash}".encode()).hexdigest()
 
 
@@ -50,7 +51,8 @@ class SessionFile:
         self._credentials = credentials
 
     def load(self, now: float) -> list[Session]:
-        """Those that still hold. A file that cannot be read is as none: everybody logs in again."""
+        """Sessions that are still valid. A file that cannot be read counts as none: everybody logs in
+        again."""
         try:
             kept = msgspec.json.decode(self._path.read_bytes(), type=_File)
         except FileNotFoundError:
@@ -67,7 +69,7 @@ class SessionFile:
         ]
 
     def save(self, sessions: list[Session]) -> None:
-        """Put them in the place of those of before, at once or not at all."""
+        """Replace the file, whole or not at all."""
         kept = [
             _Kept(one.key, one.user, int(one.role), one.began, one.used, one.address, credential)
             for one in sessions

@@ -1,4 +1,4 @@
-"""Who is logged in to the page. Sans-IO: times are monotonic seconds.
+"""Sessions of the page. Sans-IO: times are monotonic seconds.
 
 A session is known by two secrets: its id, which only the cookie has, and its token, which every change has to
 name. What another site makes a browser send has the cookie and not the token (OWASP, cross-site request
@@ -18,13 +18,13 @@ from typing import Final
 from bridge.command import Role
 
 IDLE_S: Final = 1800.0
-"""A session that nobody has used for this long ends."""
+"""Time after which an unused session ends, seconds."""
 LONGEST_S: Final = 12 * 3600.0
 MOST: Final = 256
 MOST_OF_ONE: Final = 16
 """Sessions of one user, or of visitors from one address, beside those with an open tab."""
 MOST_VISITORS: Final = 128
-"""Anybody may become one by asking: they leave room for who logs in."""
+"""Most sessions of visitors: anybody may become one by asking, and they leave room for users."""
 KEEP_EVERY_S: Final = 60.0
 _BYTES: Final = 32
 
@@ -48,7 +48,7 @@ class Session:
         return now >= self.used + IDLE_S or now >= self.began + LONGEST_S
 
     def has(self, token: str) -> bool:
-        """Whether this is its token; takes the same time for each."""
+        """True for its token; takes the same time for each."""
         return bool(self.token) and hmac.compare_digest(
             self.token.encode(), token.encode("utf-8", "surrogatepass")
         )
@@ -63,12 +63,12 @@ class Sessions:
         self._kept_at = 0.0
 
     def restore(self, sessions: Iterable[Session]) -> None:
-        """Those of a front before this one."""
+        """Take over the sessions of the front before this one."""
         self._sessions.update((one.key, one) for one in sessions)
 
     def take_changed(self, now: float) -> list[Session] | None:
-        """All of them where somebody has come or gone since the last call, or once a minute: that is to be
-        kept. None where nothing is."""
+        """All sessions, to be kept, if any has begun or ended since the last call or a minute has passed;
+        else None."""
         if not self._is_changed and now < self._kept_at + KEEP_EVERY_S:
             return None
         self._is_changed, self._kept_at = False, now
@@ -79,8 +79,8 @@ class Sessions:
         return len(self._sessions)
 
     def begin(self, user: str, role: Role, now: float, address: str = "") -> Session:
-        """A new one; where there are too many, the one goes that has been idle longest, of the same user or
-        visitor's address first. One with an open tab never goes: it may control a drive."""
+        """Begin a session. Where there are too many, the one that has been idle longest ends, of the same
+        user or visitor's address first. One with an open tab never ends: it may control a drive."""
         self._drop_old(now)
         everybody = list(self._sessions.values())
         own = [one for one in everybody if one.user == user and (user or one.address == address)]
@@ -107,7 +107,7 @@ class Sessions:
         return session
 
     def end(self, session: Session) -> None:
-        """May be called again."""
+        """End the session. May be called again."""
         if self._sessions.pop(session.key, None):
             self._is_changed = True
 
@@ -128,7 +128,8 @@ def _key_of(session_id: str) -> str:
 
 
 def _known_by(session: Session, session_id: str) -> None:
-    """The token cannot be told from what is kept: it needs the id, which nobody but the browser has."""
+    """The session with its id and token: the token cannot be made from what is kept, but needs the id, which
+    only the browser has."""
     if session.id != session_id:
         session.key = _key_of(session_id)
         session.id = session_id

@@ -1,5 +1,5 @@
-"""Who gets a tab, and whose connection gives way: shares per user and address instead of first come. Sans-IO,
-times in monotonic seconds."""
+"""Shares of tabs per user and of connections per address, instead of first come, first served. Sans-IO, times
+in monotonic seconds."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from bridge.command import Role
 
 MOST_TABS: Final = 64
 MOST_OF_USER: Final = 16
-"""Tabs of one user with however many logins, or of visitors from one address."""
+"""Most tabs of one user in all logins, or of visitors from one address."""
 FOR_ENGINEERS: Final = 1
-"""Tabs that only an engineer may take: somebody has to be able to look."""
+"""Tabs kept free for engineers: one must always be able to look."""
 MOST_CONNECTIONS: Final = 256
 MOST_WAITING_OF_ADDRESS: Final = 64
-"""Connections of one address on which nothing is under way: a browser opens six."""
+"""Most idle connections of one address: a browser opens six."""
 UNPROVED_S: Final = 6.0
-"""How long a tab's connection may be one that has not proved its session yet."""
+"""Longest time for a tab's connection to prove its session, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,22 +37,22 @@ class Seat:
 
     @property
     def who(self) -> str:
-        """By whom tabs are shared: a user, or the visitors of one address."""
+        """Holder of a share of the tabs: a user, or the visitors of one address."""
         return self.user or f"visitor {self.address}"
 
 
 @dataclass(frozen=True, slots=True)
 class Seating:
-    """Whether a tab is let in, and which of the others, by its place, gives way to it."""
+    """Decision on a tab: let in or not, and the place of the tab that gives way to it."""
 
     is_in: bool
     gives_way: int | None = None
 
 
 def admit(taken: Sequence[Seat], new: Seat) -> Seating:
-    """Who opens one more tab. Where all are taken, one of the least role gives way to a higher role; within a
-    role one of whoever has most to whoever would still have fewer. Who commands a drive never does: it would
-    stop."""
+    """Decision on one more tab. Where all are taken, a tab of the lowest role gives way to a higher role;
+    within a role, one of the holder with most tabs gives way to a holder who would still have fewer. A tab
+    that commands a drive never gives way: the drive would stop."""
     shares = Counter(one.who for one in taken)
     if shares[new.who] >= MOST_OF_USER:
         return Seating(is_in=False)
@@ -69,14 +69,14 @@ def admit(taken: Sequence[Seat], new: Seat) -> Seating:
 
 
 class Doing(IntEnum):
-    """What a connection does; the first give way first."""
+    """Activity of a connection, in the order in which they give way."""
 
     SILENT = 0
-    """Nothing was asked on it yet."""
+    """No request has come yet."""
     KEPT = 1
-    """It was answered, and is kept for the next request."""
+    """Its request was answered, and it is kept for the next one."""
     UNPROVED = 2
-    """A tab's, that may not have proved its session yet."""
+    """It is a tab's, and may not have proved its session yet."""
     BUSY = 3
 
 
@@ -88,7 +88,7 @@ _LIMITS: Final = Limits(
 
 
 class _Doing:
-    """What one connection does, and since when."""
+    """Activity of one connection, and since when."""
 
     __slots__ = ("_clock", "doing", "since")
 
@@ -97,7 +97,8 @@ class _Doing:
         self.doing, self.since = Doing.SILENT, clock()
 
     def stage(self) -> Stage:
-        """A tab that may not have proved its session yet may be nobody's."""
+        """Stage of the connection: a tab younger than ``UNPROVED_S`` may have no session yet, and gives way
+        before those that have."""
         if self.doing is not Doing.UNPROVED:
             return _STAGES[self.doing]
         return Stage.SESSION if self._clock() >= self.since + UNPROVED_S else Stage.CHANNEL
@@ -117,7 +118,7 @@ class Connections(Generic[_Id]):
         return len(self._admission)
 
     def opened(self, one: _Id, address: str) -> bool:
-        """A new one; False where there is no room for it."""
+        """Note a new connection; False where there is no room for it."""
         does = _Doing(self._clock)
         visitor = Visitor(address, does.since, does.stage, lambda: self._end(one))
         is_in = self._admission.admit(visitor, does.since)
@@ -133,7 +134,7 @@ class Connections(Generic[_Id]):
             does.since = visitor.since = self._clock()
 
     def closed(self, one: _Id) -> None:
-        """May be called again."""
+        """Note that it is closed. May be called again."""
         held = self._open.pop(one, None)
         if held is not None:
             self._admission.leave(held[1])

@@ -17,14 +17,15 @@ from bridge.command import Role
 from bridge.northbound.page.sessions import Session
 
 MOST_LINES = 500
-"""Of the audit log."""
+"""Most lines of the audit log in one answer."""
 _Told = TypeVar("_Told")
 _encode = msgspec.json.Encoder().encode
 
 
 @dataclass(frozen=True, slots=True)
 class CertificateFacts:
-    """``of`` is whose it is: ``opcua``, ``page`` or a client's file; ``until`` is in seconds since 1970."""
+    """One certificate. ``of`` is its owner: ``opcua``, ``page`` or a client's file; ``until`` is in seconds
+    since 1970."""
 
     of: str
     subject: str
@@ -34,14 +35,15 @@ class CertificateFacts:
 
 @dataclass(frozen=True, slots=True)
 class Unreadable:
-    """``of`` as in ``CertificateFacts``, or the name of a part of the system; ``text`` is why."""
+    """A part that could not be read. ``of`` as in ``CertificateFacts``, or the name of a part of the system;
+    ``text`` is the reason."""
 
     of: str
     text: str
 
 
 class SystemFacts(Protocol):
-    """What the page shows of the service. All of it may take a moment, and is asked for in a thread."""
+    """Facts of the service that the page shows. Each may take a moment and is asked for in a thread."""
 
     def versions(self) -> dict[str, str]: ...
 
@@ -56,7 +58,7 @@ class SystemFacts(Protocol):
         ...
 
     def check(self) -> list[dict[str, Any]]:
-        """What ``drivebridge check`` says of the site file as it is now: severity, line, text."""
+        """Findings of ``drivebridge check`` on the site file as it is now: severity, line, text."""
         ...
 
     def audit(self, lines: int) -> list[dict[str, Any]]:
@@ -65,8 +67,8 @@ class SystemFacts(Protocol):
 
 
 class System:
-    """Routes for ``facts``; ``tabs`` tells who has the page open, ``session_of`` who asks. What tells of
-    people and files is for engineers."""
+    """Routes for ``facts``; ``tabs`` lists the open tabs, ``session_of`` gives the session of a request.
+    Facts on people and files are for engineers."""
 
     def __init__(
         self,
@@ -86,7 +88,8 @@ class System:
         ]
 
     async def _system(self, request: Request) -> Response:
-        """``faults`` has what cannot be told, and why: of each certificate, or of a whole part."""
+        """Answer with all facts; ``faults`` has those that could not be read, with the reason, by certificate
+        or whole part."""
         session = self._session_of(request)
         if session is None:
             return JSONResponse({"error": "login"}, 401)
@@ -123,7 +126,8 @@ class System:
         return self._facts.audit(MOST_LINES)
 
     async def _asked(self, ask: Callable[[], _Told], nothing: _Told, faults: list[Unreadable]) -> _Told:
-        """What ``ask`` says; where it fails ``nothing``, and one more of ``faults``: the rest is told."""
+        """Answer of ``ask``; where it fails ``nothing`` and one more entry in ``faults``, so that the rest is
+        still shown."""
         with self._guard:
             return await asyncio.to_thread(ask)
         faults.append(Unreadable(ask.__name__, "this failed: the log of the service has more"))

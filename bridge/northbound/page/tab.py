@@ -1,4 +1,4 @@
-"""One tab's WebSocket with what waits to be sent on it. Nobody waits for a client that takes nothing."""
+"""WebSocket of one tab, with a queue of its own: a client that takes nothing holds up nobody else."""
 
 from __future__ import annotations
 
@@ -14,28 +14,29 @@ from bridge.northbound.page.viewer import Viewer
 from bridge.northbound.view import View
 
 _MOST_WAITING: Final = 8
-"""Messages that a tab has not taken yet; one more, and it gets the state anew."""
+"""Most messages that a tab has not taken yet; with one more it gets the whole state instead."""
 _MOST_OUTCOMES: Final = 1000
 _CLOSE_S: Final = 2.0
-"""How long a client may take to let itself be told why it is closed."""
+"""Longest time for a client to take the reason of its closing, seconds."""
 SESSION_OVER: Final = 4401
 NO_TOKEN: Final = 4403
 TOO_MANY: Final = 4429
 BAD_MESSAGE: Final = 1008
 TOO_SLOW: Final = 1013
 GONE: Final = (WebSocketDisconnect, RuntimeError, OSError)
-"""What is raised where the client has gone, or is being closed already."""
+"""Errors that are raised where the client has gone, or is being closed already."""
 
 
 async def close(socket: WebSocket, code: int, reason: str = "") -> None:
-    """Close it as far as somebody is there; of one that takes nothing, only the time that it has for it."""
+    """Close the socket, if the client is still there; one that takes nothing is given up after
+    ``_CLOSE_S``."""
     with suppress(*GONE):
         async with asyncio.timeout(_CLOSE_S):
             await socket.close(code, reason)
 
 
 class Tab:
-    """``since_ms`` is when it was opened, in ms since 1970."""
+    """One open tab. ``since_ms`` is when it was opened, in ms since 1970."""
 
     def __init__(self, socket: WebSocket, session: Session, view: View, since_ms: float) -> None:
         self.since_ms = round(since_ms)
@@ -54,7 +55,7 @@ class Tab:
         return self._closing is not None
 
     def tell(self, data: bytes) -> None:
-        """Have it sent in its turn. A tab for which a thousand messages wait already is closed: it would wait
+        """Queue a message. A tab for which ``_MOST_OUTCOMES`` messages wait already is closed: it would wait
         for ever for an outcome that is left out."""
         if self._closing:
             return
@@ -64,27 +65,27 @@ class Tab:
         self._queue.put_nowait(data)
 
     def show(self, data: bytes) -> None:
-        """As ``tell``; left out where much waits already: the state will follow instead."""
+        """Like ``tell``, but left out where much waits already: the whole state will follow instead."""
         if self._queue.qsize() >= _MOST_WAITING:
             self._is_behind = True
         elif not self._is_behind:
             self.tell(data)
 
     def has_caught_up(self) -> bool:
-        """True once where it had been behind and has taken everything."""
+        """True once after it was behind and has taken everything."""
         if self._is_behind and self._queue.empty():
             self._is_behind = False
             return True
         return False
 
     def close(self, code: int, reason: str = "") -> None:
-        """Give back what it owns, and have it closed soon, whether it takes that or not."""
+        """Give back the drives it controls, and close it soon, whether its client takes that or not."""
         if self._closing is None:
             self._closing = asyncio.create_task(self._close(code, reason), name="closing a tab")
             self.viewer.leave()
 
     async def serve(self, on_message: Callable[[str], None]) -> None:
-        """Until it is closed."""
+        """Serve the tab until it is closed."""
         sending = asyncio.create_task(self._send_all(), name="messages to a tab")
         self._listening = asyncio.create_task(self._listen(on_message), name="messages of a tab")
         try:

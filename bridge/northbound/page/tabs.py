@@ -1,4 +1,4 @@
-"""The tabs that show the page: what is sent to each, and when."""
+"""Open tabs of the page: what is sent to each, and when."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from bridge.northbound.view import View
 from bridge.text import as_json
 
 _TICK_S: Final = 0.05
-"""A trend has a row for each tick."""
+"""Time between two ticks, seconds; a trend has a row for each."""
 _BEAT: Final = 2
 """Ticks from one message to the next."""
 _TROUBLES: Final = 4
-"""Ticks from one look for troubles to the next while a tab is open."""
+"""Ticks between two updates of the troubles while a tab is open."""
 _LOOK: Final = 20
-"""Ticks from one look at the sessions of the tabs to the next, and from one time that tabs are told."""
+"""Ticks between two checks of the tabs' sessions, and between two messages with the time."""
 _EVENTS_KEPT: Final = 200
 _TOKEN_S: Final = 5.0
 _encode = msgspec.json.Encoder().encode
 
 
 class Tabs:
-    """Has each open tab shown what it asks for. ``clock`` is monotonic."""
+    """Sends each open tab what it asks for. ``clock`` is monotonic."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class Tabs:
         clock: Callable[[], float],
     ) -> None:
         self.keep: Callable[[list[Session]], None] = lambda sessions: None
-        """Takes the sessions for a front after this one."""
+        """Keeps the sessions for the front after this one."""
         self._view = view
         self._sessions = sessions
         self._hearings = hearings
@@ -66,7 +66,7 @@ class Tabs:
 
     @asynccontextmanager
     async def serving(self) -> AsyncGenerator[None]:
-        """While this lasts, tabs are told what changes."""
+        """While this context lasts, tabs are sent the changes."""
         self._view.on_event(self._on_event)
         self._troubles.beat()
         beating = asyncio.create_task(self._run(), name="beat of the page")
@@ -82,10 +82,8 @@ class Tabs:
             self._topics.close()
 
     async def serve(self, socket: WebSocket, session: Session | None) -> None:
-        """Serve one tab until it is closed; ``session`` is that of its cookie.
-
-        Who is refused is let in before, because a browser tells its page no code otherwise.
-        """
+        """Serve one tab until it is closed; ``session`` is that of its cookie. A tab to be refused is
+        accepted first: a browser passes no closing code to its page otherwise."""
         with suppress(*GONE):
             await socket.accept()
         code = await self._refusal(socket, session)
@@ -113,7 +111,7 @@ class Tabs:
         return 0 if self._finds_room(session, socket) else TOO_MANY
 
     def _finds_room(self, session: Session, socket: WebSocket) -> bool:
-        """Whether there is a tab left for this session, or one gives way to it."""
+        """True where there is a tab left for this session, or one gives way to it."""
         seated = [tab for tab in self._tabs if not tab.is_closing]
         taken = [
             Seat(
@@ -139,7 +137,7 @@ class Tabs:
 
     @property
     def shown(self) -> list[dict[str, Any]]:
-        """For JSON: who has the page open, from where, since when in ms since 1970, and what it shows."""
+        """Open tabs, for JSON: user, address, time of opening in ms since 1970, and the topics shown."""
         return [
             {
                 "who": str(tab.viewer.identity),
@@ -199,7 +197,7 @@ class Tabs:
                 tab.rows.append([now_ms, *_values(self._view.image, tab.viewer.followed)])
 
     def _look_for_troubles(self) -> None:
-        """Also while nobody looks, because each has the time when it began."""
+        """Update the troubles, also while no tab is open: each has the time when it began."""
         if self._troubles.beat():
             told = self._troubles_told()
             for tab in self._tabs:
@@ -224,20 +222,21 @@ class Tabs:
         self._hearings.beat(wishes, self._clock(), counts=counts)
 
     def _look_at_sessions(self) -> None:
-        """A tab that is open uses its session. Nothing here waits for a client."""
+        """Count the sessions of open tabs as used. Nothing here waits for a client."""
         for session in {tab.session for tab in self._tabs}:
             if self._sessions.find(session.id, self._clock()) is None:
                 self.end(session)
         self.keep_sessions()
 
     def keep_sessions(self) -> None:
-        """For a front after this one, as far as they have changed."""
+        """Keep changed sessions for the front after this one."""
         sessions = self._sessions.take_changed(self._clock())
         if sessions is not None:
             self.keep(sessions)
 
     def _tell_time(self) -> None:
-        """A tab that is told nothing for some seconds knows by this that its connection or we hang."""
+        """Send the time: a tab that gets nothing for some seconds takes its connection, or this front, as
+        hung."""
         now = _encode({"now": round(self._epoch_ms())})
         for tab in self._tabs:
             tab.show(now)

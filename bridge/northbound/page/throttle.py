@@ -1,4 +1,4 @@
-"""How often one address may guess passwords. Sans-IO: times are monotonic seconds."""
+"""Limit of password guesses per address. Sans-IO: times are monotonic seconds."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Final, TypeVar
 
 FREE: Final = 5
-"""Wrong passwords of one user in a row that cost nothing but their check."""
+"""Wrong passwords of one user in a row without a pause."""
 FREE_OF_ADDRESS: Final = 20
-"""Of all users together: those of several people behind one address."""
+"""Free guesses of one address for all users together: several people may be behind it."""
 FIRST_PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 300.0
 FORGOTTEN_S: Final = 3600.0
@@ -63,7 +63,7 @@ class Throttle:
         return 0.0
 
     def withdrawn(self, address: str, user: str) -> None:
-        """A login that was counted is not checked after all."""
+        """Uncount a login that is not checked after all."""
         for known in (self._users.get((address, user[:_LONGEST_NAME])), self._addresses.get(address)):
             if known:
                 known.failures = max(0, known.failures - 1)

@@ -1,4 +1,4 @@
-"""What a viewer is shown: points by topic, as a state and then as what has changed. Sans-IO.
+"""Points by topic for the viewers, as a state and then as changes. Sans-IO.
 
 A topic is a group of points that a page shows together: ``plant``, ``drive <node>/<drive>``, ``node <node>``,
 ``bus <bus>``. The message of each beat is encoded once for all viewers of a topic. A viewer that is slower
@@ -33,7 +33,7 @@ _IN_TILES: Final = (
     "supervision/fieldbus_timeout_ms",
     "supervision/restart_interlock",
 )
-"""What the plant shows of each drive beside its setpoints and actual values."""
+"""Points of each drive on the plant's page, beside its setpoints and actual values."""
 
 
 def topics_of(points: Sequence[Point], layout: Layout) -> dict[str, list[int]]:
@@ -86,7 +86,7 @@ class Topics:
         return _encode({"topic": topic, "state": self._shown(self.places[topic])})
 
     def beat(self, topics: Iterable[str]) -> dict[str, bytes]:
-        """What has changed since the last beat, for each of ``topics`` where something has."""
+        """JSON message of the changes since the last beat, for each of ``topics`` that has any."""
         changed: dict[str, list[int]] = {}
         wanted = set(topics)
         for index in self._feed.take(_MOST_AT_ONCE):

@@ -1,4 +1,4 @@
-"""What is wrong on the plant, as the bus process tells it in its points. Sans-IO.
+"""Troubles of the plant, as the bus process publishes them in its points. Sans-IO.
 
 The bus process has judged it, and when each thing began: a front that starts anew knows as much as the one
 before. Only that the bus process does not answer is found out here.
@@ -21,7 +21,7 @@ _decode = msgspec.json.Decoder(list[dict[str, Any]]).decode
 
 
 class Troubles:
-    """Looks at the image as often as it is asked. ``epoch_ms`` is the time of day."""
+    """Troubles read from the image. ``epoch_ms`` is the time of day in ms since 1970."""
 
     def __init__(self, image: Image, epoch_ms: Callable[[], float]) -> None:
         self._look = Look(image)
@@ -29,13 +29,14 @@ class Troubles:
         self._dead: dict[str, Any] | None = None
         self._told: tuple[str, str] = "", ""
         self.shown: list[dict[str, Any]] = []
-        """For JSON, as ``condition.told`` has it; the worst first."""
+        """Troubles for JSON, as ``condition.told`` has them; the worst first."""
         self.recent: list[dict[str, Any]] = []
         self.waiting = 0
-        """How many drives do not tell their state yet, though nothing is wrong with them: they start up."""
+        """Number of drives that have not reported their state yet though nothing is wrong with them: they
+        start up."""
 
     def beat(self) -> bool:
-        """Look again; whether ``shown``, ``waiting`` or ``recent`` is another one now."""
+        """Look again. True if ``shown``, ``waiting`` or ``recent`` has changed."""
         before = self.shown, self.waiting, self.recent
         if is_bridge_dead(self._look):
             self._dead = self._dead or self._bridge_dead()

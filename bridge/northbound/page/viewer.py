@@ -1,4 +1,4 @@
-"""One tab that shows the page: what it asks, and what it owns. Sans-IO.
+"""One tab of the page: its requests, and the drives that it controls. Sans-IO.
 
 A tab is a controller like any other. It commands under an identity of its own, so that two tabs of one person
 are two controllers; it renews its leases itself, by messages that it sends while it is in the foreground; and
@@ -21,13 +21,13 @@ from bridge.northbound.view import View
 from bridge.text import Text, as_json
 
 MOST_BYTES: Final = 16_384
-"""Of one message."""
+"""Largest message from a tab, bytes."""
 _MESSAGES, _EVERY_S = 100, 0.02
-"""So many messages may come at once, and one in every so many seconds after that."""
+"""Limit of messages from a tab: ``_MESSAGES`` at once, then one in ``_EVERY_S`` seconds."""
 _MOST_TOPICS: Final = 16
 MOST_FOLLOWED: Final = 12
 _HIGHEST: Final = 2**53 - 1
-"""The highest whole number that JavaScript counts to."""
+"""Largest integer that JavaScript holds exactly."""
 _FIELDS: Final[dict[Action, tuple[str, ...]]] = {
     Action.WRITE: ("values",),
     Action.START: ("direction",),
@@ -36,28 +36,28 @@ _FIELDS: Final[dict[Action, tuple[str, ...]]] = {
     Action.READ_PARAMETER: ("parameter", "max_age_ms"),
     Action.WRITE_PARAMETER: ("parameter", "value"),
 }
-"""The fields that a message may give for an action; all others have none."""
+"""Fields of a request by action; all other actions have none."""
 
 
 class BadMessage(Exception):
-    """What the tab sent is no message of ours: the connection ends with this reason."""
+    """The tab sent something that is no message of ours: the connection ends with this reason."""
 
 
 class _Show(msgspec.Struct, forbid_unknown_fields=True):
-    """The topics that are shown from now on."""
+    """Message with the topics that are shown from now on."""
 
     show: list[str]
 
 
 class _Trend(msgspec.Struct, forbid_unknown_fields=True):
-    """The points whose course is followed from now on. ``number`` comes back with their rows."""
+    """Message with the points whose trend is drawn from now on. ``number`` comes back with their rows."""
 
     trend: list[str]
     number: Annotated[int, msgspec.Meta(ge=0, le=_HIGHEST)] = 0
 
 
 class _Ask(msgspec.Struct, forbid_unknown_fields=True):
-    """A request with a number, by which its outcome is known."""
+    """Message with a request; its outcome comes back with the same number."""
 
     ask: int
     target: str
@@ -66,13 +66,13 @@ class _Ask(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class _Hear(msgspec.Struct, forbid_unknown_fields=True):
-    """What of the traffic on a bus is shown from now on; null: nothing."""
+    """Filter for the traffic that is shown from now on; null shows none."""
 
     hear: Wish | None
 
 
 class _Hidden(msgspec.Struct, forbid_unknown_fields=True):
-    """The tab is not in the foreground any more: what it owns is given back."""
+    """Message of a tab that is not in the foreground any more: the drives it controls are given back."""
 
     hidden: bool
 
@@ -97,21 +97,21 @@ class Viewer:
         self.topics: tuple[str, ...] = ()
         self.followed: tuple[int, ...] = ()
         self.choice = 0
-        """The tab's own number for what it follows."""
+        """Number that the tab gave its present trend."""
         self.wish: Wish | None = None
-        """What it wants to hear of a bus."""
+        """Filter for the traffic that it shows, None for none."""
         self._places = view.image.index
         self._view = view
         self._tell = tell
         self._owned: dict[str, None] = {}
-        """What it has taken and not given back, as far as outcomes say."""
+        """Drives and outputs that it controls, as far as outcomes say, in the order of taking them."""
         self._left = 0
-        """How often it has let go of everything."""
+        """Number of times that it gave up everything it controls."""
         self._limit = RateLimit(_MESSAGES, _EVERY_S)
 
     @property
     def commands(self) -> bool:
-        """Whether it has taken something and not given it back."""
+        """True while it controls something."""
         return bool(self._owned)
 
     def on_message(self, data: bytes, now: float, known: Callable[[str], bool]) -> None:
@@ -202,8 +202,8 @@ class Viewer:
             self._owned.pop(ask.target, None)
 
     def leave(self) -> None:
-        """Give back what it owns: the tab is hidden, closed or cut off. What is not given back because the
-        bus process does not answer ends with its lease."""
+        """Give back the drives it controls: the tab is hidden, closed or cut off. Where the bus process does
+        not answer, control ends with the lease."""
         self._left += 1
         owned, self._owned = self._owned, {}
         for target in owned:

@@ -45,7 +45,7 @@ _log = logging.getLogger(__name__)
 
 STATIC: Final = Path(__file__).parent / "static"
 _MOST_CHECKS: Final = 8
-"""Passwords that wait to be checked at a time."""
+"""Most passwords that wait to be checked at a time."""
 _BODY_S: Final = 5.0
 _ROLES: Final = {"observer": Role.OBSERVER, "operator": Role.OPERATOR, "engineer": Role.ENGINEER}
 _encode = msgspec.json.Encoder().encode
@@ -57,23 +57,23 @@ FaultTexts = Mapping[str, Mapping[str, Mapping[str, Mapping[str, str]]]]
 
 @dataclass(frozen=True, slots=True)
 class Backstage:
-    """What the page shows beside the points: made by who may look at files, buses and the system."""
+    """Sources of what the page shows beside the points: files, buses and the system."""
 
     fault_texts: FaultTexts
     exports: Mapping[str, Export]
     ears: Sequence[tuple[str, int, Ear]]
-    """Of each bus its name, bit rate and an ear."""
+    """Name, bit rate in bit/s and tap of each bus."""
     layouts: Mapping[str, Any]
     capture: Capture
     counts: Counts
     dictionaries: Mapping[str, Path]
-    """The makers' descriptions of devices, by mapping."""
+    """Makers' device descriptions by mapping."""
     system: SystemFacts
 
 
 class _Files(StaticFiles):
-    """A browser asks each time whether a file is still the same: after an update no module of before may be
-    loaded beside new ones."""
+    """Static files that a browser revalidates each time: after an update, old modules must not be loaded
+    beside new ones."""
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
@@ -82,7 +82,7 @@ class _Files(StaticFiles):
 
 
 class _OfCookie(TypedDict):
-    """Without its attributes a browser does not take that a cookie is deleted."""
+    """Attributes of the cookie: without them a browser does not delete it."""
 
     path: str
     httponly: bool
@@ -175,13 +175,13 @@ class Page:
 
     @property
     def shown(self) -> list[dict[str, Any]]:
-        """Who has the page open, as ``Tabs.shown``."""
+        """Tabs that are open, as ``Tabs.shown``."""
         return self._tabs.shown
 
     # who asks
 
     def _credentials(self, users: Iterable[UserTable]) -> dict[str, str]:
-        """What the sessions of each user rest on, and under the empty name those of visitors."""
+        """Credential hash of each user, and under the empty name that of visitors."""
         credentials = {user.name: credential_of(user.role, user.password_hash) for user in users}
         if self._anonymous is not None:
             credentials[""] = credential_of(self._anonymous.name, "")
@@ -195,12 +195,12 @@ class Page:
         return self._session_of(connection) is not None
 
     def _has_token(self, connection: HTTPConnection) -> bool:
-        """Whether it comes from our page, and not only with its cookie."""
+        """True if the request comes from our page, by its token, and not only with its cookie."""
         session = self._session_of(connection)
         return session is not None and session.has(connection.headers.get("x-token", ""))
 
     def _begin(self, request: Request, user: str, role: Role) -> Response:
-        """A new session, and who that is."""
+        """Answer that begins a session and describes it."""
         session = self._sessions.begin(user, role, self._clock(), _address_of(request))
         return self._with_cookie(self._shown(session), session)
 
@@ -219,7 +219,7 @@ class Page:
         return response
 
     async def _session(self, request: Request) -> Response:
-        """Who this browser is; where anybody may read, it becomes a visitor by asking."""
+        """Session of this browser; where anybody may read, it becomes a visitor by asking."""
         session = self._session_of(request)
         if session is not None:
             return self._json(self._shown(session))
@@ -277,7 +277,7 @@ class Page:
         )
 
     async def _faults(self, request: Request) -> Response:
-        """What the families call their faults in another language."""
+        """Fault texts of the families in another language."""
         if self._session_of(request) is None:
             return self._json({"error": "login"}, 401)
         language = request.path_params["language"]
@@ -287,7 +287,7 @@ class Page:
         return Response(_encode(self._fault_texts[language]), headers=headers, media_type="application/json")
 
     async def _texts(self, request: Request) -> Response:
-        """Templates of what the bridge says."""
+        """Templates of the bridge's texts in a language."""
         if self._session_of(request) is None:
             return self._json({"error": "login"}, 401)
         language = request.path_params["language"]
@@ -314,7 +314,8 @@ async def _index(request: Request) -> Response:
 
 
 async def body_of(request: Request, most: int) -> bytes:
-    """Raises ``TimeoutError`` for one that dribbles, ``ValueError`` for one of more than ``most`` bytes."""
+    """Body of a request. Raises ``TimeoutError`` for one that comes too slowly, ``ValueError`` for one of
+    more than ``most`` bytes."""
     body = bytearray()
     async with asyncio.timeout(_BODY_S):
         async for chunk in request.stream():

@@ -4,10 +4,10 @@ import { signal } from "./ui.js";
 import { ended, session } from "./session.js";
 
 const RETRY_MS = [500, 1000, 2000, 4000];
-/** The server says something every second. A link that is half open, or a server that hangs, does not. */
+/** Longest silence, ms: the server sends something every second, a half-open link or a hung server does not. */
 const SILENCE_MS = 3000;
 const LOOK_MS = 500;
-/** Longer than the bridge takes for the slowest of its answers. */
+/** Longest wait for an answer, ms: longer than the bridge takes for the slowest. */
 const ANSWER_MS = 15_000;
 const SESSION_OVER = [4401, 4403];
 const TOO_MANY = 4429;
@@ -15,7 +15,7 @@ const UNREACHABLE = Object.freeze({ ok: false, code: "not_connected", message: "
 const UNANSWERED = Object.freeze({ ok: false, code: "timed_out", message: "", forwarded: false });
 
 export const isConnected = signal(false);
-/** Whether the server has no room for this tab. */
+/** True if the server has no room for this tab. */
 export const isOneTooMany = signal(false);
 
 let socket = null;
@@ -40,7 +40,7 @@ export function disconnect() {
   drop();
 }
 
-/** Whether it could be sent. */
+/** Sends a message. Returns true if it could be sent. */
 export function send(message) {
   if (socket?.readyState !== WebSocket.OPEN) return false;
   socket.send(JSON.stringify(message));
@@ -63,7 +63,7 @@ function open() {
   address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
   const mine = (socket = new WebSocket(address));
   heardAt = performance.now();
-  // What one socket still says when another has been opened counts no more.
+  // Messages of an old socket do not count once another has been opened.
   const own = (act) => (event) => mine === socket && act(event);
   mine.onopen = own(onOpen);
   mine.onmessage = own(onMessage);
@@ -76,7 +76,7 @@ function onOpen() {
   listeners.onReady();
 }
 
-// Only who is let in hears something: a tab that is refused is told by how its socket is closed.
+// Only an accepted tab gets messages: a refused one gets the reason with the closing code.
 function onMessage(event) {
   tries = 0;
   isConnected.value = true;

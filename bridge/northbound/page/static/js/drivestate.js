@@ -1,10 +1,10 @@
-// The state in which people see a drive, and which of its values may be taken for true.
+// State of a drive as the page shows it, and its values as far as they are good.
 
 import { isConnected } from "./live.js";
 import { label } from "./site.js";
 import { quality, value } from "./values.js";
 
-/** The value of a point while it is good, else null: nobody knows whether what is old still holds. */
+/** The value of a point while it is good, else null: an old value may not hold any more. */
 export const good = (name) => (quality(name) === "good" ? value(name) : null);
 
 /** The label of a state while it is good, else "unknown". */
@@ -13,7 +13,7 @@ export function goodLabel(name) {
   return code === null ? "unknown" : label(name, code);
 }
 
-/** The state that the drive itself tells; "lost" where it is not heard. */
+/** The state that the drive itself reports; "lost" where it is not heard. */
 export function ownState(drive) {
   const state = `${drive}/status/state`;
   const kind = quality(state);

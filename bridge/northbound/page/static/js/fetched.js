@@ -1,11 +1,11 @@
-// Asks the server for something, and says what became of it: there is a value or a failure, never neither.
+// Requests to the server: each gives a value or a failure, never neither.
 
 import { html, useEffect, useRef, useState } from "./ui.js";
 import { maybe, t } from "./texts.js";
 
 const LIMIT_MS = 30_000;
 
-/** {value}, or {failure} in words. `read` makes the value of the answer.
+/** Result of one request: {value}, or {failure} in words. `read` makes the value of the answer.
  * @param {string} address
  * @param {{method?: string, headers?: any, body?: any, limitMs?: number, read?: (answer: Response) => Promise<any>}} options
  * @returns {Promise<{value?: any, failure?: string}>} */
@@ -23,8 +23,8 @@ async function reasonOf(answer) {
   return maybe(`refusal.${error}`) || error || t("fetched.status", { status: answer.status });
 }
 
-/** {value, failure, isBusy, again} for what is at `address`; asked for anew by `again`, and every `everyMs`. A value
- * that could not be had anew stays, beside the failure. */
+/** {value, failure, isBusy, again} for the resource at `address`; requested again by `again`, and every `everyMs`. When a
+ * new request fails, the old value stays beside the failure. */
 export function useFetched(address, everyMs = 0) {
   const [state, setState] = useState({ isBusy: true });
   const turn = useRef(0);
@@ -46,7 +46,7 @@ export function useFetched(address, everyMs = 0) {
   return { ...state, again: load };
 }
 
-/** Why there is nothing, or nothing new, with a button that tries once more; nothing while all is well. */
+/** The failure with a button that tries once more; nothing while all is well. */
 export function Failure({ told }) {
   if (!told.failure) return null;
   const key = told.value === undefined ? "fetched.failed" : "fetched.old";

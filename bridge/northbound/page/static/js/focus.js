@@ -1,6 +1,6 @@
-// Where the keyboard and a screen reader are, in a page whose parts are exchanged.
+// Focus of keyboard and screen reader in a page whose parts are exchanged.
 
-/** To the page's own part. The address stays as it is: it says which page is shown. */
+/** Moves the focus to the page's own part. The address stays: it is the route of the page. */
 export function toMain(event) {
   event?.preventDefault();
   document.getElementById("main")?.focus();
@@ -8,7 +8,7 @@ export function toMain(event) {
 
 let isFirst = true;
 
-/** Another page is shown: it begins at its top, and whoever came by a link is there with the keyboard, too. */
+/** Scrolls to the top of a newly shown page; the focus goes there, too, where a link was followed. */
 export function onRoute() {
   if (isFirst) return void (isFirst = false);
   scrollTo(0, 0);

@@ -51,7 +51,7 @@ export function inFull(value, unit = "") {
   return unit ? `${shown}\u202f${unit}` : shown;
 }
 
-/** What is allowed, with its unit: "-100 … 99.9 Hz"; the unit alone where nothing is limited. */
+/** The permitted range with its unit: "-100 … 99.9 Hz"; the unit alone where nothing is limited. */
 export function range(low, high, unit = "") {
   const has = (one) => typeof one === "number";
   const [least, most] = [has(low) && limit(low, unit, Math.ceil), has(high) && limit(high, unit, Math.floor)];
@@ -60,8 +60,8 @@ export function range(low, high, unit = "") {
   return unit;
 }
 
-// A limit comes from the bits of a word, such as 199.994: its decimals tell nobody anything. They are left out towards
-// the inside, so that what is shown as allowed is.
+// A limit comes from the bits of a word, such as 199.994: its decimals are meaningless. They are rounded off towards
+// the inside, so that every value shown as allowed is allowed.
 function limit(value, unit, inwards) {
   for (let decimals = DECIMALS[unit] ?? 2; decimals < 9; decimals++) {
     const step = 10 ** decimals;

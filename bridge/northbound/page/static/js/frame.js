@@ -1,4 +1,4 @@
-// What is around every page: the site's name, the menu, who is logged in, and what is wrong, in a sentence.
+// Frame around every page: the site's name, the menu, the user, and the plant's condition in a sentence.
 
 import { classes, html, useEffect } from "./ui.js";
 import { isOneTooMany } from "./connection.js";
@@ -63,7 +63,7 @@ function onVisibility() {
   if (document.hidden) leave();
 }
 
-// The one line that says how the plant is.
+// The plant's condition in one line.
 function Sentence() {
   const isKnown = isConnected.value && (troubles.value?.length || !waiting.value);
   const rank = isKnown ? worst(troubles.value) : "unknown";

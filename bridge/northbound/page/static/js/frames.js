@@ -1,4 +1,4 @@
-// When to draw: one thing a frame, and each at the frame's beginning.
+// Schedule of drawing: one job a frame, each at the frame's beginning.
 //
 // A browser that is idle begins a frame as soon as one is asked for. Where that is shortly before the screen is due,
 // the frame comes late. So while values come it is kept from being idle, by frames in which nothing is drawn.

@@ -1,12 +1,12 @@
-// Asks before a page is left on which this tab moves a drive: who leaves it gives the drive back, and it stops.
+// Question before a page is left on which this tab moves a drive: leaving gives the drive back, and it stops.
 
 import { signal } from "./ui.js";
 
-/** What waits for the reader's answer: {go()}, or null. */
+/** Step that waits for the reader's answer: {go()}, or null. */
 export const leaving = signal(null);
 let isMoving = () => false;
 
-/** From now on `test` says whether leaving would stop a drive; until the function that is returned is called. */
+/** Registers `test`, true while leaving would stop a drive. The function returned withdraws it. */
 export function whileMoving(test) {
   isMoving = test;
   return () => {
@@ -15,7 +15,7 @@ export function whileMoving(test) {
   };
 }
 
-/** Does `go` at once where that stops nothing, else when the reader has agreed. */
+/** Calls `go` at once where that stops nothing, else when the reader has agreed. */
 export function leaveBy(go) {
   if (!isMoving()) return void go();
   leaving.value = { go };

@@ -1,8 +1,8 @@
-// What this tab shows arrives here.
+// Messages of the server to this tab.
 //
 // The server sends {topic, state} once for each topic that is shown and {topic, changes} after that, {troubles,
 // waiting, recent}, {events} once and each {event} after that, {trend: [[time, value, ...], ...], number}, {heard}, and each
-// second {now}. Whatever came is drawn once a frame at most.
+// second {now}. All of it is drawn once a frame at most.
 
 import { batch, signal } from "./ui.js";
 import * as connection from "./connection.js";
@@ -12,18 +12,18 @@ import { lose, take } from "./values.js";
 const MOST_EVENTS = 200;
 
 export { ask, isConnected } from "./connection.js";
-/** What is wrong, the worst first; null until the server has told. */
+/** Troubles, the worst first; null until the server has sent them. */
 export const troubles = signal(null);
-/** What was wrong and is over, the latest first: troubles with `until` and `times`. */
+/** Troubles that are over, the latest first, with `until` and `times`. */
 export const recent = signal([]);
-/** How many drives are not ready yet, without anything being wrong. */
+/** Number of drives that are not ready yet though nothing is wrong. */
 export const waiting = signal(0);
-/** The newest first. */
+/** Events, the newest first. */
 export const events = signal([]);
-/** Who this tab is as a controller: what `owner` says of a drive that it has taken. */
+/** Identity of this tab as a controller: the `owner` of a drive that it has taken. */
 export const self = signal("");
 
-/** Who this tab has been since it was opened: another one after each loss of its connection. */
+/** Identities of this tab since it was opened: another one after each loss of its connection. */
 const selves = new Set();
 
 export const hasBeen = (owner) => selves.has(owner);
@@ -41,32 +41,32 @@ export function connect() {
 
 export const disconnect = connection.disconnect;
 
-/** The time on the box, in ms since 1970: what it says of times is told by its clock. */
+/** Time on the box, in ms since 1970: all times of the server are by its clock. */
 export function now() {
   return Date.now() + aheadMs;
 }
 
-/** The topics that are shown from now on. */
+/** Sets the topics that are shown from now on. */
 export function show(wanted) {
   topics = wanted;
   connection.send({ show: topics });
 }
 
-/** The points whose course is followed; `onRows` gets rows of [time in ms, value, ...], `onLost` is called where the
+/** Sets the points whose trend is drawn; `onRows` gets rows of [time in ms, value, ...], `onLost` is called where the
  * course breaks off. */
 export function follow(names, onRows = (rows) => {}, onLost = () => {}) {
   trend = { names, number: trend.number + 1, onRows, onLost };
   sendTrend();
 }
 
-/** What is heard of a bus: {bus, view, kinds, nodes}, or null for nothing; `listener` gets the messages. */
+/** Sets the filter for a bus's traffic: {bus, view, kinds, nodes}, or null for none; `listener` gets the messages. */
 export function hear(wanted, listener = (message) => {}) {
   wish = wanted;
   onHeard = listener;
   connection.send({ hear: wanted });
 }
 
-/** Whoever hides a tab has let go of what it controls: nobody looks at it any more. */
+/** A hidden tab gives up control of its drives: nobody looks at it any more. */
 export function leave() {
   connection.send({ hidden: true });
 }
@@ -104,7 +104,7 @@ function onMessage(message) {
   else keep(message.state ?? message.changes);
 }
 
-// A hidden tab gets no frames: what came meanwhile is kept as one set of readings, however long that takes.
+// A hidden tab gets no frames: the readings that come meanwhile are kept as one set, however long it is hidden.
 function keep(readings) {
   if (pending) return void Object.assign(pending, readings);
   pending = readings;

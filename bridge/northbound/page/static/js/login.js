@@ -1,4 +1,4 @@
-// Who are you?
+// Login form.
 
 import { html, useRef, useState } from "./ui.js";
 import { begin, hasVisitors, login, siteName } from "./session.js";

@@ -1,13 +1,13 @@
 // A field for a number, read by the page itself in the page's language (numbers.js), and never by the browser in its own.
-// It says in words what will be sent; what may mean two numbers is refused, and what is written as in the other language
-// is shown in this one before it is sent.
+// It says in words what will be sent; an ambiguous number is refused, and one in the other language's notation is shown
+// in this page's before it is sent.
 
 import { html, useEffect, useRef, useState } from "./ui.js";
 import { exact, inFull, range } from "./format.js";
 import { readNumber } from "./numbers.js";
 import { language, t } from "./texts.js";
 
-/** What each field on the page would send: {read(), confirm()} by its element. */
+/** Readers of the fields on the page, {read(), confirm()} by the field's element. */
 const fields = new WeakMap();
 
 /** `says` is the key of the text for what will be done with the number; `limits` are {unit, low, high, isWhole}, and
@@ -23,7 +23,7 @@ export function NumberField({ id, name, limits, says, initial = undefined, isReq
     setNote("");
     input.current.setCustomValidity(understood(input.current.value, limits).failure ?? "");
   };
-  // What is in the drive may be read later than the field is there; a field that nobody has typed in shows it.
+  // The drive's value may be read later than the field appears; a field without input then shows it.
   useEffect(follow, [beginning]);
   useEffect(() => {
     const { form } = input.current;
@@ -50,8 +50,8 @@ export function NumberField({ id, name, limits, says, initial = undefined, isReq
   `;
 }
 
-/** The numbers in `form` by the names of their fields, without those that are empty. Null where nothing is to be sent:
- * one was refused, or is shown in this page's notation first. */
+/** Numbers in `form` by the names of their fields, without empty ones. Null where nothing is to be sent: one was refused,
+ * or is shown in this page's notation first. */
 export function numbersIn(form) {
   if (!form.reportValidity()) return null;
   const values = {};
@@ -69,7 +69,7 @@ export function numbersIn(form) {
   return isConfirmed ? values : null;
 }
 
-/** {value, isOther}, {isEmpty} or {failure}.
+/** Content of a field: {value, isOther}, {isEmpty} or {failure}.
  * @returns {{value?: number, isOther?: boolean, isEmpty?: boolean, failure?: string}} */
 function understood(text, limits) {
   const found = readNumber(text, language.value);

@@ -1,16 +1,16 @@
-// Who controls a drive, as people call them.
+// Owners of drives, as people call them.
 
 import { self } from "./live.js";
 import { t } from "./texts.js";
 import { good } from "./drivestate.js";
 
-/** Who controls `drive`, as people call them. */
+/** The owner of `drive`, as people call it. */
 export function ownerOf(drive) {
   const owner = good(`${drive}/supervision/owner`);
   return owner === null ? t("unknown") : ownerName(owner);
 }
 
-/** "you", "admin (web page)", "192.168.1.20 (Modbus)"; "nobody". */
+/** The owner in words: "you", "admin (web page)", "192.168.1.20 (Modbus)"; "nobody". */
 export function ownerName(owner) {
   if (!owner) return t("plant.nobody");
   if (owner === self.value) return t("owner.you");

@@ -13,13 +13,13 @@ const OTHERS = {
 };
 const RETRY_MS = 2000;
 
-/** What the menu shows; the page of a drive is opened from the plant. */
+/** Pages in the menu; the page of a drive is opened from the plant. */
 export const menu = ["plant", "parameters", "bus", "integration", "system"];
 
 const loaded = signal({ plant });
 const loading = new Set();
 
-/** Which page a route is of. */
+/** The page of a route. */
 export function pathOf(route) {
   return Object.hasOwn(OTHERS, route[0]) ? route[0] : "plant";
 }

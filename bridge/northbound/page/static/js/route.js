@@ -1,4 +1,4 @@
-// Which page is shown: `#/plant`, `#/drive/conveyor/fu1`.
+// Route of the page that is shown: `#/plant`, `#/drive/conveyor/fu1`.
 
 import { leaveBy } from "./leaving.js";
 import { computed, signal } from "./ui.js";
@@ -11,7 +11,7 @@ addEventListener("hashchange", () => {
     if (location.hash !== wanted) history.pushState(null, "", wanted);
     place.value = wanted;
   });
-  // Until that is agreed to, the address is that of the page that is shown.
+  // Until leaving is agreed to, the address stays that of the page shown.
   if (place.value === shown) history.replaceState(null, "", shown || location.pathname + location.search);
 });
 

@@ -1,4 +1,4 @@
-// A long table with a search. Only the first rows of what is found are drawn.
+// A long table with a search. Only the first rows found are drawn.
 
 import { html, useMemo, useState } from "./ui.js";
 import { t } from "./texts.js";
@@ -34,7 +34,7 @@ export function Rows({ address, copied }) {
   `;
 }
 
-/** How much is found by `wanted`, in words. */
+/** Number of rows found by `wanted`, in words. */
 export function counted(shown, count, wanted) {
   return count || !wanted.trim() ? t("integration.shown", { shown, count }) : t("integration.no_match", { wanted: wanted.trim() });
 }

@@ -1,24 +1,24 @@
-// Who uses this tab, and what the site has.
+// User of this tab, and the description of the site.
 
 import { signal } from "./ui.js";
 
-/** `undefined` until the server has told; null where a login is needed; else {user, role, token, has_users}. */
+/** Session: `undefined` until the server has answered; null where a login is needed; else {user, role, token, has_users}. */
 export const session = signal(undefined);
-/** What the site has, as /api/site tells it: {site, buses, nodes, drives, places, natures}. */
+/** Description of the site, from /api/site: {site, buses, nodes, drives, places, natures}. */
 export const described = signal(null);
 export const siteName = signal("");
-/** Whether the site lets people read who have not logged in. */
+/** True if the site lets people read without a login. */
 export const hasVisitors = signal(false);
 
 const RETRY_MS = 1000;
 const ROLES = ["observer", "operator", "engineer"];
 
-/** Whether this tab's user has at least this role. */
+/** True if this tab's user has at least this role. */
 export function may(role) {
   return Boolean(session.value) && ROLES.indexOf(session.value.role) >= ROLES.indexOf(role);
 }
 
-/** Ask the server who we are, and what there is to show; again and again while it does not answer. */
+/** Asks the server for the session and the site; again and again while it does not answer. */
 export async function begin() {
   const answer = await fetch("api/session").catch(() => null);
   const told = await answer?.json().catch(() => null);
@@ -28,7 +28,7 @@ export async function begin() {
   await become(told.token ? told : null);
 }
 
-/** {} where it worked, else {error, pause_s}. */
+/** Logs in. {} where it worked, else {error, pause_s}. */
 export async function login(user, password) {
   const answer = await post("api/login", { user, password });
   const told = await answer.json();

@@ -1,4 +1,4 @@
-// What the site has: its buses, nodes and drives, and the nature of its points.
+// Description of the site: its buses, nodes and drives, and the nature of its points.
 
 import { computed } from "./ui.js";
 import { described } from "./session.js";

@@ -16,7 +16,7 @@ effect(() => {
   document.documentElement.lang = language.value;
 });
 
-/** The text called `key`, with `{name}` replaced by what `filled` has. A word of the bridge that has no text here is
+/** Text called `key`, with `{name}` replaced by the entry of `filled`. A word of the bridge that has no text here is
  * shown as it is. */
 export function t(key, filled = {}) {
   const text = texts.value[key] ?? en[key];
@@ -24,7 +24,7 @@ export function t(key, filled = {}) {
   return fill(text, filled);
 }
 
-/** As `t`; empty where there is no such text. */
+/** Like `t`, but empty where there is no such text. */
 export function maybe(key, filled = {}) {
   return fill(texts.value[key] ?? "", filled);
 }
@@ -44,7 +44,7 @@ export function faultIn(family, number) {
 
 const templates = signal({});
 
-/** What the bridge says, in the reader's language: `english` is made of `text`, {code, facts}, or has none. */
+/** A sentence of the bridge in the reader's language: `english` is made of `text`, {code, facts}, or has none. */
 export function worded(text, english) {
   if (language.value === "en") return english;
   if (!text) return translated(english);
@@ -54,7 +54,7 @@ export function worded(text, english) {
   return english;
 }
 
-/** The words of a part of what the bridge says, {code, facts} or words already, of which no English is told. */
+/** Words for a part of a sentence of the bridge, {code, facts} or words already, of which there is no English. */
 export function inWords(text) {
   if (typeof text === "string") return translated(text);
   const known = templates.value[language.value];
@@ -66,7 +66,7 @@ export function inWords(text) {
 const book = signal(null);
 let isOpening = false;
 
-/** What the bridge says, in the reader's language: English until that is there, and where there is no phrase. */
+/** A sentence of the bridge in the reader's language: English until the phrases are loaded, and where none fits. */
 export function translated(text) {
   if (language.value === "en" || !text) return text;
   if (book.value) return book.value.said(text, language.value);

@@ -13,5 +13,5 @@ const media = matchMedia("(prefers-color-scheme: dark)");
 const isSystemDark = signal(media.matches);
 media.addEventListener("change", () => (isSystemDark.value = media.matches));
 
-/** For what is drawn in colours that it has once read from the style sheet. */
+/** Signal for drawings whose colours were read once from the style sheet. */
 export const isDark = computed(() => (theme.value === "system" ? isSystemDark.value : theme.value === "dark"));

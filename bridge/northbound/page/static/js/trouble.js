@@ -1,4 +1,4 @@
-// What is wrong, in words. The server finds the troubles; here they get their texts.
+// Troubles in words. The server finds them; here they get their texts.
 
 import { computed, effect, signal } from "./ui.js";
 import { hasBeen, now as boxNow, troubles, waiting } from "./live.js";
@@ -11,7 +11,7 @@ import { faultIn, many, maybe, t, worded } from "./texts.js";
 const TICK_MS = 10_000;
 const now = signal(boxNow());
 
-// How long a trouble has lasted goes on while there is one, and nothing has to be drawn where there is none.
+// The duration runs while there is a trouble; without one nothing has to be drawn.
 effect(() => {
   if (!troubles.value?.length) return;
   now.value = boxNow();
@@ -19,13 +19,13 @@ effect(() => {
   return () => clearInterval(ticking);
 });
 
-/** The rank of the worst of `all`; "none" where there is none, "unknown" before the server has told. */
+/** The rank of the worst of `all`; "none" where there is none, "unknown" before the server has sent them. */
 export function worst(all) {
   if (all === null) return "unknown";
   return all[0]?.rank ?? "none";
 }
 
-/** How the plant is, in one sentence. */
+/** Condition of the plant in one sentence. */
 export function sentence(all) {
   if (all === null) return t("frame.loading");
   if (!all.length) return waiting.value ? many("plant.waiting", waiting.value) : many("plant.fine", drives.value.length);
@@ -34,7 +34,7 @@ export function sentence(all) {
   return others ? `${first}. ${many("plant.others", others)}` : `${first}.`;
 }
 
-/** What is wrong in a few words: "drive fault E010/10.3". */
+/** Headline of a trouble: "drive fault E010/10.3". */
 export function headline(trouble) {
   return t(`trouble.${trouble.kind}`, said(trouble));
 }
@@ -53,27 +53,27 @@ export function inWords(drive, text, number) {
 
 const RANKS = ["danger", "alarm", "warning"];
 
-/** Everything that is wrong, causes and what they explain. */
+/** All troubles, causes and those that they explain. */
 const everything = computed(() => (troubles.value ?? []).flatMap((one) => [one, ...(one.explains ?? [])]));
 
-/** How much is wrong at one of `places`: 0 is the worst, 3 nothing. */
+/** Worst rank at one of `places`: 0 is the worst, 3 nothing. */
 export function rankAt(places) {
   const ranks = everything.value.filter((one) => places.includes(one.place)).map((one) => RANKS.indexOf(one.rank));
   return Math.min(RANKS.length, ...ranks);
 }
 
-/** The worst at one of `places`, or what explains it there: null where nothing is wrong. */
+/** Worst trouble at one of `places`, or its cause there: null where nothing is wrong. */
 export function worstAt(places) {
   const found = (troubles.value ?? []).filter((one) => [one, ...(one.explains ?? [])].some((each) => places.includes(each.place)));
   return found[0] ?? null;
 }
 
-/** What it means and where it comes from; empty where the headline says it all. */
+/** Meaning and cause of a trouble; empty where the headline says it all. */
 export function explanation(trouble) {
   return maybe(`trouble.${trouble.kind}.why${variant(trouble)}`, withDefaults(trouble));
 }
 
-// What is true of some only: a fault without a cause, and a watchdog that stops nothing.
+// Additions for some troubles: a fault without a cause, and a watchdog that stops nothing.
 function variant(trouble) {
   if (trouble.kind === "drive_fault") return said(trouble).cause ? "_and_cause" : "";
   if (trouble.kind !== "controller_silent") return "";
@@ -82,7 +82,7 @@ function variant(trouble) {
   return reaction === "silence" ? "_silence" : "";
 }
 
-/** What to do. */
+/** Remedy of a trouble. */
 export function remedy(trouble) {
   if (trouble.until) return t("trouble.left.remedy");
   return said(trouble).remedy || maybe(`trouble.${trouble.kind}.remedy${whose(trouble)}`, withDefaults(trouble));
@@ -104,12 +104,12 @@ export function lasting(trouble) {
   return span(now.value - trouble.since);
 }
 
-/** How many things it explains, or has left behind. */
+/** Number of troubles that it explains, or has left behind. */
 export function explained(trouble) {
   return many(trouble.until ? "plant.left" : "plant.explains", trouble.explains.length);
 }
 
-/** What people call the place. */
+/** Name of the place for people. */
 export function nameOf(place) {
   if (place === "bridge") return t("place.bridge");
   return place.replace(/^bus\//, "");
@@ -142,7 +142,7 @@ export function pageOfPlace(place) {
 
 function withDefaults(trouble) {
   const facts = { ...said(trouble) };
-  // Whoever has lost its lease controls nothing any more.
+  // A controller that has lost its lease controls nothing any more.
   if ("owner" in facts) facts.owner = facts.owner ? ownerName(facts.owner) : t("owner.gone");
   for (const name of ["why", "how", "who", "fronts"]) if (name in facts) facts[name] = worded(trouble.texts?.[name], facts[name]) || t("unknown");
   return facts;

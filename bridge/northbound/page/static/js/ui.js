@@ -1,4 +1,4 @@
-// What every module draws with: Preact, its hooks, signals, and htm as the notation.
+// Drawing tools of every module: Preact, its hooks, signals, and htm as the notation.
 
 import { h, render } from "../vendor/preact.mjs";
 import htm from "../vendor/htm.mjs";
@@ -8,7 +8,7 @@ export { render };
 export { useEffect, useMemo, useRef, useState } from "../vendor/hooks.mjs";
 export { batch, computed, effect, signal, untracked, useComputed, useSignal } from "../vendor/signals.mjs";
 
-/** Class names of what is true: `classes("tile", { late: true })` is "tile late". */
+/** Class names whose value is true: `classes("tile", { late: true })` is "tile late". */
 export function classes(...given) {
   return given
     .flatMap((one) => (typeof one === "object" && one ? Object.keys(one).filter((name) => one[name]) : one || []))

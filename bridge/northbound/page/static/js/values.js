@@ -1,4 +1,4 @@
-// The points as they are now, a signal for each: what shows one is drawn again when that one changes, and not else.
+// Present readings of the points, a signal for each: a view is drawn again only when a point that it shows changes.
 
 import { batch, signal } from "./ui.js";
 
@@ -20,14 +20,14 @@ export const reason = (name) => point(name).value[2];
 export const time = (name) => point(name).value[3];
 export const texts = (name) => point(name).value[4] ?? NONE;
 
-/** Takes what the server has told: an object of readings by the points' names. */
+/** Takes readings of the server: an object by the points' names. */
 export function take(readings) {
   batch(() => {
     for (const name in readings) point(name).value = readings[name];
   });
 }
 
-/** Nobody tells anything any more: no value is good. */
+/** Marks every value as not good: the connection is lost. */
 export function lose() {
   batch(() => {
     for (const one of points.values()) one.value = [one.value[0], "dead", "", one.value[3]];

@@ -1,4 +1,4 @@
-// What points say, in the reader's language: their values that are words, and why their quality is not good.
+// Words of points in the reader's language: their text values, and the reasons why their quality is not good.
 
 import { good } from "./drivestate.js";
 import { worded } from "./texts.js";
@@ -7,5 +7,5 @@ import { reason, texts } from "./values.js";
 /** The words of a point while it is good; empty else. */
 export const words = (name) => worded(texts(name).value, good(name) ?? "");
 
-/** Why the quality of a point is not good; empty where that is not told. */
+/** Reason why the quality of a point is not good; empty where none is given. */
 export const why = (name) => worded(texts(name).reason, reason(name));

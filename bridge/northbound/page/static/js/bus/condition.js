@@ -1,4 +1,4 @@
-// How the bus is: state, load and counters, and who is on it that should not be.
+// Condition of the bus: state, load and counters, and foreign nodes and masters on it.
 
 import { html } from "../ui.js";
 import { isConnected } from "../live.js";
@@ -34,7 +34,7 @@ export function Condition({ bus }) {
   `;
 }
 
-// That nobody is there is known only while somebody looks.
+// An absence of foreign nodes is known only while the bus is watched.
 function Strangers({ point }) {
   const found = STRANGERS.filter((leaf) => good(point(leaf)));
   const isKnown = isConnected.value && STRANGERS.every((leaf) => good(point(leaf)) !== null);

@@ -1,4 +1,4 @@
-// PDOs drawn as bytes: which bits carry what.
+// PDOs drawn as bytes, with the meaning of their bits.
 
 import { html } from "../ui.js";
 import { t } from "../texts.js";
@@ -40,7 +40,7 @@ function Pdo({ pdo }) {
   `;
 }
 
-// As much as there is room for.
+// The text as far as there is room for it.
 function cut(text, bits) {
   const most = Math.max(1, Math.floor((bits * BIT) / 6.4));
   return text.length > most ? `${text.slice(0, most - 1)}…` : text;

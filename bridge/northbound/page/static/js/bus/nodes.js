@@ -1,4 +1,5 @@
-// The nodes of a bus with the steps of their boot-up: where each is, or at which object it ended and what helps.
+// Nodes of a bus with the steps of their boot-up: the present step of each, or the object at which it ended and a
+// remedy.
 
 import { classes, html, useState } from "../ui.js";
 import { may } from "../session.js";
@@ -12,8 +13,8 @@ import { texts } from "../values.js";
 import { words } from "../words.js";
 
 const STAGES = ["found", "identity", "configuration", "pdos", "supervision", "start"];
-// Which stage a step of the boot-up belongs to, by the code of its text (bridge/node/boot). The steps come in the order
-// of the stages: what is before the present one is done.
+// Stage of each step of the boot-up, by the code of its text (bridge/node/boot). The steps come in the order of the
+// stages: those before the present one are done.
 /** @type {Record<string, string[]>} */
 const STEPS = {
   found: ["look", "listen"],
@@ -23,7 +24,7 @@ const STEPS = {
   supervision: ["own_supervision", "node_supervision", "words", "wait"],
   start: ["start"],
 };
-// At which stage a boot-up ends with an error status of CiA 302-2.
+// Stage at which a boot-up ends with an error status of CiA 302-2.
 const ENDS = { B: "found", C: "identity", D: "identity", M: "identity", N: "identity", O: "identity", J: "configuration", E: "supervision", F: "supervision", K: "supervision" };
 
 export function Nodes({ bus }) {
@@ -57,7 +58,7 @@ function Node({ node }) {
   `;
 }
 
-// {letter, what}; null where it did not fail. A drive that was left out is a failure, too.
+// Failure of a boot-up, {letter, what}; null where it did not fail. A drive that was left out is a failure, too.
 function failureOf(status) {
   if (status?.code.startsWith("boot.failed")) return status.facts;
   const outcome = status?.code === "boot.noted" ? status.facts.outcome : status;
@@ -66,7 +67,7 @@ function failureOf(status) {
 
 const withoutLetter = (failure) => failure.slice(failure.indexOf(" ") + 1);
 
-// The present step; or what was found and set, one line each.
+// The present step; after the boot-up what was found and set, one line each.
 function Found({ status, name }) {
   const notes = notesOf(status);
   if (!notes.length) return html`<p class="quiet">${words(name)}</p>`;
@@ -74,12 +75,12 @@ function Found({ status, name }) {
     <ul class="notes">${notes.map((note) => html`<li>${inWords(note)}</li>`)}</ul></details>`;
 }
 
-// Those of the boot-up, and of what was found since.
+// Findings of the boot-up and since.
 function notesOf(text) {
   return text?.code === "boot.noted" ? [...notesOf(text.facts.outcome), ...text.facts.notes] : [];
 }
 
-// "done", "now", "failed" or "open".
+// State of a stage: "done", "now", "failed" or "open".
 function standing(place, state, status, error) {
   if (error) return of(place, STAGES.indexOf(endOf(error.letter, error.what)), "failed");
   if (state === "operational" || state === "stopped") return "done";
@@ -103,7 +104,7 @@ function endOf(letter, what) {
   return letter === "J" && isOfPdos(ended) ? "pdos" : (ENDS[letter] ?? "found");
 }
 
-// Whether the object that it names first is a parameter or a mapping of a PDO: 1400h … 1BFFh.
+// True if the first object that the text names is a parameter or a mapping of a PDO: 1400h … 1BFFh.
 function isOfPdos(what) {
   const object = objectOf(what)?.slice(0, 4) ?? "";
   return object >= "1400" && object <= "1BFF";

@@ -1,4 +1,4 @@
-// How a bus is, in one word: as bad as the worst on it, and "in order" only where nothing is wrong.
+// State of a bus in one word: as bad as the worst on it, and "in order" only where nothing is wrong.
 
 import { classes, html } from "../ui.js";
 import { drives, nodes } from "../site.js";
@@ -17,7 +17,7 @@ export function BusState({ bus }) {
   return html`<span class=${classes("busstate", `is-${worst.rank}`)}><${Icon} name=${worst.rank} /> ${where}${headline(worst)}</span>`;
 }
 
-/** The bus and all that is on it. */
+/** Places of the bus, its nodes and their drives. */
 export const placesOf = (bus) => [
   `bus/${bus.name}`,
   ...nodes.value.filter((one) => one.bus === bus.name).map((one) => one.name),

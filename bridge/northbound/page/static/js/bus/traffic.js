@@ -1,4 +1,4 @@
-// What passes on a bus, decoded: frame by frame, or counted by identifier.
+// Traffic on a bus, decoded: frame by frame, or counted by identifier.
 
 import { html, useEffect, useRef, useState } from "../ui.js";
 import { hear } from "../live.js";

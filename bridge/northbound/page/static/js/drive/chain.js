@@ -1,5 +1,5 @@
-// The supervision chain: who watches whom, how much time is left, and what happens when one of them falls silent.
-// What is not good is not known: an arrow is dashed then, and no time is shown as if it were left.
+// Supervision chain: who watches whom, the time left, and the reaction to each silence. A value that is not good counts
+// as unknown: its arrow is dashed, and no time left is shown.
 
 import { html } from "../ui.js";
 import { isConnected, troubles } from "../live.js";
@@ -80,7 +80,7 @@ function OfDrive({ drive }) {
   `;
 }
 
-// Whether anything came, and how long the next may take.
+// Age of the last message, and the longest time for the next.
 function Answers({ age, downtimeMs, isHeard }) {
   if (age === null || downtimeMs === null) return html`<span class="quiet">${t("unknown")}</span>`;
   if (age === NEVER_MS) return html`<span class="quiet">${t("chain.unheard")}</span>`;
@@ -100,20 +100,20 @@ function Arrow({ text, is = "", isBack, children }) {
   `;
 }
 
-// How much of the time is left before somebody reacts.
+// Share of the time that is left before the reaction.
 function Margin({ time, of, text }) {
   if (time === null || time === undefined || !of) return html`<span class="quiet">${text}</span>`;
   return html`<span class="left"><${Meter} share=${time / of} low=${0.25} /> ${t("chain.left", { left: quantity(time, "ms"), of: quantity(of, "ms") })}</span>`;
 }
 
-// What the drive does by itself is read from it: it may be that it would run on.
+// The drive's own supervision is read from it: it may be that it would run on.
 function BridgeBreak({ name }) {
   if (!isConnected.value) return t("chain.unknown");
   if (quality(name) === "config_error") return html`<strong class="is-alarm">${t("chain.bridge.doubt", { why: why(name) })}</strong>`;
   return html`${t("chain.bridge.silent")}${" "}<${Worst} name=${name} />`;
 }
 
-// A published worst case, or why there is none.
+// A published worst case, or the reason why there is none.
 function Worst({ name }) {
   if (!has(name)) return null;
   const time = good(name);

@@ -1,4 +1,4 @@
-// Setpoints and commands, for who controls the drive; stopping is everybody's who may command at all.
+// Setpoints and commands for the owner of the drive; every user who may command at all may stop it.
 
 import { html, useEffect, useRef } from "../ui.js";
 import { leaveNow, leaving, stay, whileMoving } from "../leaving.js";
@@ -54,7 +54,7 @@ function Leaving({ drive }) {
   `;
 }
 
-// Whether this tab may stop a drive that is not its own.
+// True if this tab may stop a drive that is not its own.
 function Stopping({ drive, takes }) {
   if (!drive.stop_by_anyone) return t("drive.stop_by_owner");
   return takes ? null : t("drive.stop_only");
@@ -62,7 +62,7 @@ function Stopping({ drive, takes }) {
 
 function Buttons({ drive, isHeld, form }) {
   const does = (action) => () => request(drive.name, action);
-  // Who has typed a setpoint expects to start with it.
+  // A user who has typed a setpoint expects the start to use it.
   const starts = (direction) => async () => (await sendTyped(drive.name, form.current)) && request(drive.name, "start", { direction });
   const mayStop = isHeld || drive.stop_by_anyone;
   return html`

@@ -1,4 +1,4 @@
-// The plot of a trend: it follows the newest values, unless it is paused or part of it is looked at.
+// Plot of a trend: it follows the newest values, unless it is paused or zoomed.
 
 import uPlot from "../../vendor/uplot.mjs";
 import { effect } from "../ui.js";
@@ -10,17 +10,17 @@ import { isDark } from "../theme.js";
 import { History } from "./history.js";
 
 const DASHES = [[], [8, 3], [2, 3], [8, 3, 2, 3], [14, 4], [4, 6]];
-/** @type {any} A class, whatever its script looks like to a type checker. */
+/** @type {any} A class; a type checker cannot tell from its script. */
 const Plot = uPlot;
 
 export class Course {
-  /** Follows the points `names` in the element `box`; `onZoom` is told whether part of it is looked at. */
+  /** Follows the points `names` in the element `box`; `onZoom` gets true while it is zoomed. */
   constructor(box, names, onZoom) {
     this._history = new History(names.length);
     this._frozen = null;
     this._state = { spanS: 60, isPaused: false, isZoomed: false };
     this._isDue = false;
-    // At once: what is zoomed to is gone again when another row comes before it is told.
+    // At once: the zoom would be lost when another row came first.
     const zoom = (isZoomed) => {
       this._state = { ...this._state, isZoomed };
       onZoom(isZoomed);
@@ -45,14 +45,14 @@ export class Course {
     this._plot.destroy();
   }
 
-  /** `spanS` is what of the newest is shown; paused, what is there stays, and so does what is zoomed to. */
+  /** Draws the newest `spanS` seconds; paused or zoomed, the part shown stays. */
   show(state) {
     this._state = state;
     this._frozen = state.isPaused ? (this._frozen ?? this._history.copy()) : null;
     this._draw();
   }
 
-  /** What is drawn, as a History. */
+  /** The History that is drawn. */
   get shown() {
     return this._frozen ?? this._history;
   }
@@ -83,7 +83,7 @@ export function titleOf(name) {
   return `${t(`group.${group}`)}: ${t(`point.${leaf}`)}${unit ? ` [${unit}]` : ""}`;
 }
 
-// What is drawn has no text of its own; its values stand in the legend below it.
+// The canvas has no text for a screen reader; the values stand in the legend below it.
 function describe(picture, names) {
   picture.setAttribute("role", "img");
   picture.setAttribute("aria-label", t("trend.picture", { names: names.map(titleOf).join(", ") }));

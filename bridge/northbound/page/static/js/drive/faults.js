@@ -1,4 +1,4 @@
-// The faults of a drive: the present one with its cause and remedy, what was before, and what its node has told.
+// Faults of a drive: the present one with its cause and remedy, former ones, and its node's emergency messages.
 
 import { html } from "../ui.js";
 import { has, label } from "../site.js";
@@ -28,7 +28,8 @@ export function Faults({ drive }) {
   `;
 }
 
-// After a trip of the bridge's watchdog the fault shown is the bridge's, and what the maker says of that number is not.
+// After a trip of the bridge's watchdog the fault shown is the bridge's: the maker's text for that number does not
+// apply.
 function reasons(drive) {
   if (goodLabel(`${drive.name}/supervision/watchdog_state`) === "tripped") return { cause: t("faults.by_bridge"), remedy: "" };
   const status = (leaf) => good(`${drive.name}/status/${leaf}`);

@@ -1,4 +1,4 @@
-// What a trend has seen, the oldest forgotten first: as much memory after ten hours as after ten minutes.
+// Rows of a trend, the oldest dropped first: as much memory after ten hours as after ten minutes.
 
 const KEPT = 6000; // five minutes of twenty rows a second
 

@@ -1,10 +1,10 @@
-// What may be written to a drive at present.
+// Present limits of a drive's setpoints.
 
 import { nature } from "../site.js";
 import { good } from "../drivestate.js";
 
 /** {low, high} of the setpoint `name`: as the drive's own parameter scales it, where that has been read, else as the
- * site file does. They are left out where nobody knows them: the bridge still refuses what is too much.
+ * site file does. They are left out where unknown: the bridge still refuses values out of range.
  * @returns {{low?: number, high?: number}} */
 export function limitsOf(drive, name) {
   const { low, high, scaled_by: scales, of_full: limits } = nature(name);
@@ -15,7 +15,7 @@ export function limitsOf(drive, name) {
   return full > 0 ? { low: limits[0] * full, high: limits[1] * full } : { low, high };
 }
 
-// Which of its parameter sets it uses, from 0 on.
+// Number of the parameter set in use, from 0 on.
 function activeSet({ name, set_bits: bits }) {
   const status = good(`${name}/status/drive_status_word`) ?? 0;
   return bits.reduce((sum, bit, place) => sum + (((status >> bit) & 1) << place), 0);

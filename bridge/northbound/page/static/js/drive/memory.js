@@ -1,5 +1,5 @@
-// The faults that a drive itself remembers: parameters of its family, and the error list 1003h of its node (CiA 301
-// §7.5.2.4). They are read when somebody asks for them.
+// Fault memory of a drive: parameters of its family, and the error list 1003h of its node (CiA 301 §7.5.2.4). Read on
+// request only.
 
 import { html, useState } from "../ui.js";
 import { below, nature } from "../site.js";
@@ -23,7 +23,7 @@ export function Memory({ drive }) {
   `;
 }
 
-// {rows: [[name, text], …], said}; `said` is why there is nothing, or nothing more.
+// {rows: [[name, text], …], said}; `said` is the reason why there are no rows, or no more.
 async function remembered(drive) {
   let rows = [];
   let isEmpty = false;
@@ -36,7 +36,7 @@ async function remembered(drive) {
   }
   if (isEmpty) rows = [];
   const count = await ofDrive("1003:00");
-  // Not every device has the list: what it refuses it does not have.
+  // Not every device has the list: one that refuses the read has none.
   if (!count.ok && !count.abort_code) return { rows, said: told(count) };
   for (let place = 1; place <= Math.min(count.value ?? 0, MOST); place++) {
     const sub = place.toString(16).toUpperCase().padStart(2, "0");

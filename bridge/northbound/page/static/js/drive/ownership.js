@@ -1,5 +1,5 @@
-// What this tab controls. It renews its leases itself, and only while it is in sight: hidden, closed or cut off it
-// falls silent as any controller may, and the drive stops in its published time.
+// Drives that this tab controls. It renews its leases itself, and only while it is visible: hidden, closed or cut off
+// it falls silent like any controller, and the drive stops in its published time.
 
 import { effect, signal, untracked } from "../ui.js";
 import { ask, isConnected, self } from "../live.js";
@@ -7,7 +7,7 @@ import { value } from "../values.js";
 
 const LEASE_MS = 3000;
 const LONGEST_PERIOD_MS = 750;
-/** A browser's timers, and what a tab may send in a second, are too coarse for less. */
+/** Least watchdog time, ms: browser timers, and the limit of a tab's messages, are too coarse for less. */
 const SHORTEST_TIMEOUT_MS = 200;
 /** The drives that this tab means to control. */
 const wanted = new Set();
@@ -15,17 +15,17 @@ const timers = new Map();
 /** Drives whose latest renewal has no answer yet. */
 const underway = new Set();
 
-/** The last thing that went wrong, by drive: {action, outcome}; "hidden" and "cut_off" are what became of this tab itself,
- * at `outcome.at`. */
+/** The last failure by drive: {action, outcome}; the actions "hidden" and "cut_off" are of this tab itself, at
+ * `outcome.at`. */
 export const refusals = signal({});
 
-/** Whether this tab controls `drive`. */
+/** True if this tab controls `drive`. */
 export function isOurs(drive) {
   return isConnected.value && self.value !== "" && value(`${drive}/supervision/owner`) === self.value;
 }
 
 export async function take(drive) {
-  // What takes longer than this to come back has not come back in time for the watchdog either.
+  // An answer that takes longer than this comes too late for the watchdog, too.
   const timeout = value(`${drive}/supervision/fieldbus_timeout_ms`) || LEASE_MS;
   if (timeout < SHORTEST_TIMEOUT_MS) return refuse(drive, "take_control", { code: "too_short", message: "" });
   wanted.add(drive);
@@ -37,7 +37,7 @@ export async function take(drive) {
   renew(drive);
 }
 
-/** What was refused is forgotten: it is about what was asked before. */
+/** Forgets earlier refusals: they are about earlier requests. */
 export function giveBack(drive) {
   wanted.delete(drive);
   refuse(drive, "", null);
@@ -55,8 +55,7 @@ function refuse(drive, action, outcome) {
   refusals.value = { ...refusals.value, [drive]: outcome && { action, outcome } };
 }
 
-// Who was in the way is not there any more: what was refused then might be granted now. The owner may be told later
-// than the refusal.
+// The former owner is gone: a request refused then may be granted now. The new owner may arrive later than the refusal.
 function forget(drive, refused) {
   if (refused?.outcome.code !== "not_allowed" || refused.action === "keep_alive") return;
   const owner = value(`${drive}/supervision/owner`);
@@ -64,7 +63,7 @@ function forget(drive, refused) {
   if (refused.owner !== owner) refuse(drive, "", null);
 }
 
-// One at a time: what waits in a slow connection must not go on renewing when the tab has gone.
+// One renewal at a time: those waiting in a slow connection must not outlive the tab.
 async function renew(drive) {
   if (document.hidden) return stop(drive);
   if (underway.has(drive)) return;
@@ -77,7 +76,7 @@ async function renew(drive) {
   refuse(drive, "cut_off", { at: Date.now() });
 }
 
-/** Whether it had been renewed until now. */
+/** Stops renewing the lease. Returns true if it was being renewed. */
 function stop(drive) {
   clearInterval(timers.get(drive));
   return timers.delete(drive);

@@ -13,7 +13,7 @@ import { why } from "../words.js";
 
 const WORDS = /^(control_word|setpoint_\d+)$/;
 
-/** What may be set in numbers that mean something, the main setpoint first. */
+/** Setpoints with a unit, the main setpoint first. */
 function offered(drive) {
   const isOffered = (name) => {
     const { writable, type, unit, low, high } = nature(name);
@@ -45,7 +45,7 @@ export function Setpoints({ drive, isHeld, form }) {
   `;
 }
 
-/** Sends what is typed in `form`, if anything is; whether nothing was refused. */
+/** Sends the setpoints typed in `form`, if any. Returns true where none was refused. */
 export async function sendTyped(drive, form) {
   if (!form) return true;
   const values = numbersIn(form);
@@ -55,7 +55,7 @@ export async function sendTyped(drive, form) {
 
 async function send(drive, form, values) {
   const outcome = await request(drive, "write", { values });
-  // What stands in a field is what the next sending sends.
+  // The next telegram carries what stands in the fields.
   if (outcome.ok) form.reset();
   return outcome.ok;
 }

@@ -1,4 +1,4 @@
-// The course of chosen values: live, with zoom (drag), pause, a cursor and a CSV file.
+// Trend of chosen values: live, with zoom (drag), pause, a cursor and a CSV file.
 
 import { html, useEffect, useRef, useState } from "../ui.js";
 import { save } from "../download.js";
@@ -82,13 +82,13 @@ function keep(drive, names, history) {
   save(fileName(drive), [head.map((one) => `"${one}"`).join(","), ...rows, ""].join("\r\n"), "text/csv");
 }
 
-// Several of them can be told apart, and are sorted by time.
+// File name with the time: several files stay apart and sort by time.
 function fileName(drive) {
   const time = new Date(now()).toLocaleString("sv").replaceAll(":", "");
   return `${siteName.value}-${drive}-${time}.csv`.replace(/[^\p{L}\p{N}._-]+/gu, "-");
 }
 
-// Six digits are more than any drive measures; what is left of the point is kept as it is.
+// Six digits are more than any drive measures; the integer part keeps all of its own.
 function rounded(value) {
   if (typeof value !== "number") return value ?? "";
   const whole = String(Math.trunc(Math.abs(value))).length;

@@ -1,4 +1,4 @@
-// One bus: its condition, its nodes and how far each has come, the layout of their PDOs, and what passes on it.
+// One bus: its condition, its nodes and the boot-up of each, the layout of their PDOs, and the traffic.
 
 import { html } from "../ui.js";
 import { troubles } from "../live.js";

@@ -1,4 +1,4 @@
-// One drive: what state it is in, what it does, what may be done with it, and who watches whom.
+// One drive: its state and values, its controls, and who watches whom.
 
 import { classes, html } from "../ui.js";
 import { troubles } from "../live.js";

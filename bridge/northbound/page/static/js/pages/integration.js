@@ -1,4 +1,4 @@
-// For who programs against the site: how each server is reached, and all that it serves.
+// Page for programmers: how each server is reached, and all that it serves.
 
 import { html } from "../ui.js";
 import { address } from "../route.js";
@@ -58,8 +58,8 @@ const FACTS = {
 const Fact = ({ name, children }) => html`<dt>${t(`integration.${name}`)}</dt><dd>${children}</dd>`;
 const Command = ({ text }) => html`<code>${text}</code> <${Copy} text=${text} />`;
 const portOf = (listen) => listen.slice(listen.lastIndexOf(":") + 1);
-// As commands take it: an IPv6 address without its brackets.
+// Host as commands take it: an IPv6 address without its brackets.
 const hostOf = (listen) => listen.slice(0, listen.lastIndexOf(":")).replace(/^\[(.*)\]$/, "$1");
 
-// Who listens at every address is reached at that of this page.
+// A server that listens at every address is reached at that of this page.
 const reached = (listen) => listen.replace(/(^|\/)(0\.0\.0\.0|\[::\])(?=:|$)/, `$1${location.hostname}`);

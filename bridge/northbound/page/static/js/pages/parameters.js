@@ -11,7 +11,7 @@ import { placeOf, Sets } from "../parameters/sets.js";
 
 export const parameters = { path: "parameters", topics: () => [], View };
 
-/** Who has parameters: drives by the kind of their mapping, and nodes that are none by their family. */
+/** Holders of parameters: drives by the kind of their mapping, and nodes that are none by their family. */
 function holders() {
   const others = nodes.value.filter((node) => !drives.value.some((drive) => drive.node === node.name));
   const ofDrives = drives.value.map(({ name, mapping }) => ({ name, kind: mapping }));

@@ -1,4 +1,4 @@
-// The plant: what is in trouble first, then each bus with its drives as tiles.
+// The plant: troubles first, then each bus with its drives as tiles.
 
 import { classes, html } from "../ui.js";
 import { isConnected, recent, troubles } from "../live.js";
@@ -38,7 +38,7 @@ function Attention() {
   `;
 }
 
-// What comes and goes leaves a trace for a while.
+// Troubles that come and go stay listed for a while.
 function Over() {
   const all = recent.value;
   if (!all.length) return null;
@@ -68,7 +68,7 @@ export function TroubleRow({ trouble }) {
   `;
 }
 
-// What follows from a cause stays to be seen, below it.
+// Consequences of a cause stay visible below it.
 function Explained({ cause }) {
   return html`
     <details class="explains" open=${Boolean(cause.until)}><summary>${explained(cause)}</summary>
@@ -92,7 +92,7 @@ function Bus({ bus }) {
   `;
 }
 
-// What is in trouble first, the worst before; everything else stays where it is.
+// Drives in trouble first, the worst before; all others keep their place.
 function tilesOf(bus) {
   const ofDrives = drives.value.filter((one) => one.bus === bus.name).map((drive) => ({ drive, rank: rankAt([drive.name, drive.node]) }));
   const ofNodes = nodes.value
@@ -114,7 +114,8 @@ function BusHead({ bus }) {
   `;
 }
 
-// Only the name is the link, so that it does not read out what changes; the style sheet stretches it over the tile.
+// Only the name is the link, so that a screen reader does not read out changing values; the style sheet stretches it
+// over the tile.
 function DriveTile({ drive }) {
   const state = stateOf(drive.name);
   const hasFault = state === "fault" || state === "fault_reaction_active";
@@ -180,7 +181,7 @@ function Control({ drive }) {
   `;
 }
 
-// A node that is no drive, with what its inputs say and its outputs are.
+// A node that is no drive, with the values of its inputs and outputs.
 function NodeTile({ node }) {
   const state = goodLabel(`${node.name}/node/state`);
   return html`

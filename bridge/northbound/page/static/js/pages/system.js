@@ -46,7 +46,7 @@ function Versions({ versions }) {
   `;
 }
 
-// What could not be told, of a page on which the rest stands.
+// Facts that could not be read; the rest of the page stands.
 function Unreadable({ faults }) {
   return html`<ul class="findings">${faults.map((one) => html`<li class="is-warning"><${Icon} name="warning" />
     <span>${maybe(`system.${one.of}`) || one.of}: ${translated(one.text)}</span></li>`)}</ul>`;

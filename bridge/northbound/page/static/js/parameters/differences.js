@@ -1,4 +1,4 @@
-// What differs between a drive and a set, to be written to the drive.
+// Differences between a drive and a set, to be written to the drive.
 
 import { html, useEffect, useRef, useState } from "../ui.js";
 import { many, t } from "../texts.js";
@@ -46,7 +46,7 @@ export function Differences({ holder, result, mayWrite }) {
   `;
 }
 
-// One after the other, to the end, the first refusal, or until `isOver()`; what is shown then.
+// Writes one after the other, to the end, the first refusal, or until `isOver()`. Returns the message to show.
 async function writeAll(holder, chosen, onWritten, isOver) {
   let written = 0;
   for (const { entry, wanted } of chosen) {

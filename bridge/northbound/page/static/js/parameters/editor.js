@@ -1,4 +1,4 @@
-// Changes one parameter, within its range, and says what that costs the EEPROM.
+// Editor of one parameter, within its range, with the wear of the EEPROM that a write causes.
 
 import { html, useState } from "../ui.js";
 import { number } from "../format.js";
@@ -51,7 +51,7 @@ function Field({ entry, value, isBusy }) {
   return html`<${NumberField} id="value" name="value" says="number.writes" limits=${limitsOf(entry)} initial=${value} isRequired=${true} isDisabled=${isBusy} />`;
 }
 
-// What a write costs.
+// Wear that a write causes.
 function wear(entry, described) {
   if (entry.command) return t("parameters.wear.command");
   if (entry.volatile) return t("parameters.wear.volatile");

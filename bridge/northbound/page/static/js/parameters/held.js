@@ -1,11 +1,11 @@
-// What drives hold, as far as this tab has asked: a signal for each parameter.
+// Parameter values that this tab has read from drives: a signal for each.
 
 import { ask, isConnected } from "../live.js";
 import { session } from "../session.js";
 import { batch, effect, signal } from "../ui.js";
 import { told } from "../outcome.js";
 
-/** The server lets a tab say fifty things a second. */
+/** Pause between two requests, ms: the server takes fifty messages a second from a tab. */
 const PAUSE_MS = 25;
 const MISSING = [0x06020000, 0x06090011];
 const known = new Map();
@@ -20,20 +20,20 @@ export function held(holder, name) {
   return known.get(key);
 }
 
-/** What was read of `holder`, or of all, is not known any more. */
+/** Forgets the values read from `holder`, or all values. */
 export function forget(holder = "") {
   batch(() => {
     for (const [key, one] of known) if (!holder || key.startsWith(`${holder} `)) one.value = null;
   });
 }
 
-// Whoever was cut off does not know what others have changed meanwhile, nor does whoever has just come.
+// Without a connection, changes by others are missed.
 effect(() => {
   void [isConnected.value, session.value?.token];
   forget();
 });
 
-/** Reads it anew. */
+/** Reads a parameter again. */
 export async function read(holder, name) {
   const outcome = await inTurn(holder, () => ask(holder, "read_parameter", { parameter: name }));
   const one = found(outcome);
@@ -41,7 +41,7 @@ export async function read(holder, name) {
   return one;
 }
 
-/** Writes it; the outcome is {ok, code, message, value}. */
+/** Writes a parameter; the outcome is {ok, code, message, value}. */
 export async function write(holder, name, value) {
   const outcome = await inTurn(holder, () => ask(holder, "write_parameter", { parameter: name, value }));
   if (outcome.ok) held(holder, name).value = { value: outcome.value };
@@ -60,7 +60,7 @@ export async function readAll(holder, names, onRead = (count) => {}, isOver = ()
   return true;
 }
 
-/** What a node says that it is: {vendor, product, revision, serial}, as far as it does. */
+/** Identity object of a node, {vendor, product, revision, serial}, as far as it can be read. */
 export async function identity(holder) {
   const told = {};
   for (const [place, name] of ["vendor", "product", "revision", "serial"].entries()) {
@@ -70,7 +70,7 @@ export async function identity(holder) {
   return told;
 }
 
-// One after the other at each node, which has one channel for them; what is asked of another waits for none of it.
+// One request at a time for each node, which has one SDO channel; other nodes do not wait.
 function inTurn(holder, work) {
   const [node] = holder.split("/");
   const mine = (queues.get(node) ?? Promise.resolve()).then(pause).then(work);
@@ -78,7 +78,7 @@ function inTurn(holder, work) {
   return mine;
 }
 
-// Until the server takes the next.
+// Waits until the server takes the next message.
 function pause() {
   const now = Date.now();
   free = Math.max(now, free + PAUSE_MS);

@@ -1,4 +1,4 @@
-// All parameters of a drive with a search; what is shown is read.
+// All parameters of a drive with a search; those shown are read.
 
 import { html, useEffect, useMemo, useRef, useState } from "../ui.js";
 import { may } from "../session.js";
@@ -54,7 +54,7 @@ export function List({ holder, described, onWritten }) {
 const isReadable = (entry) => !entry.write_only;
 const words = (entry) => `${entry.name} ${entry.title ?? ""} ${entry.object} ${entry.unit ?? ""} ${Object.values(entry.states ?? {}).join(" ")}`;
 
-// As soon as nobody types any more; what was read once is not read again.
+// Once typing has stopped; a parameter that was read is not read again.
 function readWhatIsShown(holder, entries) {
   let isOver = false;
   const timer = setTimeout(() => {
@@ -81,7 +81,7 @@ function Row({ holder, entry, isEdited, onEdit, described, onWritten }) {
   `;
 }
 
-// What the drive holds, or why that is not known.
+// The drive's value, or the reason why it is not known.
 function Held({ holder, entry }) {
   const one = held(holder, entry.name).value;
   if (entry.write_only) return t("parameters.write_only");
@@ -91,7 +91,7 @@ function Held({ holder, entry }) {
   return html`<span class="quiet">${t("parameters.unread")} <small class="why">${one.failure}</small></span>`;
 }
 
-// How it is changed, or why it is not.
+// Controls to change it, or the reason why it cannot be changed.
 function Change({ entry, isEdited, onEdit }) {
   if (entry.read_only) return html`<small>${t("parameters.read_only")}</small>`;
   if (entry.why_never) return html`<small class="why">${t("parameters.never")}: ${entry.why_never}</small>`;

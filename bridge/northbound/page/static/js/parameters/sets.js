@@ -1,4 +1,4 @@
-// Sets of parameters: backed up, compared with the factory, a file or another drive, and restored from what differs.
+// Parameter sets: back-up, comparison with the factory settings, a file or another drive, and restoring differences.
 
 import { html, useEffect, useRef, useState } from "../ui.js";
 import { may, session } from "../session.js";
@@ -9,7 +9,7 @@ import { held, identity, readAll } from "./held.js";
 import { Differences } from "./differences.js";
 import { same } from "./value.js";
 
-/** The address at which the server has something of a drive or node. */
+/** Address of the server's data on a drive or node. */
 export const placeOf = (what, holder) => `api/${what}/${holder.split("/").map(encodeURIComponent).join("/")}`;
 
 export function Sets({ holder, described, others }) {
@@ -22,7 +22,7 @@ export function Sets({ holder, described, others }) {
   const [source, setSource] = useState(hasFactory ? "factory" : "file");
   const end = () => (turn.current.isOver = true);
   useEffect(() => end, []);
-  // What was stopped, or left, says nothing more.
+  // A run that was stopped, or left, reports nothing more.
   const run = (work) => async () => {
     const mine = (turn.current = { isOver: false });
     const say = (one) => mine.isOver || setState(one);
@@ -78,7 +78,7 @@ export function Sets({ holder, described, others }) {
   `;
 }
 
-// Where a set comes from: {name, values, identity}.
+// Source of a set: {name, values, identity}.
 const SOURCES = {
   factory: async ({ settings }) => {
     const known = settings.filter((one) => "factory" in one);
@@ -110,7 +110,7 @@ function plain(found) {
   return Object.fromEntries(Object.entries(found).filter(([, one]) => !one.failure).map(([name, one]) => [name, one.value]));
 }
 
-// Why a set is not of a drive of this kind; empty where it is.
+// Reason why a set is not for a drive of this kind; empty where it is.
 async function whyAnother(holder, described, { name, mapping, identity: ofSet }) {
   if (mapping && mapping !== described.mapping) return t("parameters.another", { source: name, name: t("parameters.mapping") });
   if (!ofSet) return "";

@@ -4,7 +4,7 @@ import { exact, range as rangeOf } from "../format.js";
 
 const BARE = ["string", "bytes"];
 
-/** "1.03 s", "1 (automatic)". */
+/** A value in words: "1.03 s", "1 (automatic)". */
 export function shown(entry, value) {
   if (value === null || value === undefined) return "–";
   if (typeof value !== "number") return String(value);
@@ -13,28 +13,28 @@ export function shown(entry, value) {
   return entry.unit ? `${exact(value)}\u202f${entry.unit}` : exact(value);
 }
 
-/** "0 … 320 s"; empty where there is none. */
+/** The range in words: "0 … 320 s"; empty where there is none. */
 export function range(entry) {
   if (entry.low === undefined && entry.high === undefined) return "";
   return rangeOf(entry.low, entry.high, entry.unit);
 }
 
-/** Whether its value is chosen from a list. */
+/** True if the value is chosen from a list. */
 export const isChosen = (entry) => Boolean(entry.states) || entry.type === "bool";
 export const isText = (entry) => BARE.includes(entry.type);
 
-/** What a number has to be that is typed for it. */
+/** Limits of a number typed for the parameter. */
 export function limitsOf({ unit, low, high, whole }) {
   return { unit, low, high, isWhole: whole };
 }
 
-/** What was chosen, or typed as a text, as it is sent. */
+/** The chosen or typed value as it is sent. */
 export function chosen(entry, code) {
   if (entry.type === "bool") return code === "true";
   return isText(entry) ? code : Number(code);
 }
 
-/** Whether two values are the same; a state may be given by its text. */
+/** True if two values are the same; a state may be given by its text. */
 export function same(entry, one, other) {
   const [a, b] = [coded(entry, one), coded(entry, other)];
   if (typeof a === "number" && typeof b === "number") return Math.abs(a - b) <= 1e-9 * Math.max(1, Math.abs(a));

@@ -1,4 +1,4 @@
-// Who commanded what: the latest entries of the audit log.
+// Latest entries of the audit log.
 
 import { html, useMemo, useState } from "../ui.js";
 import { clock } from "../format.js";

@@ -1,4 +1,4 @@
-// The site file as it lies on the box, without its secrets, and what a check of it finds.
+// Site file as it lies on the box, without its secrets, and the findings of its check.
 
 import { html } from "../ui.js";
 import { many, t, worded } from "../texts.js";

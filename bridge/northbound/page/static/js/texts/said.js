@@ -1,4 +1,4 @@
-// What the bridge itself says, in the reader's language: a phrase book from its English.
+// Sentences of the bridge in the reader's language: a phrase book from its English.
 //
 // A phrase is a pair of sentences with slots: {name} holds one word as it is, {name#} a number, {name…} words as they
 // are, and {NAME} words that are looked up in turn. Texts that are joined by "; ", ": " or ". ", or end with something
@@ -19,7 +19,7 @@ const JOINED = /[:;] /;
 const books = signal({});
 const loading = new Set();
 
-/** `text` of the bridge in `language`. Until the phrases are there it is English; whoever draws it draws again then. */
+/** `text` of the bridge in `language`. Until the phrases are loaded it is English; it is drawn again then. */
 export function said(text, language) {
   if (language === "en" || typeof text !== "string" || !text) return text;
   const book = books.value[language];
@@ -40,7 +40,7 @@ async function load(language) {
   }
 }
 
-/** A function that looks up texts among `phrases`, a list of [English, other]; it keeps what it was asked last. */
+/** A function that looks up texts among `phrases`, a list of [English, other]; it keeps its latest answers. */
 export function bookOf(phrases) {
   const whole = new Map(phrases.filter(([english]) => !english.includes("{")));
   /** @type {{match: RegExp, names: string[], other: string}[]} */
@@ -101,7 +101,7 @@ export function bookOf(phrases) {
   };
 }
 
-// What stands before the brackets at the end of a text, and in them.
+// Text before the brackets at the end of a text, and in them.
 function aside(text) {
   if (!text.endsWith(")")) return [text, ""];
   let open = 0;

@@ -14,7 +14,7 @@ export function rendered(text, templates, plain = (sentence) => sentence) {
   });
 }
 
-/** Whether `text` and the texts among its facts have templates: a tab may be older than the bridge that it shows. */
+/** True if `text` and the texts among its facts have templates: a tab may be older than the bridge that it shows. */
 export function isKnown(text, templates) {
   if (text.code !== "plain" && !(text.code in templates)) return false;
   const texts = Object.values(text.facts).flat().filter((fact) => typeof fact === "object");
@@ -28,7 +28,7 @@ function shown(fact, quoted, format, words) {
   return format ? formatted(fact, format) : String(fact);
 }
 
-// As Python writes a string.
+// A text quoted as Python's `repr` quotes it.
 function inQuotes(text) {
   const mark = text.includes("'") && !text.includes('"') ? '"' : "'";
   return mark + text.replaceAll("\\", "\\\\").replaceAll(mark, `\\${mark}`).replaceAll("\n", "\\n") + mark;

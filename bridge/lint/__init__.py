@@ -1,4 +1,4 @@
-"""What is wrong or doubtful about a site as a whole, before anything is on the bus.
+"""Faults and doubts of a site as a whole, found before anything is on the bus.
 
 A site file is checked by ``bridge.config`` key by key; here it is seen together with its mappings: who
 uses which COB-ID, how full the bus gets, which times cannot work together.

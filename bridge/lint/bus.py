@@ -28,7 +28,7 @@ _EMCY: Final = 0x1014
 _WORD_BITS: Final = 16
 
 Downloads = Mapping[str, Sequence[Download]]
-"""What configuration files ask of their nodes, by the node's name."""
+"""Downloads of the configuration files, by the node's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class PdoView:
     rtr_poll_ms: int = 0
     number: int = 0
     words: int = 0
-    """How many words of the drive it carries by the mapping file."""
+    """Number of the drive's words that it carries by the mapping file."""
     is_optional: bool = False
     cob_id_key: Key | None = None
     type_key: Key | None = None
@@ -63,11 +63,11 @@ class PdoView:
 
     @property
     def is_polled(self) -> bool:
-        """Whether the bridge asks for it by remote frame."""
+        """True if the bridge asks for it by remote frame."""
         return self.transmission_type in REMOTE_TYPES and bool(self.rtr_poll_ms)
 
     def period_s(self, sync_s: float) -> float | None:
-        """The longest time between two TPDOs, or None where nothing makes it regular."""
+        """Longest time between two TPDOs in seconds, None where nothing makes it regular."""
         kind = self.transmission_type
         if 1 <= kind <= LAST_SYNCHRONOUS and sync_s:
             return kind * sync_s
@@ -78,7 +78,7 @@ class PdoView:
         return None
 
     def shortest_s(self, sync_s: float) -> float | None:
-        """The shortest time between two TPDOs, or None where nothing limits it."""
+        """Shortest time between two TPDOs in seconds, None where nothing limits it."""
         if self.is_synchronous:
             return max(1, self.transmission_type) * sync_s or None
         if self.is_polled:
@@ -93,7 +93,7 @@ class DriveView:
     name: str
     rpdos: tuple[PdoView, ...]
     tpdos: tuple[PdoView, ...]
-    """Those with control and status word first."""
+    """TPDOs in use, those with control and status word first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,10 +104,10 @@ class NodeView:
     key: Key
     drives: tuple[DriveView, ...]
     pdos: tuple[PdoView, ...]
-    """All that the node has, including those of drives that the site file does not name."""
+    """All PDOs of the node, including those of drives that the site file does not name."""
     settings: Settings
     emcy_id: int | None = None
-    """On which identifier its emergency messages come (1014h), None where they are off."""
+    """Identifier of its emergency messages (1014h), None where they are off."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ class BusView:
 
     @property
     def sync_s(self) -> float:
-        """The period of SYNC, 0 without one."""
+        """Period of SYNC in seconds, 0 without one."""
         return self.table.sync_period_ms / 1000
 
 

@@ -33,7 +33,7 @@ class Manual:
     )
 
     def longest_m(self, bitrate: int) -> float:
-        """Length of a bus at this bit rate: that of the next higher one in the table."""
+        """Longest bus in m at this bit rate in bit/s: that of the next higher one in the table."""
         return max((length for rate, length in self.lengths if rate >= bitrate), default=0.0)
 
     def fastest(self, length_m: float) -> int | None:
@@ -41,11 +41,11 @@ class Manual:
         return max((rate for rate, length in self.lengths if length >= length_m), default=None)
 
     def thinnest_mm2(self, length_m: float) -> float | None:
-        """Least cross-section for wires of this length; None where the manual does not say."""
+        """Least cross-section in mm² for wires of this length in m; None where the manual does not say."""
         return next((area for length, area in self.wires if length_m <= length), None)
 
     def segment_m(self, area_mm2: float, nodes: int) -> float | None:
-        """Length of a segment: by the next smaller cross-section and the next higher number of nodes. None
+        """Longest segment in m: by the next smaller cross-section and the next higher number of nodes. None
         where the manual does not say."""
         area = max((one for one in self.segments if one <= area_mm2), default=None)
         if area is None:
@@ -97,11 +97,11 @@ MANUALS: Final[Mapping[str, Manual]] = {
         ),
     ),
 }
-"""By the vendor of a family."""
+"""Manuals by the vendor of a family."""
 
 
 def check_cable(bus: BusView, report: LintReport) -> None:
-    """Judge what the site file says of the cable; nothing where it says nothing."""
+    """Judge the cable by the site file; without entries there nothing is reported."""
     cable, key = bus.table.cable, (*bus.key, "cable")
     if not cable:
         return
@@ -129,7 +129,8 @@ def check_cable(bus: BusView, report: LintReport) -> None:
 
 
 def _check_length(bus: BusView, manuals: Sequence[Manual], report: LintReport) -> None:
-    """A repeater delays the signal as much as some length of cable does (EDS84DMOTCAN §5.2.4)."""
+    """Judge the length of the bus. A repeater delays the signal like a length of cable (EDS84DMOTCAN
+    §5.2.4)."""
     cable, rate = bus.table.cable, bus.table.bitrate
     total_m = sum(segment.length_m for segment in cable)
     repeaters_m = sum(segment.repeater_m for segment in cable[1:])

@@ -17,7 +17,8 @@ from bridge.text import Text
 _CONSUMER: Final = 0x1016
 _SYNC: Final = (0x1005, 0)
 _SYNC_BITS: Final = 0x7FFF_FFFF
-"""Bit 31 has no meaning (CiA 301 §7.5.2.5). Bit 30 makes the node a producer of SYNC, too."""
+"""Bits of 1005h that count: bit 31 has no meaning (CiA 301 §7.5.2.5), bit 30 makes the node a producer of
+SYNC."""
 _COB_ID: Final = 1
 
 
@@ -53,7 +54,7 @@ def _is_cob_id(index: int, sub: int) -> bool:
 
 
 def _own_settings(node: NodeView) -> Iterator[tuple[tuple[int, int], int, Text | str]]:
-    """What the boot-up sets after the configuration: object, value, and the key that causes it."""
+    """Settings of the boot-up after the configuration: object, value, and the key that causes it."""
     for index, value in _error_control(node.table).items():
         yield (index, 0), value, "supervision"
     slots = {slot.name: slot for slot in node.family.slot}

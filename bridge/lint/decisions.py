@@ -1,4 +1,4 @@
-"""Decisions of the site file that are allowed and still worth repeating."""
+"""Decisions of the site file that are allowed and still worth a reminder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who uses which COB-ID: two senders of one identifier destroy each other's frames (CiA 301 §7.3.3)."""
+"""Users of each COB-ID: two senders of one identifier destroy each other's frames (CiA 301 §7.3.3)."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _LSS: Final = (0x7E4, 0x7E5)
 
 @dataclass(frozen=True, slots=True)
 class _Use:
-    """``active``: in use as configured; else only reserved, off at factory or not opened. ``moved``: the
-    site gives it this COB-ID, with ``key``."""
+    """One use of a COB-ID. ``active``: in use as configured; else only reserved, off at factory or not
+    opened. ``moved``: the site gives it this COB-ID, with ``key``."""
 
     cob_id: int
     what: Text | str
     owner: str
-    """The node's name; empty for the bridge."""
+    """Name of the node; empty for the bridge."""
     key: Key
     active: bool = True
     moved: bool = False
@@ -36,8 +36,8 @@ class _Use:
 
 
 def check_identifiers(bus: BusView, report: LintReport) -> None:
-    """An error if two uses collide, a warning if one of them is off at present. One finding for each pair
-    of nodes: where one identifier collides, many do."""
+    """Report collisions: an error if two uses collide, a warning if one of them is off at present. One
+    finding for each pair of nodes: where one identifier collides, many do."""
     first: dict[int, list[_Use]] = {}
     collisions: dict[tuple[str, str], list[tuple[_Use, _Use]]] = {}
     for use in _uses(bus):

@@ -1,4 +1,4 @@
-"""The interface of a bus: whose bytes it reads."""
+"""Check of a bus's interface: the origin of the bytes that it reads."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from bridge.lint.report import LintReport
 from bridge.text import Text
 
 _BY_NETWORK: Final = frozenset({"udp_multicast", "socketcand"})
-"""Of python-can. What they read is no CAN frame of 8 bytes at most, but what anybody sends."""
+"""Interfaces of python-can that read from a network: anybody can send there, and not only CAN frames of 8
+bytes at most."""
 
 
 def check_interface(bus: BusView, report: LintReport) -> None:
-    """Name an interface whose frames come over a network (docs/adr/0017-strangers-bytes.md)."""
+    """Report an interface whose frames come over a network (docs/adr/0017-strangers-bytes.md)."""
     if bus.table.interface in _BY_NETWORK:
         report.warning(
             (*bus.key, "interface"),

@@ -12,13 +12,13 @@ from bridge.lint.wire import busy_bits, wire_of
 from bridge.master.answers import SHARE, answer_bits
 
 _LOOK_MS: Final = 10
-"""How often the bus is looked at for frames of others (``bridge/can/foreignwatch.py``)."""
+"""Period of the search for foreign frames (``bridge/can/foreignwatch.py``)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """One bus. ``within_ms``: from an intruding frame to the end of the answer; None where nothing bounds
-    it (a load of more than 100 %). ``answers_per_s``: for the node with the most RPDOs."""
+    """Exposure of one bus. ``within_ms``: from an intruding frame to the end of the answer; None where
+    nothing bounds it (a load of more than 100 %). ``answers_per_s``: for the node with the most RPDOs."""
 
     bus: str
     on_intruder: str
@@ -38,7 +38,7 @@ class Exposure:
 
 
 def exposure(bus: BusView) -> Exposure:
-    """By the site's files: what a node holds may differ."""
+    """Exposure of a bus by the site's files: the settings in a node may differ."""
     busy = busy_bits(bus)
     longest: float | None = 0.0
     for node in bus.nodes:

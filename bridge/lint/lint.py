@@ -55,7 +55,7 @@ def family_dictionaries(names: Iterable[str], site: Path | None = None) -> dict[
 
 
 def dictionary_files(names: Iterable[str], site: Path | None = None) -> dict[str, Path]:
-    """The files of ``family_dictionaries``."""
+    """Paths of the files of ``family_dictionaries``, by the same names."""
     found: dict[str, Path] = {}
     folders = mapping_folders(site)
     for name in names:

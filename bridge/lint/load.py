@@ -1,4 +1,4 @@
-"""How full a bus will be: all regular frames of the site file, each at its longest."""
+"""Predicted load of a bus: all regular frames of the site file, each at its longest."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class Stream:
 
 @dataclass(frozen=True, slots=True)
 class BusLoad:
-    """The prediction for one bus. ``most_percent`` is with every event-driven TPDO at its inhibit time;
-    ``cycle_ms`` is how long SYNC and all frames of one cycle take on the wire."""
+    """Predicted load of one bus. ``most_percent`` is with every event-driven TPDO at its inhibit time;
+    ``cycle_ms`` is the time that SYNC and all frames of one cycle take on the wire."""
 
     bus: str
     bitrate: int
@@ -75,14 +75,14 @@ def predict(bus: BusView) -> BusLoad:
 
 
 def _in_cycle(stream: Stream, sync_s: float) -> int:
-    """The most of its frames that can fall into one SYNC cycle."""
+    """Largest number of its frames that can fall into one SYNC cycle."""
     if not sync_s or not stream.period_s:
         return 1
     return max(1, math.ceil(sync_s / stream.period_s - 1e-9))
 
 
 def streams(bus: BusView) -> Iterator[Stream]:
-    """All that is regular on the bus."""
+    """All regular frames of the bus."""
     table = bus.table
     if table.sync_period_ms:
         yield Stream(1 if table.sync_counter else 0, bus.sync_s, cyclic=True)
@@ -144,7 +144,7 @@ def check_load(bus: BusView, report: LintReport) -> BusLoad:
 
 
 def _check_window(bus: BusView, load: BusLoad, report: LintReport) -> None:
-    """All synchronous TPDOs must be sent within the window (1007h), and one other frame may delay them."""
+    """Check that all synchronous TPDOs are sent within the window (1007h); one other frame may delay them."""
     window_us = bus.table.sync_window_us
     synchronous = any(
         not pdo.receives and pdo.enabled and pdo.is_synchronous for node in bus.nodes for pdo in node.pdos

@@ -1,4 +1,4 @@
-"""Couplers whose modules nobody names."""
+"""Check for couplers whose modules are not named."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Downloads of the boot-up that move something, whoever owns it."""
+"""Check for downloads of the boot-up that move something without an owner."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bridge.text import Text
 
 
 def check_moving(bus: BusView, report: LintReport) -> None:
-    """A download of what commands a node is an error; 0 is what it holds after switching on."""
+    """Report downloads to objects that command a node; 0 is allowed, their value after switching on."""
     for node in bus.nodes:
         names = Names(node.family)
         for (index, sub), value in node.settings.values.items():

@@ -1,4 +1,4 @@
-"""Outputs of nodes that are no drives: what becomes of them when their controller or the bridge is silent."""
+"""Outputs of nodes that are no drives: their state when their controller or the bridge falls silent."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ASYNCHRONOUS = 255
 
 
 def output_cases(bus: BusView) -> Iterator[WorstCase]:
-    """Every node of the bus whose outputs somebody commands, with what is known without asking it."""
+    """Worst cases of every node of the bus whose outputs are commanded, as far as known without asking it."""
     busy = busy_bits(bus)
     for node in bus.nodes:
         if not _is_commanded(node):
@@ -60,7 +60,7 @@ def check_outputs(bus: BusView, report: LintReport) -> None:
 
 
 def check_read_only(bus: BusView, report: LintReport) -> None:
-    """Nodes that somebody may take for drives, and that nobody can command."""
+    """Report nodes that may be taken for drives and cannot be commanded."""
     for node in bus.nodes:
         if why := node.family.family.read_only:
             told = Text.of("check.only_read", node=node.table.name, why=why)
@@ -68,7 +68,7 @@ def check_read_only(bus: BusView, report: LintReport) -> None:
 
 
 def judged_outputs(bus: BusView, node: NodeView) -> OwnJudgement:
-    """What the node does with its outputs by itself, by site file and factory settings."""
+    """Judgement of what the node does with its outputs by itself, by site file and factory settings."""
     raw = {**_factory(node), **offline(node.family, node.settings.values, bus.table, node.table, None)}
     accepted = node.table.outputs.accepts.runs_on or ""
     own = judge(node.family, raw, bus.table, node.table, accepted)
@@ -96,7 +96,7 @@ def _rpdos(node: NodeView) -> list[PdoView]:
 
 
 def _factory(node: NodeView) -> dict[tuple[int, int], int]:
-    """What its device description says of the objects that decide."""
+    """Factory values of the deciding objects, by its device description."""
     found: dict[tuple[int, int], int] = {}
     for own in node.family.own_supervision:
         for one in (own, own.reaction):

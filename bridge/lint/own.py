@@ -1,4 +1,4 @@
-"""What drives do by themselves when the bridge falls silent, judged by site file and factory settings."""
+"""Own supervision of drives when the bridge falls silent, judged by site file and factory settings."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from bridge.tomlfile import Key
 
 @dataclass(frozen=True, slots=True)
 class WorstCase:
-    """How long one drive may take after its controller, and after the bridge, fell silent."""
+    """Longest times in which one drive stops after its controller, and after the bridge, fell silent."""
 
     drive: str
     stop: StopTime
     own: OwnJudgement
     wire: Wire
     longest: StopTime | None = None
-    """With the longest time-out that the owner may set; None where it may not set any."""
+    """The same with the longest time-out that the owner may set; None where it may not set any."""
 
     def __str__(self) -> str:
         bridge = f"{self.own.bridge_ms} ms" if self.own.bridge_ms else str(self.own.verdict)
@@ -43,7 +43,7 @@ class WorstCase:
 
     @property
     def facts(self) -> dict[str, object]:
-        """For programs."""
+        """Times and terms for programs, ready for JSON."""
         return {
             "controller_ms": self.stop.ms,
             "controller_terms": [asdict(term) for term in self.stop.terms],
@@ -55,7 +55,7 @@ class WorstCase:
 
 
 def worst_cases(bus: BusView) -> Iterator[WorstCase]:
-    """Every drive of the bus, with what is known without asking it."""
+    """Worst cases of every drive of the bus, as far as known without asking it."""
     busy = busy_bits(bus)
     for node in bus.nodes:
         for drive in node.drives:
@@ -70,7 +70,7 @@ def worst_cases(bus: BusView) -> Iterator[WorstCase]:
 
 
 def longest_ms(table: DriveTable) -> int:
-    """The longest time-out that the owner has or may set; 0 (off) counts as the longest."""
+    """Longest time-out in ms that the owner has or may set; 0 (off) counts as the longest."""
     low, high = table.timeout_range_ms
     own_ms = table.fieldbus_timeout_ms or 0
     return max(high, own_ms) if low and own_ms else 0
@@ -98,7 +98,7 @@ def check_own_supervision(bus: BusView, report: LintReport) -> None:
 
 
 def _check_times(bus: BusView, node: NodeView, report: LintReport) -> None:
-    """Configured time-outs must exceed the longest silence of a healthy bridge."""
+    """Check that configured time-outs exceed the longest silence of a healthy bridge."""
     entry = settable(node.family)
     if entry is None:
         return
@@ -130,7 +130,7 @@ def _check_times(bus: BusView, node: NodeView, report: LintReport) -> None:
 
 
 def _given(bus: BusView, node: NodeView, entry: OwnSupervision) -> tuple[Key, float]:
-    """The time that the site file gives, and where."""
+    """Time that the site file gives, and its key."""
     if node.table.own_timeout_ms is not None:
         return (*node.key, "own_timeout_ms"), float(node.table.own_timeout_ms)
     setting = node.settings[place_of(node.family, entry).key]
@@ -143,7 +143,7 @@ def _given(bus: BusView, node: NodeView, entry: OwnSupervision) -> tuple[Key, fl
 
 
 def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
-    """A node whose reaction to its time-out is by factory setting none. True if it was reported."""
+    """Report a node whose reaction to its time-out is none by factory setting. True if it was reported."""
     entry = settable(node.family)
     reaction = entry.reaction if entry else None
     if entry is None or reaction is None or reaction.factory not in reaction.nothing:
@@ -173,8 +173,8 @@ def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
 
 
 def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
-    """Drives not known to stop when the bridge falls silent; drives of a node with the same reason share one
-    warning."""
+    """Report drives that are not known to stop when the bridge falls silent; drives of a node with the same
+    reason share one warning."""
     drives: dict[tuple[OwnVerdict, Text | str], list[str]] = {}
     for drive in node.drives:
         own = judged(bus, node, drive)
@@ -191,7 +191,7 @@ def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
 
 
 def _remedy(node: NodeView, names: Sequence[str]) -> Text:
-    """What a site can do about these drives, which would run on."""
+    """Remedy for these drives, which would run on."""
     family = node.family
     if settable(family) is not None:
         slots = [family.slot_named(drive.table.slot) for drive in node.drives if drive.name in names]

@@ -1,4 +1,4 @@
-"""PDOs that a node would refuse, or not evaluate."""
+"""Check for PDOs that a node would refuse, or not evaluate."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _check_identifier(pdo: PdoView, report: LintReport) -> None:
 
 
 def _check_type(family: Family, pdo: PdoView, report: LintReport) -> None:
-    """A transmission type that the site sets; a factory setting is not ours to judge."""
+    """Judge a transmission type that the site sets; factory settings are not judged."""
     kind, forbidden = pdo.transmission_type, family.process.forbidden_types
     if pdo.type_key is None:
         return

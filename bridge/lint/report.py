@@ -14,9 +14,9 @@ from bridge.tomlfile import Key, TomlFile, dotted
 
 class Severity(StrEnum):
     ERROR = "error"
-    """Cannot work."""
+    """The site cannot work."""
     WARNING = "warning"
-    """Can work, but deserves a second look."""
+    """The site can work, but deserves a second look."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,5 +53,5 @@ class LintReport:
         self._findings.append(LintFinding(severity, fault))
 
     def findings(self) -> tuple[LintFinding, ...]:
-        """In the order of the file."""
+        """Findings in the order of the file."""
         return tuple(sorted(self._findings, key=lambda finding: finding.fault.line))

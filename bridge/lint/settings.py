@@ -1,4 +1,4 @@
-"""What is downloaded to a node, as numbers, and where the site file says so."""
+"""Downloads to a node as numbers, each with its place in the site file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ENTRY_BITS: Final = 0xFF
 _EXTENDED_ID: Final = cobid.PDO_EXTENDED | 0x1FFF_FFFF
 RPDO: Final = (0x1400, 0x1600)
 TPDO: Final = (0x1800, 0x1A00)
-"""First communication and first mapping object."""
+"""Index of the first communication and the first mapping object."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +62,14 @@ class Settings:
         return default if found is None else found.value
 
     def of(self, index: int) -> Iterator[tuple[int, Setting]]:
-        """All sub-indices of an object."""
+        """Settings of an object by sub-index."""
         for (one, sub), setting in self._found.items():
             if one == index:
                 yield sub, setting
 
     @property
     def values(self) -> dict[tuple[int, int], int]:
-        """All of them."""
+        """All settings by index and sub-index."""
         return {place: setting.value for place, setting in self._found.items()}
 
     def pdos(self) -> Iterator[tuple[bool, int]]:

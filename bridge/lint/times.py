@@ -1,4 +1,4 @@
-"""Times that cannot work together."""
+"""Check for times that cannot work together."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from bridge.node.process.held import held_s, least_deadman_ms
 from bridge.text import Text
 
 _SLOW_ANSWER_MS: Final = 50
-"""How long an SDO answer may take: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind
+"""Longest time for an SDO answer: 30 + 20 ms in an 8400 motec (EDS84DMOTCAN 3.0 §9), 50 ms and more behind
 NORD's system bus."""
 _SDO_LIVES: Final = 10
 _ROUND_TRIP_MS: Final = 500
-"""Of a life sign's token: some 200 ms until an OPC UA or zenoh client is told of it (at once where a Modbus
-client reads it), a program that reads and writes every 100 ms, and the network."""
+"""Round trip of a life sign's token: some 200 ms until an OPC UA or zenoh client is told of it (at once where
+a Modbus client reads it), a program that reads and writes every 100 ms, and the network."""
 _LONGEST_DEADMAN_MS: Final = 10_000
 
 
@@ -37,7 +37,7 @@ def check_times(bus: BusView, report: LintReport) -> None:
 
 
 def life_ms(node: NodeView) -> int:
-    """After how long a silent node is lost; 0 where nothing watches it."""
+    """Silence in ms after which a node is lost; 0 where nothing watches it."""
     table = node.table
     factors = {"heartbeat": 1, "guarding": table.life_time_factor, "none": 0}
     return table.supervision_ms * factors[table.supervision]
@@ -114,7 +114,7 @@ def _check_life_sign(drive: DriveView, report: LintReport) -> None:
 
 
 def _check_range(drive: DriveView, report: LintReport) -> None:
-    """The range within which the owner may set its time-out."""
+    """Check the range within which the owner may set its time-out."""
     table, key = drive.table, (*drive.key, "fieldbus_timeout_range_ms")
     if table.fieldbus_timeout_range_ms is None or table.control == "none":
         return
@@ -131,7 +131,7 @@ def _check_range(drive: DriveView, report: LintReport) -> None:
 
 
 def _check_held(bus: BusView, drive: DriveView, report: LintReport) -> None:
-    """Whether a SYNC still makes the stop effective when controller and bridge fail together."""
+    """Check that a SYNC still makes the stop effective when controller and bridge fail together."""
     table, rpdo = drive.table, drive.rpdos[0]
     kind, sync_ms, timeout_ms = rpdo.transmission_type, bus.table.sync_period_ms, table.fieldbus_timeout_ms
     if not timeout_ms or table.control == "none" or table.telegram_downtime_s == IGNORE_ALL_S:
@@ -155,7 +155,7 @@ def _check_held(bus: BusView, drive: DriveView, report: LintReport) -> None:
 
 
 def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: LintReport) -> None:
-    """``telegram_downtime_s`` must exceed the time after which the TPDO is late (``command.link``)."""
+    """Check that ``telegram_downtime_s`` exceeds the time after which the TPDO is late (``command.link``)."""
     downtime_s = drive.table.telegram_downtime_s
     key = (*drive.key, "telegram_downtime_s")
     tpdo = drive.tpdos[0]
@@ -184,7 +184,7 @@ def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: Lint
 
 
 def _lacks(family: str, objects: Sequence[str]) -> Text:
-    """``objects`` are one or two that supervision needs."""
+    """Text on missing ``objects``, one or two that supervision needs."""
     if len(objects) == 1:
         return Text.of("check.no_error_control", family=family, object=objects[0])
     return Text.of("check.no_guarding", family=family, object=objects[0], other=objects[1])

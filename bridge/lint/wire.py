@@ -1,4 +1,4 @@
-"""What may be sent on the bus before a frame of ours, at the predicted load."""
+"""Frames that may go before one of ours, at the predicted load."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from bridge.lint.load import longest_bits, streams
 
 _LONGEST_BYTES: Final = 8
 _LONGEST_S: Final = 10.0
-"""A bus that is busy for this long without a pause is full."""
+"""Time in seconds after which a bus that is busy without a pause counts as full."""
 
 
 def wire_of(bus: BusView, rpdos: Sequence[PdoView], busy_bits: int | None) -> Wire:
-    """For what ``rpdos`` command; ``busy_bits`` is that of the bus."""
+    """Waiting times of ``rpdos``; ``busy_bits`` is that of the bus."""
     rate = bus.table.bitrate
     own_bits = sum(longest_bits(pdo.length) for pdo in rpdos if pdo.sent)
     # These RPDOs are among them.
@@ -25,7 +25,8 @@ def wire_of(bus: BusView, rpdos: Sequence[PdoView], busy_bits: int | None) -> Wi
 
 
 def busy_bits(bus: BusView) -> int | None:
-    """The most bits that can follow each other without a pause; None where the bus never comes to rest.
+    """Largest number of bits that can follow each other without a pause; None where the bus never comes to
+    rest.
 
     The queue of a CAN interface is first in, first out: a frame of ours with a low identifier may wait
     behind one that loses every arbitration (an SDO request, say). So all regular traffic may go first, and

@@ -1,4 +1,4 @@
-"""Words of the process data that no PDO carries, and those that are sent as 0 where 0 means something."""
+"""Check for words of the process data that no PDO carries, and those sent as 0 where 0 means something."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def check_words(bus: BusView, report: LintReport) -> None:
 
 
 def _check_carried(node: NodeView, drive: DriveView, report: LintReport) -> None:
-    """Each word that a value is made from has a PDO, of this drive or of another one behind the node: what
-    one of several has alone is the mapping file's choice. Others may keep the registers where they are in
-    every variant of a family."""
+    """Check that each word that a value is made from has a PDO, of this drive or of another one behind the
+    node: a word that only one of several has is the mapping file's choice. Words of no value may keep the
+    registers where they are in every variant of a family."""
     process, slots = node.family.process, node.family.slot
     for name, group, words, pdos_of in (
         ("rpdo", "command", process.rpdo, [pdo for one in slots for pdo in one.rpdo]),
@@ -59,8 +59,8 @@ def _check_carried(node: NodeView, drive: DriveView, report: LintReport) -> None
 def _check_on(
     drive: DriveView, slot: Slot, view: PdoView, described: PdoSummary | None, report: LintReport
 ) -> None:
-    """What the device has off is switched on by somebody: the site's table for it, a download, or the
-    mapping file."""
+    """Check that a PDO that is off in the device is switched on: by the site's table for it, a download, or
+    the mapping file."""
     pdo = _of(slot, view)
     is_switched = pdo.write or pdo.optional or view.cob_id_key is not None or view.key != drive.key
     if described is None or described.enabled or is_switched:
@@ -78,7 +78,7 @@ def _of(slot: Slot, view: PdoView) -> Pdo:
 
 
 def _check_zeros(node: NodeView, drive: DriveView, slot: Slot, report: LintReport) -> None:
-    """An object that is a setting by the profile is not sent as 0 unless that is its value."""
+    """Check that an object that is a setting by the profile is not sent as 0, unless that is its value."""
     for pdo, words, ref in _resting_at_zero(node.family, slot):
         entry = node.dictionary.entry(ref.index, ref.sub) if node.dictionary else None
         value = entry.current.at(node.table.id) if entry and entry.current else None
@@ -112,7 +112,7 @@ def _resting_at_zero(family: Family, slot: Slot) -> Iterator[tuple[Pdo, tuple[st
 
 
 def _parts(mapped: Sequence[MappedObject], rest: int) -> Iterator[tuple[ObjectRef, int]]:
-    """The objects in a word, each with what rests in it."""
+    """Objects in a word, each with its value at rest."""
     if len(mapped) != 1:
         return
     (only,) = mapped

@@ -1,4 +1,4 @@
-"""Lines into a file that is rotated by size, from a thread of its own: a disk that is full, slow or not
+"""File of lines that is rotated by size, written by a thread of its own: a disk that is full, slow or not
 writable costs lines, never time."""
 
 from __future__ import annotations
@@ -14,13 +14,14 @@ from typing import Final
 
 _MOST_WAITING: Final = 10_000
 _PAUSE_S: Final = 1.0
-"""After an error, lines are dropped for so long before the file is tried again."""
+"""Pause after an error before the file is tried again, seconds; lines are dropped meanwhile."""
 _CLOSE_S: Final = 2.0
 _MODE: Final = 0o640
 
 
 class AuditFile:
-    """``path`` with ``keep`` older ones beside it, ``path.1`` the youngest, each of ``max_bytes`` at most.
+    """The file ``path`` with ``keep`` older ones beside it, ``path.1`` the youngest, each of ``max_bytes`` at
+    most.
 
     A line is one ``write`` to a file opened with O_APPEND. What could not be written in full is taken back
     and counted as ``lost``; ``fault`` then says why, and is empty again when a line could be written.
@@ -46,7 +47,7 @@ class AuditFile:
         self._thread.start()
 
     def put(self, line: bytes) -> None:
-        """Have ``line`` written, without waiting for it."""
+        """Queue ``line`` to be written, without waiting."""
         try:
             self._lines.put_nowait(line)
         except queue.Full:
@@ -58,7 +59,7 @@ class AuditFile:
         return self.lost + self._dropped
 
     def close(self) -> None:
-        """Write what waits, but do not wait for a disk that hangs."""
+        """Write the queued lines, but do not wait for a disk that hangs."""
         with contextlib.suppress(queue.Full):
             self._lines.put(None, timeout=_CLOSE_S)
             self._thread.join(_CLOSE_S)

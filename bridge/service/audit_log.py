@@ -20,7 +20,7 @@ from bridge.text import Text, as_json
 
 _PERIOD_S: Final = 0.5
 _LONGEST_TEXT: Final = 300
-"""Callers on the network may send anything: long texts are cut."""
+"""Longest text, characters: callers on the network may send anything, longer ones are cut."""
 _encode = msgspec.json.Encoder().encode
 
 
@@ -117,7 +117,7 @@ class AuditLog:
                 file.close()
 
     async def run(self) -> None:
-        """Until cancelled: summaries, and whether lines are lost."""
+        """Write summaries and report lost lines, until cancelled."""
         while True:
             await asyncio.sleep(_PERIOD_S)
             self.look(self._clock())

@@ -45,7 +45,8 @@ from bridge.service.wear import WearKeeper
 _log = logging.getLogger(__name__)
 
 _START_S: Final = 45.0
-"""How long "ready" waits for fronts that neither serve nor fail; less than the unit's TimeoutStartSec."""
+"""Longest time that "ready" waits for fronts that neither serve nor fail, seconds; less than the unit's
+TimeoutStartSec."""
 
 _NOBODY_HURRIES_MS: Final = 1000
 
@@ -105,7 +106,7 @@ class Service:
             for bus, _ in networks
             if (site.page or bus.name in self.gateways) and isinstance(bus, SoftBus)
         ]
-        """For the page and for clients of the gateway, of buses that no other process can listen to."""
+        """Taps for the page and for clients of the gateway, of buses that no other process can listen to."""
         self._tasks: list[asyncio.Task[None]] = []
         self._ending: Ending | None = None
         drives, buses = count(len(self.plant.drives), "drive"), count(len(site.bus), "bus")
@@ -123,7 +124,7 @@ class Service:
             self._add_front("zenoh")
 
     def _make_gateways(self, taps: Mapping[str, Path]) -> dict[str, GatewayServer]:
-        """By bus; ``taps`` are where the frames of each are passed on."""
+        """Gateways by bus; ``taps`` are the sockets on which the frames of each are passed on."""
         site = self.project.site
         folder = Path(site.site.runtime_dir).absolute()
         return {
@@ -139,7 +140,7 @@ class Service:
         }
 
     def _add_front(self, role: str, port: Port | None = None) -> None:
-        """``port`` is what this process holds for it."""
+        """Add a front to the parts; ``port`` is the one that this process holds for it."""
         if port:
             self._ports[role] = port
         command = ["run", str(self.project.path), "--role", role]
@@ -175,8 +176,8 @@ class Service:
             await self._serve()
 
     async def _open_ports(self, stack: AsyncExitStack) -> None:
-        """Ports first: a service that cannot be reached has no business on the bus. One that cannot be opened
-        is tried again while the others are served, unless the site needs all."""
+        """Open the ports, before the buses: a service that cannot be reached must not command a bus. A port
+        that cannot be opened is tried again while the others are served, unless the site needs all."""
         ports, needs_all = self._opened, self.project.site.site.all_ports
         if self.modbus:
             stack.push_async_callback(self.modbus.close)
@@ -206,7 +207,8 @@ class Service:
         self.master.halt(clock.now())
 
     async def _serve(self) -> None:
-        """Until cancelled, or until a task ends: each runs for ever, or raises when its part has failed."""
+        """Run all tasks until cancelled or one ends: each runs for ever, or raises when its part has
+        failed."""
         parts = [*self._servers(), *self.fronts]
         self.supervisor.expect(parts)
         works = {
@@ -234,7 +236,7 @@ class Service:
         yield ServerPart("mirror", "the link to the fronts", self.mirror)
 
     async def _start(self) -> None:
-        """Ready is who serves what the site file says, or can say what it does not serve."""
+        """Report "ready" once each part serves or is known not to, and wait for ever."""
         with suppress(TimeoutError):
             await asyncio.wait_for(self.supervisor.all_known(), _START_S)
         self.notifier.ready(self.supervisor.status)
@@ -246,8 +248,8 @@ class Service:
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def _say_what_is_doubtful(self) -> None:
-        """A site with a doubtful prediction is run all the same: stopping a plant over it would be worse. The
-        prediction for each bus becomes part of the published times of what is commanded there."""
+        """Log doubtful predictions. The site runs all the same: stopping a plant over them would be worse.
+        The prediction for each bus becomes part of the published times of what is commanded there."""
         verdict = lint(self.project.site, self.project.families, self.project.path, self.project.downloads)
         for finding in verdict.findings:
             level = logging.ERROR if finding.severity is Severity.ERROR else logging.WARNING
@@ -272,7 +274,7 @@ class Service:
             await self.master.close()
 
     def _say_end(self) -> None:
-        """The last lines of the log."""
+        """Write the last lines of the log."""
         if self._ending is not None:
             level = logging.INFO if self._ending.is_good else logging.ERROR
             for line in self._ending.lines:

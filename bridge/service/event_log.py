@@ -1,4 +1,4 @@
-"""Events into the log."""
+"""Events in the log."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ _log = logging.getLogger("bridge.events")
 
 
 def log_event(event: Event) -> None:
-    """A listener for the plant's events. A trip and its acknowledgement are of one kind, but not of one
-    severity, and hide each other as little as a worse one."""
+    """Listener that logs the plant's events, limited by source, kind and severity: a trip and its
+    acknowledgement are of one kind and must not hide each other."""
     kind = event.kind, event.severity
     extra = about(event.source, kind, first=1 if event.kind in REPEATING else A_FEW)
     _log.log(_level(event.severity), "%s: %s", event.source, event.text, extra=extra)
 
 
 def _level(severity: int) -> int:
-    """Severities are OPC UA's: 1 … 1000."""
+    """Level of the log for a severity of OPC UA's, 1 … 1000."""
     if severity >= 700:
         return logging.ERROR
     return logging.WARNING if severity >= 300 else logging.INFO

@@ -1,4 +1,4 @@
-"""Front processes: started, heard, killed where they hang or grow too large, and stopped.
+"""Front processes: started, watched, killed where they hang or grow too large, and stopped.
 
 A front is heavy and may crash; it holds nothing up. It is a child of the bus process, with a lower
 priority, and dies with it.
@@ -22,9 +22,10 @@ from bridge.base.errors import BridgeError, OperationFailed
 
 SIGN_PERIOD_S: Final = 1.0
 _SILENT_LOOKS: Final = 5
-"""Between more looks than these, and since the last sign, this many seconds have passed for certain."""
+"""Looks without a sign of life after which a front counts as hung: at least as many seconds have passed
+then."""
 _REASON: Final = b"!"
-"""On the pipe of signs: what follows is why the front ends."""
+"""Byte on the pipe of signs before the reason why the front ends."""
 _LONGEST_REASON: Final = 1000
 _STOP_S: Final = 3.0
 FRONTS: Final = ("opcua", "page", "zenoh")
@@ -34,11 +35,12 @@ _PROMPT: Final = ("zenoh",)
 """Roles whose clients command drives over and over, and wait for each answer: as important as the bus process
 itself, which is ahead of them all the same where its unit gives it a real-time priority."""
 _FIRST_TO_GO: Final = 500
-"""``oom_score_adj`` (proc(5)): where the machine or the unit has no memory left, a front is what the kernel
-kills, and not the process that stops the drives."""
+"""``oom_score_adj`` (proc(5)) of fronts: where the machine or the unit has no memory left, the kernel kills a
+front, and not the process that stops the drives."""
 _MB: Final = 1024 * 1024
 _BEYOND: Final = 2
-"""A front that grows faster than it is looked at is refused memory beyond this many times its limit."""
+"""Multiple of its limit beyond which a front is refused memory, for one that grows faster than it is looked
+at."""
 _PR_SET_PDEATHSIG: Final = 1
 
 
@@ -72,8 +74,9 @@ class Front:
         return self._process.pid if self._process else None
 
     async def run_once(self, serves: Callable[[], None]) -> str:
-        """Run it until it ends; how that was, as the end of a sentence. ``serves`` is called at its first
-        sign of life; of one that is not watched, when it has run for a second. Cancelled, it is ended."""
+        """Run it until it ends. Returns how, as the end of a sentence. ``serves`` is called at its first sign
+        of life, or where it is not watched, once it has run for a second. When cancelled, the front is
+        ended."""
         ear = None
         try:
             ear = _Ear(serves) if self._watched else None
@@ -115,7 +118,7 @@ class Front:
     async def _wait(
         self, process: asyncio.subprocess.Process, ear: _Ear | None, serves: Callable[[], None]
     ) -> str:
-        """Until it ends, or is killed because it hangs."""
+        """Wait until it ends, or is killed because it hangs."""
         # One wait for all looks: of each that is given up, asyncio keeps a future until the process ends.
         ended = asyncio.create_task(process.wait())
         try:
@@ -169,11 +172,11 @@ class _Ear:
         self._loop.add_reader(self._end, self._hear)
 
     def look(self) -> None:
-        """One that is still starting may take its time."""
+        """Count a look without a sign of life; one that is still starting may take its time."""
         self.silent_looks += self._has_heard
 
     def let_go(self) -> None:
-        """The front has its end now."""
+        """Close our copy of the front's end; the front has it now."""
         if self._mouth_is_ours:
             self._mouth_is_ours = False
             os.close(self.mouth)
@@ -201,10 +204,8 @@ class _Ear:
 
 
 async def give_signs(pipe: int) -> None:
-    """A front's signs of life, from its event loop, until cancelled.
-
-    Raises ``OperationFailed`` where nobody listens any more.
-    """
+    """Called by a front: give signs of life from its event loop, until cancelled. Raises ``OperationFailed``
+    where nobody listens any more."""
     os.set_blocking(pipe, False)
     while True:
         try:
@@ -217,13 +218,13 @@ async def give_signs(pipe: int) -> None:
 
 
 def give_reason(pipe: int, reason: str) -> None:
-    """A front's last words: why it ends."""
+    """Called by a front: give the reason why it ends."""
     with contextlib.suppress(OSError):
         os.write(pipe, _REASON + " ".join(reason.split()).encode("utf-8", "replace")[:_LONGEST_REASON])
 
 
 def become_front(parent: int, role: str) -> None:
-    """Called by a front about itself: less important than the bus process, and not to outlive it."""
+    """Called by a front: lower its own priority below the bus process, and end with it."""
     if role not in _PROMPT:
         with contextlib.suppress(OSError):
             os.nice(_NICE)
@@ -236,7 +237,8 @@ def become_front(parent: int, role: str) -> None:
 
 
 def limit_memory(most_mb: int) -> None:
-    """Called by a front about itself: memory far beyond ``most_mb`` is refused to it, and that is its end."""
+    """Called by a front: limit its own memory to far beyond ``most_mb``; a front that is refused memory
+    ends."""
     with contextlib.suppress(OSError, ValueError):
         most = _BEYOND * most_mb * _MB
         resource.setrlimit(resource.RLIMIT_DATA, (most, most))

@@ -32,17 +32,18 @@ _log = logging.getLogger(__name__)
 
 
 def fault_texts(families: dict[str, Family]) -> FaultTexts:
-    """In German; English is what the points say."""
+    """Fault texts in German; the points have the English ones."""
     return {"de": {name: _in_german(family) for name, family in families.items()}}
 
 
 def _kept_sessions(site: Site) -> Path:
-    """Beside the socket of the mirror: the folder is ours alone, and empty after a boot."""
+    """File of the sessions, beside the socket of the mirror: the folder is ours alone, and empty after a
+    boot."""
     return Path(site.site.runtime_dir).absolute() / f"{site.site.name}-page.sessions"
 
 
 def exports_of(project: Project) -> dict[str, Export]:
-    """What ``drivebridge export`` prints, by the names of files."""
+    """Exports as ``drivebridge export`` prints them, by file name."""
     tables = {"modbus": modbus_table, "opcua": opcua_table, "zenoh": zenoh_table}
     if project.site.zenoh is None:
         del tables["zenoh"]
@@ -57,7 +58,7 @@ def exports_of(project: Project) -> dict[str, Export]:
 
 
 def backstage_of(project: Project) -> Backstage:
-    """What the page shows of the files, the buses and the system of ``project``."""
+    """Sources of the page: files, buses and system of ``project``."""
     buses = Buses(project, clock.epoch_ns)
     return Backstage(
         fault_texts(project.families),

@@ -23,20 +23,20 @@ _log = logging.getLogger(__name__)
 _FIRST_PAUSE_S: Final = 0.2
 _LAST_PAUSE_S: Final = 10.0
 _STABLE_S: Final = 30.0
-"""A part that has served for this long starts again with the first pause."""
+"""Time in seconds after which a part that served starts again with the first pause."""
 _LONGEST_REASON: Final = 300
 _FAILING: Final = "bridge/fronts_failing"
 
 
 class Part(Protocol):
-    """``name`` is what the point calls it, ``title`` what sentences do."""
+    """A supervised server or front. ``name`` is that of its point, ``title`` that in sentences."""
 
     name: str
     title: str
 
     async def run_once(self, serves: Callable[[], None]) -> str:
         """Start it where it has ended, call ``serves`` (once or more) when it can be used, and wait until it
-        ends: how, as the end of a sentence. May raise."""
+        ends. Returns how, as the end of a sentence. May raise."""
         ...
 
 
@@ -55,7 +55,7 @@ class Ports:
         self._failed: dict[str, str] = {}
 
     async def open(self, name: str, start: Callable[[], Awaitable[object]]) -> None:
-        """Start what serves under ``name``."""
+        """Open the port of ``name`` and start its server."""
         try:
             await start()
         except Unavailable as error:
@@ -64,12 +64,12 @@ class Ports:
             self._opened.add(name)
 
     def has(self, name: str) -> bool:
-        """Whether it has been opened."""
+        """True if it has been opened."""
         return name in self._opened
 
     def check(self, *, needs_all: bool) -> None:
-        """Raises ``Unavailable`` where none could be opened, or where one could not and the site
-        ``needs_all``: a service that cannot be reached has no business on the bus."""
+        """Raise ``Unavailable`` where none could be opened, or where one could not and the site
+        ``needs_all``: a service that cannot be reached must not command a bus."""
         if self._failed and (needs_all or not self._opened):
             raise Unavailable("\n".join(self._failed.values()))
 
@@ -112,7 +112,7 @@ class Supervisor:
 
     @property
     def status(self) -> str:
-        """One line for whoever looks after the service."""
+        """Status line of the service, for systemd."""
         return f"{self._status}; not served: {self._failing_text}" if self._failing else self._status
 
     @property
@@ -150,7 +150,7 @@ class Supervisor:
             return f"has failed: {error!r}"
 
     def _fails(self, part: Part, how: str, pause_s: float) -> None:
-        """An event at most once a minute: one that never comes up must not fill a disk."""
+        """Report a failure, at most once a minute: a part that never comes up must not fill a disk."""
         self._failing[part.name] = how
         now = self._clock()
         self._settled(part, now)

@@ -1,4 +1,4 @@
-"""How the plant is, as points and events of the bus process: judged twice a second, in portions."""
+"""Condition of the plant, as points and events of the bus process: judged twice a second, in portions."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from bridge.text import Text
 
 LOOK_EVERY_S: Final = 0.5
 _PORTION: Final = 20
-"""Buses and drives that are looked at in one go: about 0.1 ms."""
+"""Buses and drives that are judged in one go: about 0.1 ms."""
 _NO_NEWS: Final = 500
-"""Events below this severity tell that something is over, or was done."""
+"""Severity below which events report that something is over, or was done."""
 _UNPROVEN: Final = "stop_unproven"
 _NOTICED: Final = {
     Kind.NODE_LOST: "node_lost",
     Kind.WATCHDOG: "controller_silent",
     Kind.FRONT: "fronts_failing",
 }
-"""The trouble that an event is about."""
+"""Kind of trouble that an event is about."""
 
 
 class PlantCondition:
@@ -54,7 +54,7 @@ class PlantCondition:
         plant.because = self.because
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Judge the plant again and again, until cancelled."""
         while True:
             now = self._clock()
             for number, _ in enumerate(self.troubles.look(now * 1000, self._epoch_ns(now) / 1e6)):
@@ -64,7 +64,7 @@ class PlantCondition:
             await asyncio.sleep(LOOK_EVERY_S)
 
     def look(self) -> None:
-        """Once, at everything."""
+        """Judge everything once."""
         now = self._clock()
         self.troubles.beat(now * 1000, self._epoch_ns(now) / 1e6)
         self.show(now)
@@ -85,7 +85,7 @@ class PlantCondition:
         self._tell_causes(troubles.shown, now)
 
     def _tell_causes(self, shown: list[Shown], now: float) -> None:
-        """What no single event tells. A cause is told once, as soon as it is found."""
+        """Report causes that no single event tells, each once, as soon as it is found."""
         present: set[tuple[str, str, float]] = set()
         for one in shown:
             said = _said(one.trouble)
@@ -100,7 +100,7 @@ class PlantCondition:
         self._told_causes = present
 
     def because(self, event: Event) -> Text | str:
-        """What has caused an event, as a phrase; empty where nothing known has."""
+        """Cause of an event as a phrase; empty where none is known."""
         kind = _NOTICED.get(event.kind)
         if kind is None or event.source == "bridge" or event.severity < _NO_NEWS:
             return ""
@@ -109,7 +109,7 @@ class PlantCondition:
 
 
 def _said(trouble: Trouble) -> Text | None:
-    """A cause that is found by what several have in common."""
+    """Sentence on a cause that several troubles have in common; None for others."""
     facts = {name: fact for name, fact in trouble.facts if not isinstance(fact, Text)}
     match trouble.kind:
         case "bus_silent":

@@ -1,4 +1,4 @@
-"""What is checked before a bus is opened: a bridge that cannot go on must not move a drive."""
+"""Checks before a bus is opened: a bridge that cannot go on must not move a drive."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FULL: Final = (errno.ENOSPC, errno.EDQUOT)
 
 
 def check_files(site: Site, path: Path, *, fronts: bool) -> None:
-    """Files and folders of the site at ``path``, with ``fronts`` also what its fronts need. Raises
+    """Check files and folders of the site at ``path``, with ``fronts`` also what its fronts need. Raises
     ``FileFaults`` and ``Unavailable``."""
     folder = Path(site.site.state_dir)
     _check_state_folder(folder)
@@ -34,7 +34,7 @@ def check_files(site: Site, path: Path, *, fronts: bool) -> None:
 
 
 def _check_state_folder(folder: Path) -> None:
-    """Raises ``Unavailable`` if nothing can be written. A full disk is only reported: it costs lines of the
+    """Raise ``Unavailable`` if nothing can be written. A full disk is only reported: it costs lines of the
     audit log and counts of the EEPROM guard, and must not stop a plant."""
     try:
         folder.mkdir(mode=0o750, parents=True, exist_ok=True)

@@ -14,7 +14,7 @@ from bridge.parameter.ledger_file import LedgerFile
 _log = logging.getLogger(__name__)
 
 _PERIOD_S: Final = 1.0
-"""What was written within this time before a crash is not counted."""
+"""Period of keeping the counts, seconds: writes within it before a crash are not counted."""
 
 
 class WearKeeper:
@@ -29,7 +29,7 @@ class WearKeeper:
         self._fault = ""
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Keep the counts as they grow, until cancelled."""
         while True:
             await asyncio.sleep(_PERIOD_S)
             unsaved = self._ledger.take_unsaved()
@@ -51,7 +51,7 @@ class WearKeeper:
                 self._ledger.restore(totals, epoch_s, clock.now())
 
     def keep(self) -> None:
-        """Keep what is not kept yet, and take over what is."""
+        """Write the new counts to the file, and take over those in it."""
         try:
             self._file.add(self._ledger, _epoch_s(), clock.now())
         except OSError as error:

@@ -1,1 +1,1 @@
-"""What the page is given beside the plant: buses, captures, the system."""
+"""Sources of the page beside the plant: buses, captures, the system."""

@@ -1,4 +1,4 @@
-"""The buses of a site for the page: how they are listened to, what their frames say, how their PDOs look."""
+"""Buses of a site for the page: taps, decoded frames, layouts of the PDOs."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ class Buses:
         self._descriptions = family_dictionaries(devices, project.path)
 
     def ears(self) -> list[tuple[str, int, Ear]]:
-        """For each bus its name, bit rate and an ear."""
+        """Name, bit rate in bit/s and tap of each bus."""
         return [(name, table.bitrate, self._ear(table)) for name, table in self._tables.items()]
 
     def layouts(self) -> dict[str, Any]:
-        """For JSON: the nodes of each bus with the parts of their PDOs."""
+        """Nodes of each bus with the parts of their PDOs, for JSON."""
         return {
             name: {
                 "master": table.master_node_id,
@@ -103,7 +103,7 @@ class Buses:
 
 
 class _BusEar:
-    """Listens to one bus and decodes what it hears; each opening begins with a decoder that knows nothing."""
+    """Tap of one bus that decodes its frames; each opening begins with a fresh decoder."""
 
     def __init__(
         self,
@@ -155,7 +155,7 @@ class _BusEar:
 
 
 def _open(listener: Listener, table: BusTable) -> None:
-    """Raises ``OperationFailed``."""
+    """Open a bus to listen. Raises ``OperationFailed``."""
     try:
         listener.open()
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What is captured of a bus for the page, as python-can writes it to a file."""
+"""Capture of a bus for the page, as python-can writes it to a file."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _IDENTIFIER: Final = 0x1FFF_FFFF
 
 
 class CaptureFile:
-    """``form`` is ``candump`` or ``asc``; ``epoch_ns`` turns monotonic seconds into ns since 1970. Written as
-    frames come, because a line takes less memory than its frame."""
+    """A capture as text. ``form`` is ``candump`` or ``asc``; ``epoch_ns`` turns monotonic seconds into ns
+    since 1970. Written as frames come, because a line takes less memory than its frame."""
 
     def __init__(self, channel: str, form: str, epoch_ns: Callable[[float], int]) -> None:
         # Imported where somebody wants a file: it takes long.
@@ -46,7 +46,7 @@ class CaptureFile:
             self.frames += 1
 
     def content(self) -> bytes:
-        """All of it; nothing can be added after that."""
+        """The whole file; nothing can be added after that."""
         self._writer.stop()
         content = self._file.getvalue().encode()
         self._close()

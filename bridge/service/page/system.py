@@ -1,4 +1,4 @@
-"""What the page shows of the service itself, read from files and from the system when it is asked for."""
+"""Facts of the service itself for the page, read from files and from the system on request."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ _HASHES: Final = re.compile(
     r"""(\"{3}.*?\"{3}|'{3}.*?'{3}|"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[^\n]*)""",
     re.DOTALL,
 )
-"""What a key for a hash has for a value, whatever that is."""
+"""Value of a key for a hash, whatever that is."""
 _TABLES: Final = ("/proc/self/net/tcp", "/proc/self/net/tcp6")
 _ESTABLISHED: Final = "01"
 _MALFORMED: Final = (ValueError, TypeError, OverflowError, x509.InvalidVersion, UnsupportedAlgorithm)
-"""What a file raises that is no certificate, or one that is broken in any of its parts."""
+"""Errors of a file that is no certificate, or one that is broken in any of its parts."""
 _TAIL_BYTES: Final = 1 << 20
 
 
@@ -52,7 +52,7 @@ class SystemOf:
         self._versions: dict[str, str] = {}
 
     def versions(self) -> dict[str, str]:
-        """They stay while the process runs, and are looked for in many files."""
+        """Versions of the program and its libraries; kept, because they are looked for in many files."""
         if not self._versions:
             self._versions = {
                 "drivebridge": __version__,
@@ -145,7 +145,7 @@ def _version(package: str) -> str:
 
 
 def _ports(site: Site) -> Iterator[tuple[int, str]]:
-    """Which protocol is served on which port."""
+    """Ports that are served, each with its protocol."""
     for name, table in (("modbus", site.modbus), ("opcua", site.opcua), ("page", site.page)):
         if table:
             yield int(table.listen.rpartition(":")[2]), name
@@ -202,7 +202,7 @@ def _trusted(folder: Path) -> Iterator[CertificateFacts | Unreadable]:
 
 
 def _certificate(of: str, file: Path) -> Iterator[CertificateFacts | Unreadable]:
-    """Nothing where there is no file."""
+    """Facts of the certificate in a file, or why it cannot be read; nothing where there is no file."""
     try:
         content = file.read_bytes()
         is_text = content.lstrip().startswith(b"-----")

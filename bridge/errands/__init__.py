@@ -1,1 +1,1 @@
-"""What single commands do on a bus."""
+"""Bus tasks: the work of single commands on a bus."""

@@ -1,5 +1,4 @@
-"""What must be known of a drive, or of a node that is none, before it is written to without its bridge.
-Sans-IO."""
+"""Checks of a drive, or of a node that is none, before it is written to without its bridge. Sans-IO."""
 
 from __future__ import annotations
 
@@ -20,7 +19,7 @@ _WORD_BYTES = 2
 
 
 class Bystander(ForeignMaster):
-    """Listens for whoever commands this bus; ``status`` is the status word of a TPDO that is heard. A node
+    """Listener for another master of this bus; ``status`` is the status word of a TPDO that is heard. A node
     that is no drive has no slot, and no status word."""
 
     def __init__(
@@ -37,16 +36,16 @@ class Bystander(ForeignMaster):
 
 
 def command_ids(node: NodeTable, family: Family) -> frozenset[int]:
-    """On which identifiers the node is commanded: by its mapping, or where that does not say by the
-    pre-defined connection set."""
+    """Identifiers of the node's RPDOs: by its mapping, or where that has none by the pre-defined connection
+    set."""
     if family.is_device:
         return frozenset(base + node.id for base in cobid.RPDOS)
     return frozenset(pdo.cob_id + node.id for slot in family.slot for pdo in slot.rpdo)
 
 
 class Standstill:
-    """Sees to it that what is protected is not written while the drive is enabled, or an output of a node
-    that is no drive is anything but safe.
+    """Guard against writing protected parameters while the drive is enabled, or an output of a node that is
+    no drive is anything but safe.
 
     ``heard`` is the status word that it has sent by itself, for a drive that cannot be asked for it;
     ``outputs`` are those of a node without a slot. Where nobody knows it, only who uses ``force`` writes.
@@ -74,7 +73,7 @@ class Standstill:
 
     @property
     def gate(self) -> Gate:
-        """For who works at the machine: an engineer, and what moves is asked of the drive."""
+        """Gate for a user at the machine: an engineer; the drive itself is asked whether it moves."""
         return Gate(is_engineer=True, is_moving=lambda: False, asks=self.check)
 
     def concerns(self, entry: Entry) -> bool:
@@ -82,7 +81,8 @@ class Standstill:
         return judge(effect, is_engineer=True, is_moving=True) is Verdict.NOT_AT_REST
 
     def check(self, entries: Iterable[Entry]) -> Generator[Transfer, tuple[bytes, float], None]:
-        """Raises ``ParameterError`` with the names of those that are not written now."""
+        """Check that all of them may be written now. Raises ``ParameterError`` with the names of the
+        others."""
         concerned = ", ".join(entry.name for entry in entries if self.concerns(entry))
         if not concerned and not self._whole:
             return
@@ -100,8 +100,8 @@ class Standstill:
             )
 
     def _check_outputs(self, what: str, *, must_tell: bool) -> Generator[Transfer, tuple[bytes, float], None]:
-        """Raises ``ParameterError`` for the first output that the node holds at anything but its safe value;
-        one that is to hold its last value is safe at 0."""
+        """Check the outputs. Raises ``ParameterError`` for the first output that the node holds at anything
+        but its safe value; one that is to hold its last value is safe at 0."""
         for place in self._places:
             name = place.output.name
             rule = f"{what}: not written while an output is active"
@@ -118,7 +118,7 @@ class Standstill:
                 raise ParameterError(Why.PROTECTED, f"{rule}, and {name} is: make it safe first")
 
     def _status(self) -> Generator[Transfer, tuple[bytes, float], int | None]:
-        """The status word as the drive answers for the objects that make it up in its TPDO."""
+        """Status word, read by SDO from the objects that make it up in its TPDO."""
         if not all(part.index for part in self._parts):
             return self._heard
         each = _WORD_BYTES // len(self._parts)
@@ -133,6 +133,6 @@ class Standstill:
 
 
 def _is_active(place: Place, data: bytes) -> bool:
-    """Whether an output that holds these bytes is anything but safe."""
+    """True if an output that holds these bytes is anything but safe."""
     raw = int.from_bytes(data, "little") & ((1 << place.output.size) - 1)
     return raw != (place.safe or 0)

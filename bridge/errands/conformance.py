@@ -1,4 +1,4 @@
-"""What CiA 301 asks of a slave, tried on one node that stands still. Sans-IO.
+"""Conformance test of one node that stands still: requirements of CiA 301 on a slave. Sans-IO.
 
 Each check is a generator: it yields what is sent and which frames are waited for, is sent the frames that
 came, and notes its findings. What a check changes it notes in the slave, and the last one puts it back.
@@ -18,7 +18,7 @@ from bridge.canopen.sdo_transfer import ABORT, MUX, U32
 from bridge.errands.errand import Errand
 
 REACTION_S: Final = 1.0
-"""The longest that a node may take to do what NMT says."""
+"""Longest time for a node to follow an NMT command, seconds."""
 _SDO_BYTES: Final = 8
 _NOT_THERE: Final = (abort.NO_OBJECT, abort.NO_SUB, abort.UNKNOWN_COMMAND)
 """Abort codes: no such object, no such sub-index, no such service."""
@@ -28,14 +28,14 @@ class Verdict(StrEnum):
     PASSED = "passed"
     FAILED = "failed"
     NOT_OFFERED = "not offered"
-    """What a slave need not have."""
+    """The service is optional, and the node does not have it."""
     NOT_SEEN = "not seen"
-    """What could not be tried or told."""
+    """The rule could not be tried, or the trial decided nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """``clause`` is that of CiA 301; ``seen`` is what the node did."""
+    """Result of one rule. ``clause`` is that of CiA 301; ``seen`` is what the node did."""
 
     clause: str
     rule: str
@@ -61,11 +61,11 @@ class SetPdo:
     cob_id: int
     bits: int | None
     transmission_type: int | None
-    """None: it could not be read."""
+    """None where it could not be read."""
     inhibit_ms: float = 0.0
     event_ms: int = 0
     on_request: bool = False
-    """It is sent when it is asked for."""
+    """True if it is sent on request."""
 
 
 Answers = list[Frame]
@@ -81,13 +81,13 @@ class Slave:
         self.findings: list[Finding] = []
         self.tpdos: list[SetPdo] = []
         self.rpdos: list[SetPdo] = []
-        """Those that are on."""
+        """RPDOs that are on."""
         self.heartbeat_ms: int | None = None
-        """What 1017h was before it was changed; None where it is as it was."""
+        """Value of 1017h before a check changed it; None where it is unchanged."""
         self.is_displaced = False
-        """A check has started or stopped it."""
+        """True once a check has started or stopped the node."""
         self.slowest_ms = 0.0
-        """The longest that an SDO answer has taken."""
+        """Longest time that an SDO answer has taken."""
 
     def found(self, clause: str, rule: str, ok: bool, seen: str = "") -> None:
         self.findings.append(Finding(clause, rule, Verdict.PASSED if ok else Verdict.FAILED, seen))
@@ -136,7 +136,7 @@ def plain(answer: bytes) -> int | None:
 
 
 def expedited_bytes(answer: bytes) -> int | None:
-    """How long the object is that an expedited upload has brought; None for every other answer."""
+    """Length in bytes of an object from an expedited upload; None for every other answer."""
     if len(answer) != _SDO_BYTES or answer[0] & 0xE2 != 0x42:
         return None
     return 4 - (answer[0] >> 2 & 3) if answer[0] & 1 else 4
@@ -164,7 +164,7 @@ def shown(answer: bytes) -> str:
 
 
 def is_state(slave: Slave, *states: NmtState) -> Step:
-    """Until the node says in a heartbeat that it is in one of these states."""
+    """Step that waits for a heartbeat with one of these states."""
 
     def fits(frame: Frame) -> bool:
         one = frame.can_id == cobid.ERROR_CONTROL + slave.id and len(frame.data) == 1
@@ -174,7 +174,7 @@ def is_state(slave: Slave, *states: NmtState) -> Step:
 
 
 def send(*frames: Frame) -> Step:
-    """Nothing is waited for but the bus."""
+    """Step that sends and waits for no frame."""
     return Step(frames, lambda _: False, 0.05)
 
 
@@ -186,7 +186,7 @@ class Conformance(Errand):
         self.slave = slave
         self.done = 0
         self.heard: dict[int, set[int]] = {}
-        """The lengths of all data frames of the node's, by COB-ID."""
+        """Lengths of all data frames of the node, by COB-ID."""
         self._checks = [*checks]
         self.total = len(self._checks)
         self._last: Check | None = last

@@ -28,19 +28,19 @@ from bridge.errands.conformance_transfers import block, segmented
 _READ_ONLY: Final = 0x0601_0002
 _NO_ACCESS: Final = 0x0601_0000
 _RESERVED: Final = 0x0FFF
-"""An index that no device has (CiA 301 §7.4.1, table 40)."""
+"""Index that no device has (CiA 301 §7.4.1, table 40)."""
 _NO_SUCH_SUB: Final = 0x7F
 _NO_COMMAND: Final = 0x55
-"""No NMT command."""
+"""Command specifier that is no NMT command."""
 _BEAT_MS: Final = 100
 _BEATS: Final = 5
 _BEAT_SLACK: Final = 0.25
-"""How far the mean period may be from what was set, as a share of it: the test's own jitter is in it."""
+"""Tolerance of the mean period, as a share of the one that was set: the test's own jitter is in it."""
 _BOOT_UP_S: Final = 10.0
 
 
 def checks(slave: Slave, *, reset: bool) -> list[Check]:
-    """All of them, in the order in which they are made. ``reset`` resets the node's communication, too."""
+    """All checks, in the order in which they are made. ``reset`` resets the node's communication, too."""
     found = [
         mandatory(slave),
         error_codes(slave),
@@ -93,7 +93,7 @@ def mandatory(slave: Slave) -> Check:
 
 
 def error_codes(slave: Slave) -> Check:
-    """What is not there, or must not be written, is refused with the code for it."""
+    """Refusal of objects that are not there, or must not be written, with the abort code for it."""
     for rule, request, codes in (
         ("reading an object that is not there is refused", (_RESERVED, 0, b""), (abort.NO_OBJECT,)),
         ("reading a sub-index that is not there is refused", (0x1018, _NO_SUCH_SUB, b""), (abort.NO_SUB,)),
@@ -115,7 +115,7 @@ def error_codes(slave: Slave) -> Check:
 
 
 def unknown_requests(slave: Slave) -> Check:
-    """Requests that make no sense, and one that needs no answer."""
+    """Answers to invalid requests, and to one that needs none."""
     answer = yield from slave.ask(b"\xe0" + MUX.pack(0x1000, 0))
     rule = "an unknown command specifier is refused: 05040001h"
     slave.found("§7.2.4.3.17", rule, aborted(answer) == abort.UNKNOWN_COMMAND, shown(answer))
@@ -130,7 +130,7 @@ def unknown_requests(slave: Slave) -> Check:
 
 
 def emergency(slave: Slave) -> Check:
-    """Where emergency messages come, and the history of errors."""
+    """COB-ID of emergency messages, and the history of errors."""
     rule = "1014h is a COB-ID for emergency messages"
     answer = yield from slave.read(0x1014)
     cob_id = plain(answer)
@@ -155,7 +155,7 @@ def emergency(slave: Slave) -> Check:
 
 
 def heartbeat(slave: Slave) -> Check:
-    """A period set in 1017h is kept. It stays set for the checks of the NMT states."""
+    """Heartbeat period as set in 1017h. It stays set for the checks of the NMT states."""
     clause, rule = "§7.2.8.3.2.2", f"the heartbeat comes every {_BEAT_MS} ms where 1017h says so"
     answer = yield from slave.read(0x1017)
     before = plain(answer)
@@ -233,7 +233,7 @@ def stopping(slave: Slave) -> Check:
 
 
 def boot_up(slave: Slave) -> Check:
-    """Reset communication ends with one boot-up message, and the node answers after it."""
+    """Reset communication: it ends with one boot-up message, and the node answers after it."""
 
     def fits(frame: Frame) -> bool:
         return frame.can_id == cobid.ERROR_CONTROL + slave.id and frame.data == b"\0"
@@ -247,7 +247,7 @@ def boot_up(slave: Slave) -> Check:
 
 
 def lengths(slave: Slave, heard: dict[int, set[int]]) -> None:
-    """How long the node's frames were that were heard meanwhile."""
+    """Judge the lengths of the node's frames heard meanwhile: ``heard`` has them in bytes, by COB-ID."""
     if sizes := heard.get(cobid.EMCY + slave.id):
         slave.found("§7.2.7.3.1", "emergency messages have 8 bytes", sizes == {8}, f"{sorted(sizes)} bytes")
     for pdo in slave.tpdos:

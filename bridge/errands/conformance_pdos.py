@@ -1,4 +1,4 @@
-"""The checks of ``conformance`` on PDOs: how they are set, and what comes of it once the node is started.
+"""The checks of ``conformance`` on PDOs: their settings, and their traffic once the node is started.
 Sans-IO."""
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from bridge.errands.conformance import (
 )
 
 _PDOS: Final = 4
-"""So many of each kind are looked at: those that have a place in the pre-defined connection set."""
+"""PDOs of each kind that are checked: those of the pre-defined connection set."""
 _PDO_BITS: Final = 64
 _SYNCHRONOUS: Final = range(1, 241)
 _ON_REQUEST: Final = (252, 253)
 _EVENT_DRIVEN: Final = (254, 255)
 _MOST_SYNCS: Final = 20
 _SYNC_S: Final = 0.1
-"""The time after a SYNC in which its TPDO is waited for."""
+"""Longest wait for a TPDO after its SYNC, seconds."""
 _QUIET_S: Final = 0.2
 _LONGEST_EVENT_MS: Final = 2_000
 _EVENTS: Final = 4
 _SLACK: Final = 0.25
-"""As a share of a period: the test's own jitter is in it."""
+"""Tolerance as a share of a period: the test's own jitter is in it."""
 _TOO_SHORT: Final = b"\x10\x82"
 """8210h: PDO not processed due to length error (CiA 301 §7.2.7.1, table 26)."""
 _PRODUCES_SYNC: Final = 0x4000_0000
-"""Bit 30 of 1005h."""
+"""Bit 30 of 1005h: the node produces SYNC."""
 
 
 def settings_of_pdos(slave: Slave) -> list[Check]:
@@ -53,7 +53,7 @@ def settings_of_pdos(slave: Slave) -> list[Check]:
 
 
 def _setting(slave: Slave, number: int, *, sent: bool) -> Check:
-    """One PDO of the node's: its COB-ID, and that its mapped objects exist and fit into a frame."""
+    """Check one PDO of the node: its COB-ID, and that its mapped objects exist and fit into a frame."""
     name, of_mapping = (f"TPDO {number + 1}", "§7.5.2.38") if sent else (f"RPDO {number + 1}", "§7.5.2.36")
     parameter, mapping = (0x1800, 0x1A00) if sent else (0x1400, 0x1600)
     answer = yield from slave.read(parameter + number, 1)
@@ -100,7 +100,7 @@ def _setting(slave: Slave, number: int, *, sent: bool) -> Check:
 
 
 def _mapped(slave: Slave, name: str, entry: int, *, sent: bool) -> Check:
-    """That one mapped object is there, and as long as it is mapped. Below 0020h it is a gap."""
+    """Check that a mapped object is there, and as long as it is mapped. Below 0020h it is a gap."""
     of_mapping = "§7.5.2.38" if sent else "§7.5.2.36"
     index, sub, bits = entry >> 16, entry >> 8 & 0xFF, entry & 0xFF
     if index < 0x20:
@@ -115,8 +115,8 @@ def _mapped(slave: Slave, name: str, entry: int, *, sent: bool) -> Check:
 
 
 def operation(slave: Slave) -> Check:
-    """Start the node: its PDOs come as they are set, and in no other NMT state. An RPDO without data cannot
-    move anything, and is told."""
+    """Start the node, and check that its PDOs come as they are set, and in no other NMT state. An RPDO
+    without data cannot move anything, and is reported by the node."""
     syncs = yield from _syncs(slave)
     yield from _silent(slave, syncs, "no PDO comes before the node is started")
     slave.is_displaced = True
@@ -138,7 +138,7 @@ def operation(slave: Slave) -> Check:
 
 
 def _syncs(slave: Slave) -> Generator[Step, Answers, Iterator[Frame] | None]:
-    """The SYNC messages that the node waits for: None where it makes them itself."""
+    """SYNC messages that the node waits for; None where it produces them itself."""
     cob_id = yield from slave.number(0x1005)
     overflow = yield from slave.number(0x1019)
     if cob_id is not None and cob_id & _PRODUCES_SYNC:
@@ -157,7 +157,7 @@ def _silent(slave: Slave, syncs: Iterator[Frame] | None, rule: str) -> Check:
 
 
 def _comes(slave: Slave, pdo: SetPdo, syncs: Iterator[Frame] | None) -> Check:
-    """That a TPDO comes as its transmission type says."""
+    """Check that a TPDO comes as its transmission type says."""
     kind = pdo.transmission_type
     if kind in _SYNCHRONOUS:
         yield from _comes_by_sync(slave, pdo, syncs)
@@ -202,7 +202,8 @@ def _comes_on_request(slave: Slave, pdo: SetPdo, syncs: Iterator[Frame] | None) 
 
 
 def _comes_by_timer(slave: Slave, pdo: SetPdo) -> Check:
-    """At least as often as its event timer says, at most as often as its inhibit time allows."""
+    """Check that a TPDO comes at least as often as its event timer says, and at most as often as its inhibit
+    time allows."""
     period_ms = max(pdo.event_ms, pdo.inhibit_ms)
     rule = f"{pdo.name} comes every {period_ms:g} ms at least, as its event timer says"
     if period_ms > _LONGEST_EVENT_MS:
@@ -223,7 +224,7 @@ def _gaps(gaps_ms: Sequence[float]) -> str:
 
 
 def _is_told(slave: Slave, pdo: SetPdo) -> Check:
-    """A slave need not have emergency messages, nor this one."""
+    """Check the emergency message after an RPDO without data, where one comes: a slave need not have any."""
     rule = f"{pdo.name} without data is told by an emergency message, 8210h"
     if pdo.bits == 0:
         return

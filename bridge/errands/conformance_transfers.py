@@ -25,7 +25,7 @@ _MOST_SEGMENTS: Final = 200
 
 
 def _whole(slave: Slave, index: int) -> Generator[Step, Answers, tuple[bytes | None, int | None, str, bytes]]:
-    """An object of any length by segments: what came, how much was announced, what went wrong, and the last
+    """Segmented upload of an object of any length: data, length announced in bytes, error, and the last
     answer."""
     answer = yield from slave.ask(b"\x40" + MUX.pack(index, 0))
     size = expedited_bytes(answer)
@@ -51,7 +51,7 @@ def _whole(slave: Slave, index: int) -> Generator[Step, Answers, tuple[bytes | N
 
 
 def segmented(slave: Slave) -> Check:
-    """The device name by segments, and the toggle bit."""
+    """Segmented upload of the device name, and its toggle bit."""
     clause, rule = "§7.2.4.3.6", "1008h is read by segments, with alternating toggle bit"
     data, announced, why, answer = yield from _whole(slave, _NAME)
     if data is None and announced is None:
@@ -73,7 +73,7 @@ def segmented(slave: Slave) -> Check:
 
 
 def block(slave: Slave) -> Check:
-    """The device name as a block upload with CRC, against what came by segments."""
+    """Block upload of the device name with CRC, compared with the segmented one."""
     clause, rule = "§7.2.4.3.12", "1008h is read as a block"
     wanted, _, _, last = yield from _whole(slave, _NAME)
     if wanted is None:

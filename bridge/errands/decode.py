@@ -1,4 +1,4 @@
-"""What frames on a CANopen bus mean, for ``monitor``: COB-ID, contents, drive words. Sans-IO.
+"""Meaning of the frames on a CANopen bus, for ``monitor``: COB-ID, contents, drive words. Sans-IO.
 
 COB-IDs are those of the pre-defined connection set (CiA 301 §7.3.3) and, for the nodes of a site,
 those of their mapping files. Nothing is asked of anybody: a node that has been given other COB-IDs or
@@ -63,8 +63,8 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """``node`` is the CANopen address that it is about, 0 for all or none; ``label`` what the COB-ID
-    stands for; ``values`` the facts by name, for scripts."""
+    """Meaning of one frame. ``node`` is the node id that it is about, 0 for all or none; ``label`` the name
+    of its COB-ID; ``values`` the facts by name, for scripts."""
 
     kind: Kind
     node: int
@@ -100,7 +100,7 @@ class Decoder:
                     self._pdos.update(device_views(node, family, (descriptions or {}).get(node.mapping_key)))
 
     def decode(self, frame: Frame) -> Meaning:
-        """What ``frame`` says; every frame says something."""
+        """Meaning of ``frame``; every frame has one."""
         cob_id = frame.can_id & STANDARD_MASK
         if frame.can_id & EXTENDED:
             return Meaning(Kind.OTHER, 0, "29-bit", frame.data.hex(" ").upper())
@@ -121,7 +121,7 @@ class Decoder:
         return self._of_node(cob_id & ~0x7F, cob_id & 0x7F, frame.data)
 
     def tpdo_bytes(self, cob_id: int) -> int | None:
-        """Length of a TPDO by the mapping file; None for what is none of the site's."""
+        """Length of a TPDO in bytes by the mapping file; None for identifiers that are none of the site's."""
         view = self._pdos.get(cob_id)
         return view.codec.length if view is not None and view.label.startswith("TPDO") else None
 
@@ -194,7 +194,7 @@ class Decoder:
 
     @staticmethod
     def _emcy_drive(family: Family | None, data: bytes) -> str:
-        """Which drive of the node it is about, where the family says so in a byte."""
+        """Drive of the node that an emergency message is about, where the family has a byte for it."""
         byte = family.emcy.drive_byte if family else None
         if family is None or byte is None or byte >= len(data):
             return ""

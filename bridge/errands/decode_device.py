@@ -1,4 +1,4 @@
-"""Process data of a site's nodes that are no drives, for those who only listen: objects by their names."""
+"""Process data of a site's nodes that are no drives, for a listener: objects by their names."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _DIGITS: Final = 6
 
 @dataclass(frozen=True, slots=True)
 class DevicePdoView:
-    """One PDO of a node, as its device description has it. ``signals`` are what its entries are, None for
-    one that the mapping does not know."""
+    """One PDO of a node, as its device description has it. ``signals`` are its entries, None for one that the
+    mapping does not know."""
 
     node_id: int
     label: str
@@ -28,7 +28,8 @@ class DevicePdoView:
     signals: tuple[Signal | None, ...]
 
     def said(self, data: bytes) -> tuple[str, tuple[tuple[str, Value | float], ...]]:
-        """A sentence and the values by name. Data of any length is taken as far as it goes."""
+        """Sentence and values by name for the data of a frame. Data of any length is taken as far as it
+        goes."""
         length = self.codec.length
         parts: list[str] = []
         values: list[tuple[str, Value | float]] = []

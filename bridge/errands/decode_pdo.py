@@ -1,4 +1,4 @@
-"""Process data of a site's drives, for those who only listen: words by name, state, values."""
+"""Process data of a site's drives, for a listener: words by name, state, values."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class PdoView:
     label: str
     words: tuple[tuple[int, str], ...]
     ends: tuple[int, ...]
-    """Behind which bit of the frame each of the words is whole."""
+    """Bits of the frame up to which each of the words is complete."""
     places: int
     codec: PdoCodec
     map: WordMap
@@ -37,7 +37,8 @@ class PdoView:
     """Values whose scale is known of parameter set 1 alone."""
 
     def said(self, data: bytes) -> tuple[str, tuple[tuple[str, Value | float], ...]]:
-        """A sentence and the values by name. Data of any length is taken as far as it goes."""
+        """Sentence and values by name for the data of a frame. Data of any length is taken as far as it
+        goes."""
         length = self.codec.length
         words = [0] * self.places
         self.map.unpack(self.codec.unpack(data[:length].ljust(length, b"\0")), words)

@@ -27,15 +27,15 @@ from bridge.master.network import Network
 
 BOOT_WITHIN_S: Final = 30.0
 ARM_S: Final = 1.0
-"""How long everything is sent before the silence: the first RPDO, heartbeat or guard request starts the
-drive's supervision."""
+"""Time of sending everything before the silence, seconds: the first RPDO, heartbeat or guard request starts
+the drive's supervision."""
 MARGIN_S: Final = 1.0
 UNKNOWN_S: Final = 5.0
-"""How long to wait for a drive whose own time-out is not known, or off."""
+"""Longest wait for a drive whose own time-out is not known, or off, seconds."""
 RETURN_S: Final = 1.0
 RETURN_WITHIN_S: Final = 20.0
 MESSAGE_MS: Final = 50
-"""How long the emergency message or TPDO that shows the reaction may be on its way."""
+"""Longest delay of the emergency message or TPDO that shows the reaction, ms."""
 
 
 class Phase(StrEnum):
@@ -62,15 +62,15 @@ class DropOutcome:
     own: OwnJudgement
     state_before: DriveState
     seen: list[tuple[float, str]] = field(default_factory=list[tuple[float, str]])
-    """What came from it in the silence: ms, what."""
+    """Messages from it in the silence: time in ms and text."""
     reacted_ms: float | None = None
     noticed_ms: float | None = None
     state_after: DriveState = DriveState.UNKNOWN
     fault_after: str = ""
     latency_ms: int = MESSAGE_MS
-    """What a node that says its state in its heartbeat may add."""
+    """Delay in ms of a node that shows its state in its heartbeat."""
     rpdos_alone: bool = False
-    """All but the RPDOs went on."""
+    """True if all but the RPDOs went on."""
 
     @property
     def own_ms(self) -> float:
@@ -91,7 +91,7 @@ class DropOutcome:
 
     @property
     def bound_ms(self) -> float:
-        """Within which time of the last frame the reaction has to show; 0 where there is none to come."""
+        """Longest time in ms from the last frame to the reaction; 0 where none is expected."""
         return self.own_ms + MESSAGE_MS if self.own_ms else 0.0
 
     @property
@@ -122,11 +122,11 @@ class DropTest:
         self.failure = ""
         self.outcomes: list[DropOutcome] = []
         self.silent_s = 0.0
-        """How long nothing was sent."""
+        """Length of the silence, seconds."""
         self.notes = ""
-        """What the boot-up said."""
+        """Notes of the boot-up."""
         self.rpdos_alone = any(drive.falls_silent for drive in node.table.drive)
-        """The site stops drives of the node by ending their RPDOs, and by nothing else."""
+        """True if the site stops drives of the node by ending their RPDOs, and by nothing else."""
         self._core = next(core for core in network.nodes if core.node is node)
         self._plant = plant
         self._node = node
@@ -225,7 +225,7 @@ class DropTest:
 
     @property
     def _outputs(self) -> list[Outputs]:
-        """Those of a node that is no drive. They tell nothing themselves: the node leaves Operational."""
+        """Outputs of a node that is no drive. They send nothing themselves: the node leaves Operational."""
         return [one for one in self._node.commanded if isinstance(one, Outputs)]
 
     def _pairs(self) -> list[tuple[Drive, DropOutcome]]:
@@ -272,11 +272,11 @@ class DropTest:
 
 
 _COMES: Final = 700
-"""Severity of an emergency message that comes; one that goes has less."""
+"""Least severity of an emergency message that sets an error; one that resets it has less."""
 
 
 class ForeignMaster(Errand):
-    """Listens for whoever commands this bus already: then no test must be made. ``found`` says what it was.
+    """Listener for another master of this bus: with one no test must be made. ``found`` says what was heard.
 
     ``commands`` are the identifiers of the node's RPDOs.
     """

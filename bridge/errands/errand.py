@@ -1,4 +1,4 @@
-"""Work of a single command on a bus: frames and time in, frames out. Sans-IO."""
+"""Bus tasks, the work of a single command on a bus: frames and time in, frames out. Sans-IO."""
 
 from __future__ import annotations
 
@@ -14,11 +14,8 @@ NOTHING_KNOWN: Final[Mapping[int, str]] = MappingProxyType({})
 
 
 class Errand(ABC):
-    """Times are monotonic seconds. What is to be sent is put into ``_frames``.
-
-    Whoever runs it counts the frames: ``sent`` are all that it has given, ``unsent`` those that the bus did
-    not take in time.
-    """
+    """Base of all tasks. Times are monotonic seconds. Frames to be sent go into ``_frames``. The caller
+    counts them: ``sent`` is the number of all, ``unsent`` of those that the bus did not take in time."""
 
     sent: int = 0
     unsent: int = 0
@@ -45,7 +42,7 @@ class Errand(ABC):
 
 
 class SdoErrands(Errand):
-    """What is done over SDO channels side by side. ``_now`` is the latest time that is known."""
+    """Task that uses SDO channels side by side. ``_now`` is the latest time that is known."""
 
     def __init__(self, channels: Iterable[SdoChannel], now: float) -> None:
         super().__init__()
@@ -53,8 +50,8 @@ class SdoErrands(Errand):
         self._channels = {channel.reply_id: channel for channel in channels}
 
     def take_learned(self) -> dict[int, str]:
-        """Why servers are not asked for block transfer any more, by the COB-ID of their requests: once for
-        each, when that was found out."""
+        """Reasons why servers are not asked for block transfer any more, by the COB-ID of their requests:
+        each given once, when it was found out."""
         learned = {channel.request_id: channel.take_learned() for channel in self._channels.values()}
         return {request_id: why for request_id, why in learned.items() if why}
 

@@ -1,6 +1,5 @@
-"""What a drive remembers of its faults: the numbers that it keeps itself, and the error list of its node,
-1003h (CiA 301 §7.5.2.4).
-"""
+"""Fault memory of a drive: the numbers that it keeps itself, and the error list of its node, 1003h (CiA 301
+§7.5.2.4)."""
 
 from __future__ import annotations
 
@@ -20,8 +19,8 @@ _WORD: Final = 0xFFFF
 
 @dataclass(frozen=True, slots=True)
 class Remembered:
-    """``where`` is a parameter such as P701[1], or the entry of 1003h, which has 16 bits of the maker's
-    beside the code: ``information``."""
+    """One remembered fault. ``where`` is a parameter such as P701[1], or the entry of 1003h, which has 16
+    bits of the maker's beside the code: ``information``."""
 
     where: str
     explained: Explained
@@ -32,7 +31,7 @@ Asks = Generator[Transfer, tuple[bytes, float], list[Remembered]]
 
 
 def fault_memory(access: DriveParameters, family: Family, words: FaultWords, now: float) -> Asks:
-    """Ask a drive for all that it remembers, each list with the newest first. What it does not have is left
+    """Read the fault memory of a drive, each list with the newest first. Lists that it does not have are left
     out. Raises ``ParameterError`` where it does not answer."""
     found: list[Remembered] = []
     event = family.emcy.event

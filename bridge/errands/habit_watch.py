@@ -13,13 +13,13 @@ _SDO_BYTES: Final = 8
 _EMCY_BYTES: Final = 8
 _HEARTBEAT_BYTES: Final = 1
 _LONGEST_WAIT_S: Final = 5.0
-"""An answer that comes later belongs to no request."""
+"""Age of a request in seconds after which an answer does not belong to it."""
 _ABORT: Final = 0x80
 
 
 class HabitWatch:
-    """``timeout_s`` is the site's SDO time-out of a node, ``tpdo_bytes`` the length of a TPDO by its COB-ID,
-    None where nobody knows it."""
+    """Watch on the habits of all nodes. ``timeout_s`` is the site's SDO time-out of a node, ``tpdo_bytes``
+    the length of a TPDO by its COB-ID, None where nobody knows it."""
 
     def __init__(self, timeout_s: Callable[[int], float], tpdo_bytes: Callable[[int], int | None]) -> None:
         self._timeout_s = timeout_s
@@ -51,7 +51,7 @@ class HabitWatch:
                 pass
 
     def habits(self) -> dict[int, list[str]]:
-        """By node id, those that have any."""
+        """Habits by node id, of the nodes that have any."""
         said = {node_id: counter.said() for node_id, counter in sorted(self._counters.items())}
         return {node_id: habits for node_id, habits in said.items() if habits}
 

@@ -1,4 +1,4 @@
-"""LSS for the command line: which device, what is to be done with it, and how it is carried out. Sans-IO."""
+"""LSS for the command line: selection of a device, services on it, and their transfer. Sans-IO."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from bridge.canopen.lss import LssAddress, LssError, LssExchange, Service
 from bridge.errands.errand import Errand
 
 _PAUSE_S: Final = 0.02
-"""After a request that nobody answers: the devices have to act on it."""
+"""Pause after a request without an answer, seconds: the devices have to act on it."""
 _FIRST_QUESTION: Final = 5
-"""How many times longer the first question of a scan waits: it measures how quick the devices are."""
+"""Factor on the wait for the first question of a scan, which measures how quick the devices are."""
 _SAFETY: Final = 4
-"""How many times longer than the slowest answer so far the next ones are waited for."""
+"""Factor on the time of the slowest answer so far, for the wait for the next ones."""
 
 _R = TypeVar("_R")
 
 
 class LssErrand(Errand, Generic[_R]):
-    """Carries a service's requests to the bus and the replies back.
+    """Task that carries a service's requests to the bus and the replies back.
 
     ``error`` says why it failed; ``steps`` and ``step`` tell how far it is. Times are monotonic seconds.
 
@@ -35,7 +35,7 @@ class LssErrand(Errand, Generic[_R]):
         self.steps = 0
         self.step = ""
         self.late = 0
-        """Answers to a scan that came when nobody waited for one."""
+        """Number of answers to a scan that came when none was expected."""
         self._dialogue = Dialogue(service, self._ask, self._done, (LssError,))
         self._timeout_s = timeout_s
         self._exchange: LssExchange | None = None
@@ -52,7 +52,7 @@ class LssErrand(Errand, Generic[_R]):
 
     @property
     def result(self) -> _R:
-        """What the service returned. Raises LssError where it failed or has not ended."""
+        """Result of the service. Raises LssError where it failed or has not ended."""
         if not self._result:
             raise self.error or LssError("interrupted")
         return self._result[0]
@@ -111,7 +111,7 @@ class LssErrand(Errand, Generic[_R]):
         return max(least_s, _SAFETY * self._slowest_s)
 
     def _end(self, error: LssError | None) -> None:
-        """Whatever came of it, no device is left in configuration state."""
+        """End the service; after an error all devices are switched back to waiting state."""
         self.error = error
         if error:
             self._frames += [Frame(lss.REQUEST_ID, exchange.request) for exchange in lss.to_waiting()]
@@ -121,7 +121,7 @@ class LssErrand(Errand, Generic[_R]):
 
 
 def select(which: LssAddress | None) -> Service[None]:
-    """One device to configuration state: the one with this identity, or the only one on the bus."""
+    """Switch one device to configuration state: the one with this identity, or the only one on the bus."""
     if which is None:
         yield from lss.switch_global(configuration=True)
     else:
@@ -130,7 +130,7 @@ def select(which: LssAddress | None) -> Service[None]:
 
 
 def inquire(which: LssAddress | None) -> Service[tuple[LssAddress, int]]:
-    """Identity and node id of a device."""
+    """Read identity and node id of a device."""
     yield from select(which)
     identity = yield from lss.inquire_identity()
     node_id = yield from lss.inquire_node_id()
@@ -139,7 +139,7 @@ def inquire(which: LssAddress | None) -> Service[tuple[LssAddress, int]]:
 
 
 def set_node_id(which: LssAddress | None, node_id: int, *, keep: bool) -> Service[None]:
-    """A new node id; ``keep`` stores it. A device that had none takes it when it leaves configuration."""
+    """Set a new node id; ``keep`` stores it. A device that had none takes it when it leaves configuration."""
     yield from select(which)
     yield from lss.configure_node_id(node_id)
     if keep:
@@ -150,7 +150,7 @@ def set_node_id(which: LssAddress | None, node_id: int, *, keep: bool) -> Servic
 def set_bit_rate(
     which: LssAddress | None, bit_rate: int | None, *, keep: bool, activate_ms: int | None
 ) -> Service[None]:
-    """A new bit rate, valid after the device's next start, or within twice ``activate_ms`` from now."""
+    """Set a new bit rate, valid after the device's next start, or within twice ``activate_ms`` from now."""
     yield from select(which)
     yield from lss.configure_bit_rate(bit_rate)
     if keep:

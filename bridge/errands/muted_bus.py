@@ -1,4 +1,4 @@
-"""A bus that can be muted: the master goes on listening, and nothing of it is sent any more."""
+"""Bus that can be muted: the master goes on listening, and nothing of it is sent any more."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class MutableBus:
         self._accepted: list[int] = []
         self._bursting: set[int] = set()
         self._muted: frozenset[int] | None = None
-        """The identifiers that are muted alone; None: all are."""
+        """Muted identifiers; None for all."""
         self._sent_at: dict[int, float] = {}
         self.is_muted = False
 
@@ -63,8 +63,8 @@ class MutableBus:
 
     @property
     def last_sent(self) -> float:
-        """When the last of our frames that are muted was on the bus, as far as the bus tells: bursts come
-        back with their time stamps."""
+        """Time of the last muted frame of ours on the bus, as far as known: bursts come back with their time
+        stamps."""
         muted = self._muted
         return max(
             (at for can_id, at in self._sent_at.items() if muted is None or can_id in muted),
@@ -83,7 +83,7 @@ class MutableBus:
         self._bus.end_burst(can_id)
 
     def mute(self, only: frozenset[int] | None = None) -> None:
-        """From now on nothing is sent: no SYNC, no RPDO, no heartbeat, no guarding, no SDO; or nothing on the
+        """Send nothing from now on: no SYNC, no RPDO, no heartbeat, no guarding, no SDO; or nothing on the
         identifiers in ``only``."""
         self.is_muted, self._muted = True, only
         for can_id in self._bursting:

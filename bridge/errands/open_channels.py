@@ -1,4 +1,4 @@
-"""Opens a node's further SDO servers as its boot-up does, for who has to reach all of its drives. Sans-IO."""
+"""Opening of a node's further SDO servers as in its boot-up, to reach all of its drives. Sans-IO."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ _Failure = SdoError | BootError
 
 
 class OpenChannels(SdoErrands):
-    """``notes`` says what was opened, ``failure`` why something could not be."""
+    """Task that opens them. ``notes`` lists those that were opened, ``failure`` is the reason why one could
+    not be."""
 
     def __init__(self, node: Node, now: float) -> None:
         self._sdo = SdoChannels(node)

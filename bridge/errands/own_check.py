@@ -1,4 +1,4 @@
-"""Asks nodes what their drives would do if the bridge fell silent, beside a running bridge. Sans-IO."""
+"""Question to nodes, beside a running bridge: what their drives would do if it fell silent. Sans-IO."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Judgements = dict[str, OwnJudgement]
 
 
 def ask(node: Node) -> Generator[Read, bytes | None, Judgements]:
-    """What each drive of the node would do, by the drive's name, or the node itself with its outputs."""
+    """Judgement of each drive of the node, by the drive's name, or of the node itself with its outputs."""
     of_node = yield from read_places(node, None, link=True)
     found: Judgements = {}
     for drive in node.drives:
@@ -44,8 +44,8 @@ def _of_outputs(
 
 
 class OwnCheck(SdoErrands):
-    """All nodes side by side. ``found`` has what was read, by drive; ``failed`` why a node could not be
-    asked, by node."""
+    """Task that asks all nodes side by side. ``found`` has the judgements by drive, ``failed`` the reasons
+    why nodes could not be asked, by node."""
 
     def __init__(self, nodes: Sequence[Node], now: float) -> None:
         of_nodes = [SdoChannels(node) for node in nodes]

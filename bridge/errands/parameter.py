@@ -1,4 +1,4 @@
-"""A procedure on one drive's parameters as an errand for the command line. Sans-IO."""
+"""Procedure on one drive's parameters as a task for the command line. Sans-IO."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ T = TypeVar("T")
 
 
 class ParameterErrand(SdoErrands, Generic[T]):
-    """A node that is no drive has no slot. ``make`` gives the procedure, of now. ``known`` says by the COB-ID
-    of its requests why a server is not asked for block transfer. ``result`` is None until it has ended."""
+    """Task that runs a procedure. A node that is no drive has no slot. ``make`` gives the procedure for the
+    present time. ``known`` says by the COB-ID of its requests why a server is not asked for block transfer.
+    ``result`` is None until it has ended."""
 
     def __init__(
         self,

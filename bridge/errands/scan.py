@@ -1,4 +1,4 @@
-"""Finds the nodes of a bus: by their own messages, by SDO and by node guarding. Sans-IO.
+"""Scan for the nodes of a bus: by their own messages, by SDO and by node guarding. Sans-IO.
 
 All 127 ids are asked side by side. An SDO answer alone proves no node: a device with a second SDO
 server answers there for an id that nobody has (Lenze node n on 5C0h + n, which is the first channel of
@@ -22,11 +22,11 @@ from bridge.errands.errand import Errand
 
 _IDS: Final = range(1, 128)
 _OTHER_CHANNELS: Final = range(0x1201, 0x1204)
-"""The further SDO servers that devices have: NORD and STÖBER 2…4, Lenze 2."""
+"""Parameter objects of further SDO servers that devices have: NORD and STÖBER 2…4, Lenze 2."""
 _TWINS: Final = (96, 64, 32)
-"""How far from its node's id another SDO channel on 580h…5FFh shows up."""
+"""Distances from its node's id at which another SDO channel shows up on 580h…5FFh."""
 _BITS_PER_ID: Final = 400
-"""One request and its answer, and as much again for everybody else on the bus."""
+"""Bits of one request and its answer, and as many again for everybody else on the bus."""
 _LEAST_STEP_S: Final = 0.001
 
 
@@ -40,7 +40,7 @@ Interview = Generator[Read | Guard, bytes | None, None]
 
 @dataclass(slots=True)
 class FoundNode:
-    """What is known of one id; None for what the node does not say."""
+    """Findings on one id; None for objects that the node does not have."""
 
     id: int
     nmt_state: NmtState = NmtState.UNKNOWN
@@ -53,14 +53,14 @@ class FoundNode:
     serial: int | None = None
     name: str = ""
     first_channel: int | None = None
-    """1200h:1, where the first SDO server takes its requests."""
+    """1200h:1, the COB-ID on which the first SDO server takes its requests."""
     emcy_id: int | None = None
     other_channels: set[int] = field(default_factory=set[int])
     """COB-IDs on which its other SDO servers take requests."""
     has_heartbeat: bool | None = None
-    """Whether there is a 1017h; None where the node was not asked."""
+    """True if there is a 1017h; None where the node was not asked."""
     has_guarding: bool | None = None
-    """Whether there is a 100Ch, likewise."""
+    """True if there is a 100Ch; None where the node was not asked."""
     is_heard: bool = False
     """Boot-up, heartbeat or guarding answer received: nobody else sends on 700h + id."""
 
@@ -146,7 +146,7 @@ class Scanner(Errand):
 
     @property
     def done(self) -> int:
-        """How many of the ``total`` ids have been dealt with."""
+        """Number of the ``total`` ids that are done."""
         return self.total - len(self._starts) - len(self._interviews)
 
     def is_finished(self, now: float) -> bool:
@@ -219,7 +219,7 @@ class Scanner(Errand):
         return [node for node in self._nodes.values() if self._is_there(node)]
 
     def phantoms(self) -> dict[int, int | None]:
-        """Ids that were answered for without being there, and the node whose answers they were."""
+        """Ids that were answered for without being there, each with the node that answered."""
         return {
             node.id: self._owner(node)
             for node in self._nodes.values()

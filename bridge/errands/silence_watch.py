@@ -12,7 +12,7 @@ from bridge.config import BusTable
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The longest time between two frames of ``label``, in ms, and the key of the site file that it is of."""
+    """Longest time between two frames of ``label``, in ms, and the key of the site file that sets it."""
 
     label: str
     most_ms: int
@@ -31,8 +31,8 @@ class _Heard:
 
 
 def bounds(table: BusTable, rpdos: Mapping[int, str]) -> dict[int, Bound]:
-    """By COB-ID; ``rpdos`` are the labels of the bridge's. What is repeated less often than twice within the
-    dead-man time may be silent for two of its periods."""
+    """Bounds by COB-ID; ``rpdos`` are the labels of the bridge's. A frame that is repeated less often than
+    twice within the dead-man time may be silent for two of its periods."""
     found: dict[int, Bound] = {}
     if table.sync_period_ms:
         found[cobid.SYNC] = _repeated("SYNC", table.deadman_ms, table.sync_period_ms, "sync_period_ms")
@@ -53,7 +53,7 @@ def _repeated(label: str, deadman_ms: int, period_ms: int, key: str) -> Bound:
 
 
 class SilenceWatch:
-    """Judges frames in the order of the wire. What has never been heard is not judged."""
+    """Judge of frames in the order of the wire. Identifiers that were never heard are not judged."""
 
     def __init__(self, bounds: Mapping[int, Bound]) -> None:
         self._bounds = bounds
@@ -70,8 +70,8 @@ class SilenceWatch:
         heard.last = frame.time
 
     def said(self, started: float, end: float) -> list[str]:
-        """A sentence for each that was silent for too long; times are seconds after ``started``. Whoever is
-        silent at the ``end`` was silent until then."""
+        """Sentences, one for each identifier that was silent for too long; times are seconds after
+        ``started``. A silence that lasts at the ``end`` is counted up to then."""
         sentences: list[str] = []
         for can_id, heard in sorted(self._heard.items()):
             self._judge(can_id, heard, end)

@@ -1,4 +1,4 @@
-"""Single errands on a bus for the command line: one SDO transfer, one NMT command. Sans-IO."""
+"""Single tasks on a bus for the command line: one SDO transfer, one NMT command. Sans-IO."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ class SdoErrand(SdoErrands):
     ) -> None:
         self.result: Result | None = None
         self.done_bytes = 0
-        """What has gone or come so far, by the frames: tells that a long transfer goes on."""
+        """Bytes transferred so far, by the frames: shows that a long transfer goes on."""
         self.total_bytes = None if data is None else len(data)
-        """How much it is; of a read it is known once the server has announced it."""
+        """Bytes of the whole transfer; for a read known once the server has announced them."""
         self._mux = MUX.pack(index, sub)
         self._writes = data is not None
         request, reply = (server.request, server.reply) if server else (cobid.SDO_REQUEST, cobid.SDO_REPLY)
@@ -83,7 +83,7 @@ class SdoErrand(SdoErrands):
         return frames
 
     def _count(self, data: bytes) -> None:
-        """An answer of a read: it announces the length, or is a segment."""
+        """Count an answer of a read: it announces the length, or is a segment."""
         if self._writes or len(data) != _SDO_BYTES:
             return
         if data[1:4] != self._mux:
@@ -98,10 +98,8 @@ class SdoErrand(SdoErrands):
 
 
 class NmtErrand(Errand):
-    """One NMT command to a node, or to all with ``node_id`` 0, and what the nodes say afterwards.
-
-    One node is waited for until it is where it should be, all of them for the whole of ``wait_s``.
-    """
+    """One NMT command to a node, or to all with ``node_id`` 0, and the states that nodes report afterwards.
+    One node is waited for until it has reached its state, all of them for the whole of ``wait_s``."""
 
     def __init__(self, command: NmtCommand, node_id: int, now: float, wait_s: float) -> None:
         super().__init__()

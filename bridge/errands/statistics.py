@@ -1,4 +1,4 @@
-"""How often each identifier is on a bus, and what it costs of the bus's time. Sans-IO."""
+"""Counts of each identifier on a bus, and its share of the bus's time. Sans-IO."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ class Statistics:
         count.last = frame.time
 
     def counts(self) -> list[Count]:
-        """By identifier, lowest first: the order in which they win the bus."""
+        """Counts by identifier, lowest first: the order in which they win the bus."""
         return [self._counts[can_id] for can_id in sorted(self._counts, key=lambda i: (i & 0x7FF, i))]
 
     def load_percent(self, count: Count, seconds: float) -> float:
-        """Share of the bus that this identifier took in ``seconds``."""
+        """Load in percent that this identifier caused in ``seconds``."""
         return 100 * count.bits / (self._bitrate * seconds) if seconds > 0 else 0.0

@@ -1,4 +1,4 @@
-"""A witness of the dead-man chain: watches the bus and judges it by rules of its own.
+"""Witness of the dead-man chain: it watches the bus and judges it by rules of its own.
 
 What watches the bridge must not share its errors. So this package uses nothing of the bridge but the model of
 the site file (``bridge.config``): how a frame is read, what a control word means, which outputs a PDO carries

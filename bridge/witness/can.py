@@ -17,7 +17,8 @@ _EXACT: Final = 0xC000_07FF  # 11-bit data frames with exactly this identifier
 _SO_TIMESTAMPNS: Final = 35
 _BUFFER: Final = 1 << 20
 _AGE_MOST_S: Final = 1.0
-"""A stamp is wall clock; of one that is older the clock has been set meanwhile."""
+"""Greatest age of a time stamp, seconds: stamps are wall clock, an older one shows that the clock was set
+meanwhile."""
 
 
 class Listener:
@@ -42,8 +43,8 @@ class Listener:
         self._socket.close()
 
     def frames(self) -> Iterator[tuple[int, bytes, float]]:
-        """What has come: identifier, data, time of reception on the monotonic clock. An interface that is
-        down gives nothing."""
+        """Frames received since the last call: identifier, data, time of reception on the monotonic clock. An
+        interface that is down gives none."""
         while True:
             try:
                 data, control, _, _ = self._socket.recvmsg(_FRAME.size, 64)

@@ -1,4 +1,4 @@
-"""What the witness reads of device descriptions: names, types and numbers of their objects.
+"""Reader of device descriptions for the witness: names, types and numbers of their objects.
 
 EDS and DCF (CiA 306 §4), XDD and XDC (CiA 311). Not more than it takes to know which RPDO carries which
 outputs and what the node does with them: a file that is odd otherwise is read all the same.
@@ -25,7 +25,7 @@ _XML_KEYS: Final = {
     "defaultValue": "defaultvalue",
     "actualValue": "parametervalue",
 }
-"""Attributes by the keys of an EDS that mean the same."""
+"""Keys of an EDS by the attributes that mean the same."""
 
 
 class Unreadable(Exception):
@@ -57,13 +57,13 @@ class Description:
         return entry.number if entry else None
 
     def title(self, at: At) -> str:
-        """The element's name, that of its object first where it does not begin with it."""
+        """Name of an element, after that of its object unless it begins with it."""
         entry, whole = self.entries[at], self.names.get(at[0], "")
         return entry.name if entry.name.lower().startswith(whole.lower()) else f"{whole} {entry.name}"
 
 
 def describe(content: bytes, node_id: int, modules: Sequence[str] = ()) -> Description:
-    """What a file says of the node with this id and these modules. Raises ``Unreadable``."""
+    """Description of the node with this id and these modules. Raises ``Unreadable``."""
     text = _decoded(content)
     is_xml = text.lstrip().startswith("<")
     sections = _xml(text) if is_xml else dict(_ini(text))
@@ -85,7 +85,7 @@ def describe(content: bytes, node_id: int, modules: Sequence[str] = ()) -> Descr
 
 
 def _decoded(content: bytes) -> str:
-    """UTF-8, UTF-16 with its mark; a line that is no UTF-8 is Windows-1252."""
+    """Text of a file: UTF-8, or UTF-16 with its mark; a line that is no UTF-8 is Windows-1252."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", "replace")
     lines = content.removeprefix(b"\xef\xbb\xbf").splitlines(keepends=True)
@@ -100,8 +100,7 @@ def _line(content: bytes) -> str:
 
 
 def _ini(text: str) -> Iterator[tuple[tuple[int, int | None], dict[str, str]]]:
-    """The sections of objects and elements, with their keys in lower case. What is there twice counts once,
-    as it stands first."""
+    """Sections of objects and elements, with their keys in lower case. Of duplicates the first counts."""
     found: Sections = {}
     keys: dict[str, str] | None = None
     for line in (one.strip() for one in re.split(r"\r\n|\n|\r", text)):
@@ -153,7 +152,7 @@ def _keys(element: ElementTree.Element) -> dict[str, str]:
 
 
 def _number(text: str, node_id: int) -> int | None:
-    """An integer, which may have the node's id added; None for anything else."""
+    """Integer, to which the node id may be added; None for anything else."""
     total = 0
     for term in re.sub(r"[\s()]", "", text.partition(";")[0]).split("+"):
         if _NODE_ID.fullmatch(term):

@@ -1,4 +1,4 @@
-"""What the witness finds: stops with their times, alarms, and that it sees again."""
+"""Findings of the witness: stops with their times, alarms, and the return of its sight."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class Cause(StrEnum):
-    """Why a drive stopped."""
+    """Reason why a drive stopped."""
 
     CONTROLLER = "controller silent"
     COMMAND = "stop commanded"
@@ -16,7 +16,7 @@ class Cause(StrEnum):
 
 
 class Kind(StrEnum):
-    """What an alarm is about."""
+    """Kind of alarm."""
 
     LATE = "late"
     RUNS_ON = "runs on"
@@ -30,8 +30,8 @@ class Kind(StrEnum):
 @dataclass(frozen=True, slots=True)
 class Stop:
     """One stop of a drive, or of a node's outputs that became safe. ``bus_ms``: from the owner's last
-    telegram to the first RPDO that stops, None where that is not what stopped it; ``drive_ms``: from what
-    stopped it to the drive that says so, None where nothing says so."""
+    telegram to the first RPDO that stops, None where the silence is not what stopped it; ``drive_ms``: from
+    the cause of the stop to the drive's report of it, None without a report."""
 
     drive: str
     cause: Cause
@@ -49,7 +49,8 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """A promise is broken, or somebody else is there. ``source`` is a drive, a node with outputs, a bus."""
+    """Alarm: a promise is broken, or a foreign sender is on the bus. ``source`` is a drive, a node with
+    outputs, a bus."""
 
     source: str
     kind: Kind
@@ -59,7 +60,7 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What was said to be blind sees again."""
+    """End of a blindness that was reported."""
 
     source: str
     time: float

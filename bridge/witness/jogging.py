@@ -9,22 +9,22 @@ from __future__ import annotations
 from typing import Final
 
 _LATE_S: Final = 0.1
-"""From an RPDO to a TPDO that shows what it brought about."""
+"""Longest time in seconds from an RPDO to a TPDO that shows its effect."""
 _RAMPS: Final = 4.0
 
 
 class Jogs:
-    """One drive. ``ramp_s`` is the longest ramp expected, ``judged_s`` the time of stops after which it is
-    judged. Speeds are signed, in any unit."""
+    """Jogging of one drive. ``ramp_s`` is the longest ramp expected, ``judged_s`` the time of stops after
+    which it is judged. Speeds are signed, in any unit."""
 
     def __init__(self, ramp_s: float, judged_s: float) -> None:
         self._ramp_s, self._judged_s = ramp_s, judged_s
         self._turned_at = 0.0
         self._is_stop = False
         self._stop_s = 0.0
-        """Length of the stop before this run: as long it may still speed up."""
+        """Length in seconds of the stop before this run: for as long the drive may still speed up."""
         self._run = (0, 0.0)
-        """Number and sum of the speeds of a run that goes on steadily."""
+        """Number and sum of the speeds of a steady run."""
         self._reset()
 
     def _reset(self) -> None:
@@ -33,7 +33,7 @@ class Jogs:
         self._last_at: float | None = None
 
     def on_turn(self, at: float, *, stops: bool) -> None:
-        """The RPDOs say something else than before."""
+        """Take a change of the RPDOs between run and stop."""
         if stops is self._is_stop:
             return
         self._stop_s = 0.0 if stops else at - self._turned_at
@@ -42,12 +42,13 @@ class Jogs:
         self._is_stop, self._turned_at, self._last_at = stops, at, None
 
     def on_obeyed(self) -> None:
-        """It says that it is not enabled: what is left of this stop tells nothing."""
+        """Take a report that the drive is not enabled: the rest of this stop tells nothing."""
         self._reset()
         self._run = (0, 0.0)
 
     def on_speed(self, speed: int, at: float) -> str:
-        """A TPDO that says "enabled"; a sentence where the drive does not brake, else nothing."""
+        """Take the speed in a TPDO that says "enabled". Returns a sentence where the drive does not brake,
+        else ""."""
         since_s = at - self._turned_at
         if not self._is_stop:
             if since_s > self._stop_s + _LATE_S:

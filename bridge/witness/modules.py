@@ -1,5 +1,5 @@
-"""The modules of a coupler as the witness reads them (CiA 306): what is plugged in, and which elements
-of shared objects it brings."""
+"""Modules of a coupler as the witness reads them (CiA 306): the modules plugged in, and the elements of
+shared objects that they bring."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _HEAD: Final = re.compile(
     re.IGNORECASE,
 )
 _BITS: Final = {1: 1, 2: 8, 5: 8, 3: 16, 6: 16, 4: 32, 7: 32}
-"""Of the data types that digital inputs and outputs have (CiA 301 §7.4.7)."""
+"""Bits by data type, for digital inputs and outputs (CiA 301 §7.4.7)."""
 _LAST: Final = 0xFE
 
 
 def plug(sections: Sections, text: str, names: Sequence[str]) -> frozenset[tuple[int, int]]:
-    """Add to ``sections`` what the modules with these names bring, or those that the file says are plugged
-    in; gives the elements of shared objects that an RPDO may set."""
+    """Add to ``sections`` the objects of the modules with these names, or of those that the file says are
+    plugged in. Returns the elements of shared objects that an RPDO may set."""
     found = list(_modules(text))
     plugged = [_number_of(name, found) for name in names]
     if not names:
@@ -50,7 +50,7 @@ def plug(sections: Sections, text: str, names: Sequence[str]) -> frozenset[tuple
 
 
 _Part = tuple[int, str, tuple[int, int | None] | None, dict[str, str]]
-"""Whose it is, of what kind, for which object or element, and its keys."""
+"""Section of a module: module, kind, object or element, and keys."""
 
 
 def _modules(text: str) -> Iterator[_Part]:
@@ -99,7 +99,7 @@ def _highest(sections: Sections, index: int) -> int:
 
 
 def _elements(end: list[int], keys: dict[str, str]) -> Iterator[tuple[int, int]]:
-    """The next ones after ``end``: index, sub-index, and bits of it that are free."""
+    """Next elements after ``end``: index, sub-index, and free bits."""
     count, _, shared = keys.get("count", "").partition(";")
     wanted, bits = max(0, _whole(count)), max(0, _whole(shared or "0"))
     if wanted:

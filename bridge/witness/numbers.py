@@ -22,11 +22,11 @@ _HEADER: Final = struct.Struct(">HHHB")
 _READ_HOLDING: Final = 3
 _READ_INPUTS: Final = 4
 _QUESTIONS: Final = ((_READ_HOLDING, TIMEOUT_REGISTER), (_READ_INPUTS, NUMBER_REGISTER))
-"""The number last: its answer makes the reading."""
+"""Questions, that for the number last: its answer completes the reading."""
 
 
 class Reading(NamedTuple):
-    """What one drive's unit said. ``timeout_ms`` is None where it did not tell."""
+    """Reading of one drive's unit. ``timeout_ms`` is None where it was not answered."""
 
     unit: int
     number: int
@@ -36,8 +36,8 @@ class Reading(NamedTuple):
 
 
 class Numbers:
-    """Asks for all units every 50 ms; those of ``outputs`` have no register for the time-out. Non-blocking:
-    the shell waits for ``fileno``.
+    """Modbus client that asks for all units every 50 ms; those of ``outputs`` have no register for the
+    time-out. Non-blocking: the shell waits for ``fileno``.
 
     ``take_lost`` is true after each time that the bridge was not there or has stopped answering, ``why``
     says what was wrong then; it is called again every two seconds.
@@ -51,7 +51,7 @@ class Numbers:
         self.why = "no answer yet"
         self._buffer = bytearray()
         self._asked: dict[tuple[int, int], float] = {}
-        """When what has not been answered yet was asked for: function and unit."""
+        """Times of the questions without an answer yet, by function and unit."""
         self._timeouts_ms: dict[int, int] = {}
         self._asked_at = float("-inf")
         self._next = 0.0
@@ -126,7 +126,7 @@ class Numbers:
         self._asked_at = now
 
     def receive(self, now: float) -> list[Reading]:
-        """The answers that have come."""
+        """Readings completed by the answers received since the last call."""
         if self._socket is None:
             return []
         ended = "it ends the connection: this address has to be among its [modbus] allow"

@@ -1,4 +1,4 @@
-"""What the witness looks at of a node that is no drive: its outputs, their frames, and what becomes of them.
+"""Plan for a node that is no drive: its outputs, their frames, and their state when the node is stopped.
 
 Which RPDO carries which output is read of the device description that the node has as its mapping, or, for a
 mapping file, what the site file writes into the node, or the default of CiA 401. What the node does with its
@@ -52,12 +52,14 @@ _IN_ERROR: Final = {
     0x6411: (0x6443, 0x6444),
     0x6412: (0x6443, 0x6444),
 }
-"""CiA 401: error mode and error value of digital outputs in groups of 8, 16, 32, and of analogue ones."""
+"""Objects of CiA 401: error mode and error value of digital outputs in groups of 8, 16, 32, and of analogue
+ones."""
 _DIGITAL: Final = range(0x6200, 0x6400)
-"""A bit of their error mode lets the error value's bit through. Others take it where the mode is 1."""
+"""Digital outputs: each bit of their error mode lets that of the error value through. Analogue ones take the
+error value where the mode is 1."""
 _BEHAVIOUR: Final = (0x1029, 1)
 _PRE_OPERATIONAL, _STAYS = 0, 1
-"""1029h:01: where an error of communication leads; 2 is Stopped (CiA 301 §7.5.2.32)."""
+"""Values of 1029h:01, the state after an error of communication; 2 is Stopped (CiA 301 §7.5.2.32)."""
 _CONSUMER: Final = (0x1016, 1)
 _CIA_401: Final = (
     (0x6200, "uint8", range(1, 9)),
@@ -78,7 +80,8 @@ class Values:
     safe: int
 
     def are_active(self, data: bytes) -> bool | None:
-        """None where the frame does not have the length that is mapped."""
+        """True if ``data`` sets one of the outputs to anything but its safe value; None where the frame does
+        not have the mapped length."""
         if len(data) != self.bytes:
             return None
         return int.from_bytes(data, "little") & self.mask != self.safe
@@ -86,11 +89,11 @@ class Values:
 
 @dataclass(frozen=True, slots=True)
 class OutputFrames:
-    """What is known of a node's outputs by files alone. ``rpdos`` and ``tpdos`` are by identifier,
-    ``event_ms`` the longest time between two of the latter, ``written`` the objects that move outputs or make
-    them safe. ``own_ms`` is after how long the node notices a silent bridge, 0 where that is not known;
-    ``why_active`` why its outputs would stay as they are then, nothing where they become safe;
-    ``why_unknown`` why nothing is known of its PDOs."""
+    """Outputs of a node, as far as files tell. ``rpdos`` and ``tpdos`` are by identifier, ``event_ms`` the
+    longest time between two of the latter, ``written`` the objects that move outputs or make them safe.
+    ``own_ms`` is after how long the node notices a silent bridge, 0 where that is not known; ``why_active``
+    why its outputs would stay as they are then, nothing where they become safe; ``why_unknown`` why nothing
+    is known of its PDOs."""
 
     rpdos: Mapping[int, Values]
     tpdos: Mapping[int, Values]
@@ -103,8 +106,8 @@ class OutputFrames:
 
 @dataclass(frozen=True, slots=True)
 class _Output:
-    """``safe`` is an integer without sign, None where it is on hold. ``mode`` and ``error`` are the objects
-    of its error behaviour."""
+    """One output. ``safe`` is an integer without sign, None where it is on hold. ``mode`` and ``error`` are
+    the objects of its error behaviour."""
 
     name: str
     at: At
@@ -115,11 +118,11 @@ class _Output:
 
 
 class _Unknown(Exception):
-    """Why nothing can be known of the outputs."""
+    """Reason why nothing can be known of the outputs."""
 
 
 def output_frames(bus: BusTable, node: NodeTable, folder: Path) -> OutputFrames | None:
-    """Of a node, whose site file is in ``folder``; None where it has no outputs."""
+    """Outputs of a node, whose site file is in ``folder``; None where it has none."""
     try:
         if node.mapping.startswith("eds:"):
             description = _described(folder / node.mapping.removeprefix("eds:"), node.id, node.modules)
@@ -168,8 +171,8 @@ def _numbers(description: Description) -> dict[At, int]:
 
 
 def _described_outputs(description: Description, node: NodeTable) -> dict[At, _Output]:
-    """What its RPDOs carry, those that are switched off as well, and what modules bring for them: all of them
-    have names."""
+    """Outputs by object: those that RPDOs carry, also RPDOs that are off, and those that modules bring for
+    them. All of them have names."""
     carried: list[At] = []
     found: dict[At, _Output] = {}
     names: set[str] = set()
@@ -194,7 +197,8 @@ def _described_outputs(description: Description, node: NodeTable) -> dict[At, _O
 
 
 def _refuse_unmapped(by_modules: Collection[At], numbers: Mapping[At, int]) -> None:
-    """A coupler maps by itself what is plugged in, and no file may say where. Raises ``_Unknown``."""
+    """Raise ``_Unknown`` for outputs in no RPDO: a coupler maps its modules by itself, and no file may say
+    where."""
     carried = {
         (index, sub)
         for number in range(_MOST_PDOS)
@@ -208,8 +212,8 @@ def _refuse_unmapped(by_modules: Collection[At], numbers: Mapping[At, int]) -> N
 
 
 def _name(title: str, at: At) -> str:
-    """As docs/how-to/generic-nodes.md shows it: the title's words in lower case, umlauts written as two
-    letters, accents left out."""
+    """Name of an output as in docs/how-to/generic-nodes.md: the title's words in lower case, umlauts written
+    as two letters, accents left out."""
     spelt = unicodedata.normalize("NFC", title.lower()).translate(_SPELT)
     plain = re.sub("[\u0300-\u036f]", "", unicodedata.normalize("NFD", spelt))
     words = "_".join(re.findall("[a-z0-9]+", plain))
@@ -220,7 +224,7 @@ def _name(title: str, at: At) -> str:
 
 
 def _mapped_outputs(node: NodeTable, folder: Path) -> tuple[dict[At, _Output], int]:
-    """The outputs, and the profile that the file says."""
+    """Outputs by object, and the profile that the file names."""
     tables: dict[str, dict[str, Any]] = {}
     profile = 0
     for data in _chain(node.mapping, folder / "mappings"):
@@ -243,7 +247,7 @@ def _mapped_outputs(node: NodeTable, folder: Path) -> tuple[dict[At, _Output], i
 
 
 def _chain(mapping: str, folder: Path) -> list[dict[str, Any]]:
-    """The file and those beside the site file that it extends, the last first. None that comes with the
+    """The file and those beside the site file that it extends, the last first. No mapping that comes with the
     program has outputs."""
     chain: list[dict[str, Any]] = []
     seen: set[str] = set()
@@ -282,7 +286,7 @@ def _default_pdos(outputs: Mapping[At, _Output], node_id: int, profile: int) -> 
 
 
 def _written(node: NodeTable, folder: Path) -> dict[At, int]:
-    """What the site file, or the configuration file that it names, has written into the node."""
+    """Numbers that the site file, or its configuration file, writes into the node, by object."""
     numbers: dict[At, int] = {}
     if node.configuration:
         entries = _described(folder / node.configuration, node.id).entries
@@ -303,7 +307,7 @@ def _bits(kind: str) -> int:
 
 
 def _safe(value: SafeValue, kind: str, factor: float = 1.0, offset: float = 0.0) -> int | None:
-    """The value as it is sent, without sign; None for "hold"."""
+    """Safe value as it is sent, without sign; None for "hold"."""
     if isinstance(value, str):
         return None
     number = (value - offset) / factor if (factor, offset) != (1.0, 0.0) and kind != "bool" else value
@@ -313,7 +317,7 @@ def _safe(value: SafeValue, kind: str, factor: float = 1.0, offset: float = 0.0)
 
 
 def _entries(numbers: Mapping[At, int], mapping: int) -> Iterator[tuple[int, int, int]]:
-    """Index, sub-index and bits of what a PDO carries."""
+    """Index, sub-index and bits of the objects in a PDO."""
     for sub in range(1, min(numbers.get((mapping, 0), 0), _MOST_MAPPED) + 1):
         word = numbers.get((mapping, sub), 0)
         yield word >> 16 & 0xFFFF, word >> 8 & 0xFF, word & 0xFF
@@ -322,7 +326,7 @@ def _entries(numbers: Mapping[At, int], mapping: int) -> Iterator[tuple[int, int
 def _pdos(
     numbers: Mapping[At, int], bases: tuple[int, int], outputs: Mapping[At, _Output]
 ) -> dict[int, tuple[Values, int]]:
-    """The PDOs that are switched on and carry one of the outputs, and their event timers in ms."""
+    """PDOs that are on and carry one of the outputs, by identifier, and their event timers in ms."""
     found: dict[int, tuple[Values, int]] = {}
     for number in range(_MOST_PDOS):
         cob_id = numbers.get((bases[0] + number, 1), _OFF)
@@ -342,7 +346,7 @@ def _pdos(
 
 
 def _own_ms(bus: BusTable, node: NodeTable, numbers: Mapping[At, int]) -> int:
-    """After how long the node notices that the bridge is silent; 0 where it does not, as far as is known."""
+    """Time in ms after which the node notices that the bridge is silent; 0 where none is known."""
     times = [node.supervision_ms * node.life_time_factor] if node.supervision == "guarding" else []
     if bus.heartbeat_ms:
         watched = numbers.get(_CONSUMER, 0)
@@ -352,7 +356,8 @@ def _own_ms(bus: BusTable, node: NodeTable, numbers: Mapping[At, int]) -> int:
 
 
 def _why_active(numbers: Mapping[At, int], outputs: Mapping[At, _Output]) -> str:
-    """Why the outputs would stay as they are when the node leaves Operational, or would not leave it."""
+    """Reason why the outputs would stay as they are: the node keeps them when it leaves Operational, or does
+    not leave it. Empty where they become safe."""
     if numbers.get(_BEHAVIOUR, _PRE_OPERATIONAL) == _STAYS:
         return "it stays operational: 1029:01 is 1"
     return next((why for one in outputs.values() if (why := _why_one(numbers, one))), "")

@@ -1,4 +1,4 @@
-"""The witness of a node's outputs: what ``watch`` is for drives. Sans-IO.
+"""Judge of a node's outputs, as ``watch`` is of drives. Sans-IO.
 
 Outputs seldom say what they do. So what counts is what they are told, what the node says of its own state,
 and what the files say that it does with them in that state. Where a TPDO shows them, that counts.
@@ -17,15 +17,15 @@ from bridge.witness.rate import SPARE, Rate
 from bridge.witness.services import RESET, RESET_COMMUNICATION, START, STOP, TAKES_OUT
 
 _BOOT_UP, _OPERATIONAL = 0x00, 0x05
-"""States that a node says (CiA 301 §7.2.8.3.2.2)."""
+"""NMT states in a heartbeat (CiA 301 §7.2.8.3.2.2)."""
 _UNSEEN_S: Final = 1.0
-"""Outputs that somebody commands get their RPDO more often than that."""
+"""Time in seconds within which commanded outputs get their next RPDO."""
 _FRESH_S: Final = 0.5
-"""A bridge that was silent for longer may have been started anew."""
+"""Silence in seconds after which the bridge may have been restarted."""
 
 
 class _Rpdo:
-    """One RPDO, as it came last."""
+    """Latest content of one RPDO."""
 
     def __init__(self, values: Values, period_ms: float) -> None:
         self.values = values
@@ -33,11 +33,11 @@ class _Rpdo:
         self.is_active = False
         self.repeats = Rate(period_ms)
         self.changes: deque[float] = deque()
-        """When it came with other values than before."""
+        """Times at which it came with other values than before."""
 
 
 class Outputs:
-    """The outputs of one node. ``findings`` are taken by whoever tells them."""
+    """The outputs of one node. The caller takes the ``findings``."""
 
     def __init__(self, watched: WatchedOutputs) -> None:
         self._watched = watched
@@ -46,22 +46,22 @@ class Outputs:
         self._guard = 0x700 + watched.node_id
         self._rpdo_at: float | None = None
         self._safe_at: float | None = None
-        """The first RPDO by which all of them are safe, of those that go on with it."""
+        """Time of the first RPDO of the present run by which all outputs are safe."""
         self._unheard_at: float | None = None
-        """They were told to be safe, and the node has said nothing since."""
+        """Time at which they were told to be safe, while the node has sent nothing since."""
         self._shows = dict.fromkeys(watched.tpdos, False)
         self._shown_at = 0.0
-        """When a TPDO showed active outputs last."""
+        """Time of the last TPDO that showed active outputs."""
         self._shown_since: float | None = None
         self._heard_at: float | None = None
         self._state: int | None = None
         self._operational_at: float | None = None
         self._out: int | None = None
-        """The NMT command by which the node was taken out of operation."""
+        """NMT command by which the node was taken out of operation."""
         self._active_out_at: float | None = None
-        """That was while they were told to be active."""
+        """Time of that command, if they were told to be active then."""
         self._told: set[tuple[Kind, str]] = set()
-        """Alarms of what goes on are raised once."""
+        """Alarms raised for a state that lasts: each is raised once."""
         self._findings: list[Finding] = []
 
     @property
@@ -70,16 +70,16 @@ class Outputs:
 
     @property
     def identifiers(self) -> set[int]:
-        """What it has to see."""
+        """Identifiers of the frames that it needs."""
         return {*self._rpdos, *self._shows, self._guard}
 
     @property
     def _is_active(self) -> bool:
-        """The last RPDOs tell one of them to be active."""
+        """True if the last RPDOs tell one of them to be active."""
         return any(one.is_active for one in self._rpdos.values())
 
     def is_told(self, at: float) -> bool:
-        """Whether somebody keeps one of them active."""
+        """True if one of them is kept active."""
         return self._is_active and self._rpdo_at is not None and at - self._rpdo_at <= _FRESH_S
 
     def take_findings(self) -> list[Finding]:
@@ -89,7 +89,7 @@ class Outputs:
     # what comes
 
     def on_frame(self, can_id: int, data: bytes, at: float) -> None:
-        """A frame with one of the ``identifiers``."""
+        """Take a frame with one of the ``identifiers``."""
         if (rpdo := self._rpdos.get(can_id)) is not None:
             self._on_rpdo(can_id, rpdo, data, at)
         elif can_id in self._shows:
@@ -121,7 +121,7 @@ class Outputs:
                 self._on_safe(at)
 
     def _on_safe(self, at: float) -> None:
-        """All of them are told to be safe, and were not."""
+        """Note that all of them are told to be safe, and were not before."""
         silence_ms = self.owner.silence_ms(at)
         if silence_ms is not None:
             bound_ms = self.owner.bound_ms
@@ -149,7 +149,7 @@ class Outputs:
         self._told.discard((Kind.UNHEARD, "cut"))
 
     def _on_guard(self, data: bytes, at: float) -> None:
-        """Heartbeat or guarding answer of its node: the lower seven bits are the state."""
+        """Take a heartbeat or guarding answer of its node: the lower seven bits are the state."""
         if not data:
             return
         self._on_heard(at)
@@ -165,7 +165,7 @@ class Outputs:
             self._on_off_by_itself(at)
 
     def _on_off_by_itself(self, at: float) -> None:
-        """The node is not operational any more, and makes them safe then."""
+        """Note that the node is not operational any more, and makes them safe then."""
         silent_s = 0.0 if self._rpdo_at is None else at - self._rpdo_at
         if self._is_active and silent_s > _FRESH_S / 2:
             bound_ms = self._watched.silent_ms or None
@@ -182,7 +182,7 @@ class Outputs:
         self._told.clear()
 
     def on_nmt(self, command: int, at: float) -> None:
-        """An NMT command to its node, or to all."""
+        """Take an NMT command to its node, or to all."""
         if command == START:
             self._out = self._active_out_at = None
             self._told -= {(Kind.UNHEARD, "out"), (Kind.IGNORED, "out")}
@@ -194,7 +194,7 @@ class Outputs:
     # judging
 
     def on_time(self, now: float) -> None:
-        """Call it when everything that had come by ``now`` has been handed over."""
+        """Judge the time: called when all frames received by ``now`` have been handed over."""
         if lateness := self.owner.lateness():
             self._alarm(Kind.LATE, now, f"told to be active {lateness}")
         self._judge_senders(now)
@@ -203,7 +203,7 @@ class Outputs:
         self._judge_unheard(now)
 
     def _judge_senders(self, now: float) -> None:
-        """RPDOs that change more often than telegrams come."""
+        """Judge RPDOs that change more often than telegrams come."""
         told = self.owner.telegrams()
         for can_id, rpdo in self._rpdos.items():
             if told is None:
@@ -218,7 +218,7 @@ class Outputs:
                 self._alarm(Kind.INTRUDER, now, f"{message}: somebody else sends it, too")
 
     def _judge_shown(self, now: float) -> None:
-        """A TPDO that shows active outputs longer than it may."""
+        """Judge a TPDO that shows active outputs longer than it may."""
         seen, since, watched = self._shown_at, self._shown_since, self._watched
         if since is None:
             return
@@ -234,7 +234,7 @@ class Outputs:
             self._once(Kind.RUNS_ON, "", now, self._runs_on("active", seen - self._rpdo_at))
 
     def _judge_silence(self, now: float) -> None:
-        """A bridge that is silent, and outputs that say nothing."""
+        """Judge the silence of the bridge for outputs that are not seen."""
         if self._shows or not self._is_active or self._rpdo_at is None:
             return
         if self._watched.why_active:
@@ -246,7 +246,7 @@ class Outputs:
             self._once(Kind.RUNS_ON, "", now, told)
 
     def _judge_unheard(self, now: float) -> None:
-        """Outputs that were told to be active last, by a node that takes no RPDOs or cannot be heard."""
+        """Judge outputs that were told to be active last and whose node takes no RPDOs or cannot be heard."""
         watched, why = self._watched, self._watched.why_active
         if self._active_out_at is not None:
             if self._out != STOP:

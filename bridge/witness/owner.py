@@ -1,4 +1,5 @@
-"""What is known of the owner of a drive, or of a node's outputs, and what is promised of it. Sans-IO.
+"""Owner of a drive, or of a node's outputs, as far as the witness knows it, and the promise about it.
+Sans-IO.
 
 Its telegrams are known only by their number, which is read now and then, with the time-out in force. A
 telegram is assumed to be as young as possible, so a stop may have come up to one reading later than it seems,
@@ -14,9 +15,9 @@ from bridge.witness.plan import promised_ms
 from bridge.witness.rate import WINDOW_S
 
 _READING_MS: Final = 150
-"""A telegram may seem so much younger than it is."""
+"""Most by which a telegram may seem younger than it is, ms."""
 _COUNTED: Final = 1 << 16
-"""Numbers of telegrams begin anew there."""
+"""Modulus of the telegrams' numbers."""
 
 
 class Owner:
@@ -25,34 +26,34 @@ class Owner:
     def __init__(self, name: str, timeout_ms: int, beside_ms: int | None) -> None:
         self.name = name
         self.timeout_ms = self._given_ms = timeout_ms
-        """The time-out that is in force, and that of the site file."""
+        """Time-out in force, at first that of the site file."""
         self._beside_ms = beside_ms
         self._timeout_at = float("-inf")
-        """It has been told at this time for the first time."""
+        """Time of the first reading with that time-out."""
         self.answered_at: float | None = None
-        """When its number was told last, or telling it was waited for first."""
+        """Time of the last reading of its number, or from which the first is waited for."""
         self._number: int | None = None
         self._telegram_at: float | None = None
-        """When the owner's last telegram had come at the latest."""
+        """Latest possible time of the owner's last telegram."""
         self._read_at: float | None = None
-        """The last reading of its number was asked for at this time."""
+        """Time at which the last reading of its number was asked for."""
         self._late_at: float | None = None
-        """The first RPDO that enables later than promised after that telegram."""
+        """Time of the first RPDO that enables later than promised after that telegram."""
         self._is_told = False
-        """That it was late."""
+        """True once the lateness was reported."""
         self._readings: deque[tuple[float, float, int]] = deque()
-        """When a number was asked for and told, and the number."""
+        """Readings: time of asking, time of the answer, number."""
 
     @property
     def is_promised(self) -> bool:
-        """Something is promised of it, whatever time-out it sets."""
+        """True if a stop is promised for it, whatever time-out it sets."""
         return self._beside_ms is not None
 
     def on_number(
         self, number: int, asked_at: float, answered_at: float, timeout_ms: int | None = None
     ) -> None:
-        """The number of the owner's last telegram, as it was between these times, and the time-out in force;
-        None where that was not told."""
+        """Take the number of the owner's last telegram, as it was between these times, and the time-out in
+        force; None where that was not read."""
         self.answered_at = answered_at
         timeout_ms = self._given_ms if timeout_ms is None else timeout_ms
         if timeout_ms != self.timeout_ms:
@@ -68,12 +69,12 @@ class Owner:
             self._readings.popleft()
 
     def on_numbers_lost(self) -> None:
-        """Nobody tells its numbers (any more)."""
+        """Note that its numbers cannot be read (any more)."""
         self._number = self._telegram_at = self._read_at = self._late_at = None
         self._readings.clear()
 
     def on_enabling(self, at: float) -> None:
-        """An RPDO that enables."""
+        """Take an RPDO that enables."""
         if self._late_at is None and self._is_late(at):
             self._late_at = at
 
@@ -91,7 +92,7 @@ class Owner:
         return f"{_ms(late - telegram)} ms after its owner's last telegram; promised: {self.bound_ms}"
 
     def silence_ms(self, stopped_at: float) -> int | None:
-        """How long it had sent nothing at a stop; None where that is not what stopped."""
+        """Silence of the owner in ms at a stop; None where the silence is not what stopped."""
         if self._telegram_at is None or not self.timeout_ms:
             return None
         silence_ms = _ms(stopped_at - self._telegram_at)
@@ -99,26 +100,26 @@ class Owner:
 
     @property
     def bound_ms(self) -> int | None:
-        """What is promised after the owner's last telegram; None for nothing."""
+        """Promised longest time in ms after the owner's last telegram; None for no promise."""
         until = self._may_run_until()
         return None if until is None or self._telegram_at is None else _ms(until - self._telegram_at)
 
     def telegrams(self) -> tuple[int, float, float] | None:
-        """How many telegrams came at the most between two times of the last seconds, and these; None where
-        nobody tells."""
+        """Largest number of telegrams between two times of the last seconds, and these times; None without
+        readings."""
         if not self._readings:
             return None
         (_, first_at, first), (last_at, _, last) = self._readings[0], self._readings[-1]
         return (last - first) % _COUNTED, first_at, last_at
 
     def _is_late(self, at: float) -> bool:
-        """Whether an RPDO at this time must not enable any more."""
+        """True if an RPDO at this time must not enable any more."""
         until = self._may_run_until()
         return until is not None and _ms(at - until) > 0
 
     def _may_run_until(self) -> float | None:
-        """The last time for an RPDO that enables; None where nothing is promised. A time-out that has been
-        made shorter holds from when that is known."""
+        """Latest time for an RPDO that enables; None where nothing is promised. A time-out that has been made
+        shorter holds from when that is known."""
         stop_ms = promised_ms(self.timeout_ms, self._beside_ms)
         if not stop_ms or self._telegram_at is None:
             return None

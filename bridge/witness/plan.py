@@ -1,4 +1,5 @@
-"""What the witness looks at: a site's drives and outputs, their frames, and when they have to be stopped."""
+"""Plan of the witness: a site's drives and outputs, their frames, and the times within which they must
+stop."""
 
 from __future__ import annotations
 
@@ -15,29 +16,30 @@ from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, NodeTable, PdoTabl
 from bridge.witness.output_plan import OutputFrames, Values, output_frames
 
 REACTION_MS: Final = 20
-"""How late the bridge may be itself (docs/explanation/dead-man-chain.md, "How long it takes")."""
+"""Greatest lateness of the bridge itself, ms (docs/explanation/dead-man-chain.md, "How long it takes")."""
 _FRAME_BITS: Final = 135
-"""A data frame of eight bytes with all its stuff bits, and the pause after it (ISO 11898-1)."""
+"""Bits of a data frame of eight bytes with all its stuff bits, and the pause after it (ISO 11898-1)."""
 _BEFORE_OF_EACH: Final = 5
 """Frames that each node and each drive may have waiting before one of ours, with all that is sent meanwhile
 (docs/explanation/dead-man-chain.md, "The witness")."""
 _IDLE_LEAST: Final = 0.2
-"""A bus with less to spare is not reckoned with."""
+"""Least idle share of a bus that is assumed."""
 _QUEUE_MS: Final = 50
-"""How long a frame may wait for an interface that is none of the kernel's."""
+"""Longest wait of a frame for an interface that is none of the kernel's, ms."""
 _TPDO_MS: Final = 500
-"""How often a drive says what it does, where the site file does not tell."""
+"""Period of a drive's TPDO in ms, where the site file sets none."""
 RAMP_MS: Final = 5000
-"""How long a drive may take to stand, where the site file does not tell."""
+"""Longest time for a drive to stand still in ms, where the site file sets none."""
 UNKNOWN_MS: Final = 3000
-"""From the last RPDO to a drive that has stopped, where its own time-out is not known."""
+"""Longest time in ms from the last RPDO to a stopped drive, where its own time-out is not known."""
 _SWITCH_MS: Final = 500
-"""How long an output may take to switch."""
+"""Longest time for an output to switch, ms."""
 _LOST_MS: Final = 1000
-"""So much longer than its supervision a node may be silent: it may have been told to restart."""
+"""Time in ms by which a node may be silent for longer than its supervision: it may have been told to
+restart."""
 _FIRST_UNITS: Final = range(1, 248)
 _NUMBERS: Final = {base + 0x100 * place: place + 1 for base in (0x180, 0x200) for place in range(4)}
-"""The PDO's number by its identifier without the node's (CiA 301 §7.3.5)."""
+"""PDO numbers by identifier without node id (CiA 301 §7.3.5)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +52,7 @@ class Word:
     value: int
 
     def enables(self, data: bytes) -> bool | None:
-        """None where the frame is too short to hold the word."""
+        """True if the word in ``data`` says "enabled"; None where the frame is too short to hold it."""
         part = data[self.byte : self.byte + self.bytes]
         if len(part) < self.bytes:
             return None
@@ -91,17 +93,17 @@ class WatchedDrive:
     follow_ms: int
     node_id: int = 0
     rpdo_ms: float = 0.0
-    """How often the bridge repeats its RPDO."""
+    """Period in ms at which the bridge repeats its RPDO."""
     speed: Speed | None = None
-    """None where its TPDO brings none."""
+    """Speed in its TPDO, None where there is none."""
     nmt_stops: bool = False
-    """It does not run in the NMT state Stopped."""
+    """True if it does not run in the NMT state Stopped."""
     lost_ms: int = 0
-    """Nothing heard of its node for so long means that it is cut off; 0 where that is not known."""
+    """Silence of its node in ms after which it counts as cut off; 0 where that is not known."""
 
     def stop_ms(self, timeout_ms: int) -> int:
-        """From the owner's last telegram to the last enabling RPDO, with this time-out in force; 0 where
-        nothing is promised."""
+        """Longest time in ms from the owner's last telegram to the last enabling RPDO, with this time-out in
+        force; 0 where nothing is promised."""
         return promised_ms(timeout_ms, self.beside_ms)
 
 
@@ -133,12 +135,14 @@ class WatchedOutputs:
 
     @property
     def stop_ms(self) -> int:
-        """From the owner's last telegram to the last RPDO with active values; 0 where nothing is promised."""
+        """Longest time in ms from the owner's last telegram to the last RPDO with active values; 0 where
+        nothing is promised."""
         return promised_ms(self.timeout_ms, self.beside_ms)
 
 
 def promised_ms(timeout_ms: int, beside_ms: int | None) -> int:
-    """From an owner's last telegram to the last RPDO that enables; 0 where nothing is promised."""
+    """Longest time in ms from an owner's last telegram to the last RPDO that enables; 0 where nothing is
+    promised."""
     return timeout_ms + beside_ms if timeout_ms and beside_ms is not None else 0
 
 
@@ -156,7 +160,7 @@ class WatchedBus:
 
     @property
     def judged_outputs(self) -> list[WatchedOutputs]:
-        """Those of which enough is known."""
+        """Outputs of which enough is known."""
         return [one for one in self.outputs if not one.why_unknown]
 
 
@@ -279,7 +283,8 @@ def _speed(family: dict[str, Any], mapping: str) -> Speed | None:
 
 
 def _lost_ms(node: NodeTable, table: DriveTable) -> int:
-    """Its error control, or its TPDO where the site file says how often that comes."""
+    """Silence in ms after which the drive's node counts as cut off: by its error control, or by its TPDO
+    where the site file sets its period."""
     if node.supervision == "none":
         return _LOST_MS + 3 * _tpdo_ms(table) if any(pdo.event_ms for pdo in table.tpdo) else 0
     return _LOST_MS + _supervised_ms(node)
@@ -290,8 +295,8 @@ def _supervised_ms(node: NodeTable) -> int:
 
 
 def _beside_ms(bus: BusTable, output_rpdos: int) -> int:
-    """What the bridge, the kernel and the bus may take beside the time-out: two periods, lateness, what is
-    sent before our frame, and the interface's queue."""
+    """Longest time in ms that bridge, kernel and bus take beside the time-out: two periods, lateness, frames
+    sent before ours, and the interface's queue."""
     period_ms = 1000 * bus.rpdo_period_s
     frame_ms = 1000 * _FRAME_BITS / bus.bitrate
     nodes = [node for node in bus.node if node.enabled]
@@ -317,8 +322,8 @@ def _tpdo_ms(table: DriveTable) -> int:
 
 
 def _unit_ids(site: Site) -> dict[tuple[str, int], int]:
-    """As docs/reference/modbus.md says: those of the site file, the others in order from 1. A node without
-    drives has one, too."""
+    """Unit ids as in docs/reference/modbus.md: those of the site file, the others in order from 1. A node
+    without drives has one, too."""
     places = [
         (node.name, place, drive.unit_id)
         for bus in site.bus

@@ -1,4 +1,4 @@
-"""A frame that comes more often than the bridge repeats it has another sender. Sans-IO."""
+"""Rates of frames: one that comes more often than the bridge repeats it has another sender. Sans-IO."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from typing import Final
 WINDOW_S: Final = 2.0
 _LOAD: Final = 1.5
 SPARE: Final = 5
-"""What comes beside the beat when it changes."""
+"""Frames that may come beside the period, when the content changes."""
 
 
 class Rate:
-    """One frame. The bridge sends it each ``period_ms``; 0: nobody knows."""
+    """Rate of one frame. The bridge sends it each ``period_ms``; 0 where that is not known."""
 
     def __init__(self, period_ms: float) -> None:
         self._period_ms = period_ms
         self._times: deque[float] = deque()
 
     def is_too_often(self, at: float) -> bool:
-        """It came at ``at``: whether that is more than one sender would send. Then it is counted anew."""
+        """Count a frame at ``at``. True if that is more than one sender would send; the count then begins
+        again."""
         if not self._period_ms:
             return False
         times = self._times

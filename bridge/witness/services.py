@@ -21,7 +21,7 @@ _COMMANDS: Final = {
     RESET_COMMUNICATION: "reset of communication",
 }
 TAKES_OUT: Final = (STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION)
-"""Commands after which a node says nothing of its drives and takes no RPDOs."""
+"""NMT commands after which a node sends no TPDOs and takes no RPDOs."""
 _STARTS_S: Final = 2.0
 _MOST_STARTS: Final = 3
 _HEARD: Final = (
@@ -31,16 +31,16 @@ _HEARD: Final = (
     range(0x1F80, 0x1F81),
     range(0x6040, 0x6041),
 )
-"""SYNC, the identifier of emergencies, guarding and heartbeats, SDO and PDO parameters, NMT startup, the
-control word (CiA 301 §7.5, CiA 402)."""
+"""Objects for communication and control of a node: SYNC, the identifier of emergencies, guarding and
+heartbeats, SDO and PDO parameters, NMT startup, the control word (CiA 301 §7.5, CiA 402)."""
 _DOWNLOAD, _UPLOAD, _ABORT = 0x20, 0x40, 0x80
 """Command specifiers in the three highest bits (CiA 301 §7.2.4.3)."""
 
 
 class Services:
-    """One bus. ``nodes`` has the SDO time-out of each node of the site in s; ``told_to_run`` gives what of a
-    node is told to run at a time, in words, or nothing; ``written`` has the objects that move outputs of a
-    node or make them safe."""
+    """Judge of the services on one bus. ``nodes`` has the SDO time-out of each node of the site in s;
+    ``told_to_run`` gives what of a node is told to run at a time, in words, or nothing; ``written`` has the
+    objects that move outputs of a node or make them safe."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class Services:
         self._written = written
         self._starts: dict[int, deque[float]] = {node: deque() for node in nodes}
         self._asked: dict[int, float] = {}
-        """When a question was asked that has no answer yet, by node."""
+        """Time of the question without an answer yet, by node."""
 
     @property
     def identifiers(self) -> set[int]:
@@ -64,7 +64,7 @@ class Services:
         )
 
     def on_frame(self, can_id: int, data: bytes, at: float) -> str:
-        """A sentence where it is somebody else's, else nothing."""
+        """Take a frame. Returns a sentence where it is a foreign sender's, else ""."""
         if can_id == 0x000:
             return self._on_nmt(data, at)
         node = can_id & 0x7F

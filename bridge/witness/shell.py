@@ -1,4 +1,4 @@
-"""Runs the witness: waits for frames and answers, and hands the findings on."""
+"""Shell of the witness: it waits for frames and answers, and hands the findings on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _TICK_S = 0.05
 
 
 class CannotListen(Exception):
-    """Has a line for each interface that cannot be opened."""
+    """Interfaces cannot be opened; the message has a line for each."""
 
 
 class Witness:
@@ -54,7 +54,7 @@ class Witness:
             self._numbers.close()
 
     def run_until(self, until: Callable[[float], bool]) -> None:
-        """Watch until ``until`` says so; it is asked after every turn."""
+        """Watch until ``until`` returns true; it is called after every turn."""
         while not until(now := time.monotonic()):
             self._wait(now)
             self._turn()

@@ -1,4 +1,5 @@
-"""The judgement of the witness: frames, telegrams' numbers and the time in, stops and alarms out. Sans-IO.
+"""Judge of one bus for the witness: frames, telegrams' numbers and the time in, stops and alarms out.
+Sans-IO.
 
 A stop is recorded with its time and what is promised of it; an alarm is raised as soon as a promise is
 broken, whether or not the drive stops in the end. Times are seconds of one monotonic clock, those of frames
@@ -22,24 +23,24 @@ from bridge.witness.services import TAKES_OUT, Services
 
 _TURNS_S: Final = 0.5
 _MOST_TURNS: Final = 4
-"""An RPDO that turns from "run" to "stop" and back so often in ``_TURNS_S`` has two senders."""
+"""Most turns of an RPDO from "run" to "stop" and back in ``_TURNS_S``: with more it has two senders."""
 _BOOT_UP, _STOPPED = 0x00, 0x04
-"""States that a node says (CiA 301 §7.2.8.3.2.2)."""
+"""NMT states in a heartbeat (CiA 301 §7.2.8.3.2.2)."""
 _UNSEEN_S: Final = 1.0
-"""An enabled drive gets its RPDO more often than that."""
+"""Time in seconds within which an enabled drive gets its next RPDO."""
 BLIND_S: Final = 5.0
-"""Without a reading for so long the witness says that it sees nothing of the owner."""
+"""Time in seconds without a reading after which the witness reports that it sees nothing of the owner."""
 
 
 class _Track:
-    """What is known of one drive."""
+    """Knowledge of one drive."""
 
     def __init__(self, drive: WatchedDrive) -> None:
         self.drive = drive
         self.owner = Owner(drive.name, drive.timeout_ms, drive.beside_ms)
         self.rpdo_at: float | None = None
         self.stopped_at: float | None = None
-        """The first RPDO that does not enable, of those that go on with it."""
+        """Time of the first RPDO of the present run that does not enable."""
         self.tells_run = False
         self.turns: deque[float] = deque()
         self.is_enabled = False
@@ -48,17 +49,17 @@ class _Track:
         self.jogs = Jogs(RAMP_MS / 1000, drive.follow_ms / 1000)
         self.rpdo = b""
         self.repeats = Rate(drive.rpdo_ms)
-        """Of an RPDO that says what the one before it said."""
+        """Rate of RPDOs with the same content as the one before."""
         self.node_at: float | None = None
-        """Its node's error control was heard last."""
+        """Time of its node's last error control message."""
         self.taken_out_at: float | None = None
-        """Its node was taken out of operation by NMT while it said "enabled"."""
+        """Time at which its node was taken out of operation by NMT while it said "enabled"."""
         self.told: set[Kind] = set()
-        """Alarms of what goes on are raised once."""
+        """Alarms raised for a state that lasts: each is raised once."""
 
 
 class Watch:
-    """One bus. ``findings`` are taken by whoever tells them. Whether it ``asks`` for telegrams' numbers."""
+    """One bus. The caller takes the ``findings``. ``asks`` is true where telegrams' numbers are asked for."""
 
     def __init__(self, bus: WatchedBus, *, asks: bool = True) -> None:
         self._name = bus.name
@@ -84,13 +85,14 @@ class Watch:
 
     @property
     def identifiers(self) -> list[int]:
-        """What it has to see."""
+        """Identifiers of the frames that it needs."""
         services = self._services.identifiers
         drives = {*self._by_rpdo, *self._by_tpdo, *self._by_guard}
         return sorted({*drives, *self._by_outputs, *self._beats, *services})
 
     def _told_to_run(self, node_id: int, at: float) -> str:
-        """What of a node is told to run or to be active; nothing where there is no such thing."""
+        """Text on a drive that is told to run, or outputs told to be active, of a node; empty where there are
+        none."""
         if any(one.tells_run for one in self._tracks.values() if one.drive.node_id == node_id):
             return "a drive of it is told to run"
         is_active = any(one.is_told(at) for one in self._outputs if one.node_id == node_id)
@@ -131,7 +133,7 @@ class Watch:
                 outputs.on_nmt(command, at)
 
     def _on_guard(self, track: _Track, data: bytes, at: float) -> None:
-        """Heartbeat or guarding answer of its node: the lower seven bits are the state."""
+        """Take a heartbeat or guarding answer of its node: the lower seven bits are the state."""
         track.node_at = at
         state = data[0] & 0x7F if data else None
         if state == _BOOT_UP or (state == _STOPPED and track.drive.nmt_stops):
@@ -141,12 +143,12 @@ class Watch:
     def on_number(
         self, name: str, number: int, asked_at: float, answered_at: float, timeout_ms: int | None = None
     ) -> None:
-        """The number of the owner's last telegram, as it was between these times, and the time-out in force;
-        None where that was not told."""
+        """Take the number of the owner's last telegram, as it was between these times, and the time-out in
+        force; None where that was not read."""
         self._owners[name].on_number(number, asked_at, answered_at, timeout_ms)
 
     def on_numbers_lost(self, why: str = "") -> None:
-        """Nobody tells the numbers (any more): nothing is known of the owners."""
+        """Note that the numbers cannot be read (any more): nothing is known of the owners."""
         self._why_blind = why
         for owner in self._owners.values():
             owner.on_numbers_lost()
@@ -169,7 +171,8 @@ class Watch:
             self._on_turn(track, at)
 
     def _on_repeat(self, track: _Track, data: bytes, at: float) -> None:
-        """The bridge repeats an RPDO so often, and no more: beside that it sends what is new."""
+        """Judge the rate of an RPDO: the bridge repeats it so often and no more, and sends new content beside
+        that."""
         is_same, track.rpdo = data == track.rpdo, data
         if is_same and track.repeats.is_too_often(at):
             message = f"RPDO {track.drive.rpdo:03X}h comes too often: somebody else sends it, too"
@@ -206,7 +209,7 @@ class Watch:
             track.enabled_since = None
 
     def _on_speed(self, track: _Track, data: bytes, at: float) -> None:
-        """Whether it brakes, where its owner jogs."""
+        """Judge whether it brakes, where its owner jogs."""
         if not track.is_enabled:
             track.jogs.on_obeyed()
             return
@@ -247,7 +250,7 @@ class Watch:
         )
 
     def on_time(self, now: float) -> None:
-        """Call it when everything that had come by ``now`` has been handed over."""
+        """Judge the time: called when all frames received by ``now`` have been handed over."""
         for track in self._tracks.values():
             if lateness := track.owner.lateness():
                 self._alarm(track.drive.name, Kind.LATE, now, f"told to run {lateness}")
@@ -259,7 +262,7 @@ class Watch:
             self._judge_sight(now)
 
     def _judge_sight(self, now: float) -> None:
-        """Who is promised something of its owner, and nobody tells the owner's telegrams."""
+        """Judge the sight of owners: report promises for which the owner's telegrams cannot be read."""
         blind: list[Owner] = []
         for owner in self._owners.values():
             if not owner.is_promised:
@@ -278,7 +281,7 @@ class Watch:
         self._blind = blind
 
     def _judge_drive(self, track: _Track, now: float) -> None:
-        """A drive that says "enabled" longer than it may."""
+        """Judge a drive that says "enabled" longer than it may."""
         drive, seen = track.drive, track.tpdo_at
         if not track.is_enabled or seen is None or track.enabled_since is None:
             return
@@ -297,7 +300,7 @@ class Watch:
             self._once(track, Kind.RUNS_ON, now, message)
 
     def _judge_unheard(self, track: _Track, now: float) -> None:
-        """A drive that said "enabled" last, and cannot say any more whether it stops."""
+        """Judge a drive that said "enabled" last, and is cut off while it stops."""
         if not track.is_enabled or track.tpdo_at is None:
             return
         if (out_at := track.taken_out_at) is not None and _ms(now - out_at) > track.drive.follow_ms:

@@ -20,13 +20,17 @@ ROOMS = (
     "derive",
     "dictionary",
     "eds",
+    "errands",
+    "lint",
     "northbound/modbus",
     "northbound/opcua",
     "northbound/page",
     "northbound/zenoh",
     "parameter",
+    "service",
     "sim",
     "uaserver",
+    "witness",
     "zenohlink",
 )
 HEADLESS = frozenset(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from typing import Final, Protocol
 
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 
 _LONGEST: Final = 200
 
@@ -25,7 +25,7 @@ def teller(protocol: str) -> Teller:
 
     def tell(kind: str, source: str, detail: str = "", level: int = logging.WARNING) -> None:
         more = f": {detail[:_LONGEST]}" if detail else ""
-        extra = about(source, (protocol, kind))
+        extra = log_source(source, (protocol, kind))
         _log.log(level, "%s: %s from %s%s", protocol, kind, source, more, extra=extra)
 
     return tell

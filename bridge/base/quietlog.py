@@ -21,7 +21,7 @@ _FIRST: Final = "line_first"
 A_FEW: Final = 3
 
 
-def about(source: str, kind: Hashable = None, *, first: int = 1) -> dict[str, Hashable]:
+def log_source(source: str, kind: Hashable = None, *, first: int = 1) -> dict[str, Hashable]:
     """Source of a log line, for ``extra`` of a call that others can cause: who or what it is about, and how
     many lines are written before they are counted. Lines of one call are of one kind unless ``kind`` tells
     them apart."""

@@ -123,7 +123,7 @@ class CliBus:
         return node_id
 
 
-def choose_line(site: Path | None, which: BusChoice, *, is_recorded: bool = False) -> CliBus:
+def choose_bus(site: Path | None, which: BusChoice, *, is_recorded: bool = False) -> CliBus:
     """The bus that the options name; one that was recorded has no interface. Raises ``BadParameter`` if they
     name none or two."""
     bus = which.bus

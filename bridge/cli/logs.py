@@ -8,7 +8,7 @@ import os
 from typing import Any, Final
 
 from bridge.base.errors import is_exhausted
-from bridge.base.quietlog import QuietHandler, about
+from bridge.base.quietlog import QuietHandler, log_source
 from bridge.cli.terminal import printable, printable_lines
 
 _log = logging.getLogger(__name__)
@@ -74,11 +74,11 @@ def log_fault(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
     logged with its traceback; that there is no descriptor left is one trouble, wherever it is met."""
     error: BaseException | None = context.get("exception")
     if error is not None and is_exhausted(error):
-        _log.error("%s: %s", context.get("message"), error, extra=about("event loop", "exhausted"))
+        _log.error("%s: %s", context.get("message"), error, extra=log_source("event loop", "exhausted"))
         return
     place = _place(error) or str(context.get("message"))
     message = f"unexpected: {context.get('message')}: {error!r}" if error else str(context.get("message"))
-    _log.error("%s", message, exc_info=error, extra=about("event loop", place))
+    _log.error("%s", message, exc_info=error, extra=log_source("event loop", place))
 
 
 def _place(error: BaseException | None) -> tuple[str, int] | None:

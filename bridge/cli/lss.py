@@ -13,7 +13,7 @@ import typer
 from bridge.base.errors import OperationFailed
 from bridge.canopen.lss import BIT_RATES, NO_NODE_ID, LssAddress, LssError, Service
 from bridge.canopen.lss_scan import Scanned, find_all
-from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_line, print_table, takes_bus, tell
+from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_bus, print_table, takes_bus, tell
 from bridge.cli.terminal import progress
 from bridge.errands import lss as lss_errand
 from bridge.errands.lss import LssErrand
@@ -49,7 +49,7 @@ def scan(
     as_json: AsJson = False,
 ) -> None:
     """Find every device that has no node id (fastscan). 14 seconds for each, longer for slow ones."""
-    line = choose_line(site, which)
+    line = choose_bus(site, which)
     scanned = Scanned()
     try:
         _run(line, find_all(parse_identity(known) if known else None, scanned), timeout_ms)
@@ -83,7 +83,7 @@ def inquire(
     as_json: AsJson = False,
 ) -> None:
     """Ask a device for its identity and node id."""
-    line = choose_line(site, which)
+    line = choose_bus(site, which)
     found, node_id = _run(line, lss_errand.inquire(_which(identity, only)), timeout_ms)
     if as_json:
         print(json.dumps({"node_id": None if node_id == NO_NODE_ID else node_id} | found._asdict()))
@@ -106,7 +106,7 @@ def set_id(
     """Give a device a node id. One that has another already takes it with its next reset."""
     if 127 < node_id < NO_NODE_ID:
         raise typer.BadParameter(f"{node_id} is no node id: 1…127, or 255 for none")
-    line = choose_line(site, which)
+    line = choose_bus(site, which)
     _run(line, lss_errand.set_node_id(_which(identity, only), node_id, keep=keep), timeout_ms)
     _report({"ok": True, "node_id": node_id, "stored": keep}, f"node id {node_id}", keep, as_json)
 
@@ -131,7 +131,7 @@ def set_bitrate(
     rate = None if new == "auto" else int(new) if new.isdecimal() else 0
     if rate is not None and rate not in rates:
         raise typer.BadParameter(f"{new!r} is no bit rate of LSS: {', '.join(map(str, rates))} or auto")
-    line = choose_line(site, which)
+    line = choose_bus(site, which)
     service = lss_errand.set_bit_rate(_which(identity, only), rate, keep=keep, activate_ms=activate_ms)
     _run(line, service, timeout_ms)
     facts = {"ok": True, "bitrate": rate, "stored": keep, "active": activate_ms is not None}
@@ -149,7 +149,7 @@ def store(
     as_json: AsJson = False,
 ) -> None:
     """Make a device store its node id and bit rate."""
-    line = choose_line(site, which)
+    line = choose_bus(site, which)
     _run(line, lss_errand.keep_settings(_which(identity, only)), timeout_ms)
     _report({"ok": True, "stored": True}, "node id and bit rate", True, as_json)
 

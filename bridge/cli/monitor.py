@@ -15,7 +15,7 @@ import typer
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
-from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_line, print_table, takes_bus, tell
+from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_bus, print_table, takes_bus, tell
 from bridge.cli.terminal import printable
 from bridge.cli.trace import SUFFIXES, Trace
 from bridge.errands.decode import Decoder, Kind, Meaning
@@ -88,7 +88,7 @@ def monitor(
 ) -> None:
     """Decode the frames on a bus until Ctrl-C, --count or --seconds, or those of a recorded trace."""
     site, path = _site_and_trace(files or [])
-    line = choose_line(site, replace(which, channel=None) if path else which, is_recorded=path is not None)
+    line = choose_bus(site, replace(which, channel=None) if path else which, is_recorded=path is not None)
     ids = {line.node_id(text) for text in node or []}
     kinds = set(kind or [])
     devices = [name for name, family in line.families.items() if family.is_device]

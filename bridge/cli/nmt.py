@@ -10,7 +10,7 @@ import typer
 
 from bridge.base.errors import OperationFailed
 from bridge.canopen.nmt import NmtCommand
-from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_line, split_site, takes_bus
+from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_bus, split_site, takes_bus
 from bridge.cli.terminal import progress
 from bridge.errands.single import NmtErrand
 
@@ -52,7 +52,7 @@ def nmt(
         command = _COMMANDS[CommandName(name)]
     except ValueError:
         raise typer.BadParameter(f"{name!r} is none of {', '.join(CommandName)}") from None
-    line = choose_line(site, which)
+    line = choose_bus(site, which)
     node_id = 0 if node == "all" else line.node_id(node)
     with progress(f"{name}: waiting up to {seconds:g} s") as show:
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from bridge.base.errors import OperationFailed
-from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_line, print_table, takes_bus, tell
+from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_bus, print_table, takes_bus, tell
 from bridge.cli.scan_site import write_site
 from bridge.cli.terminal import progress
 from bridge.errands.scan import FoundNode, Scanner
@@ -46,7 +46,7 @@ def scan(
     """List the nodes of a bus: by heartbeat, guarding and SDO."""
     if write and passive:
         raise typer.BadParameter("a site file needs what the nodes answer: leave out --passive")
-    line = choose_line(site, which)
+    line = choose_bus(site, which)
     listen_s = seconds or (_PASSIVE_S if passive else _ACTIVE_S)
     scanner = _run(line, passive=passive, listen_s=listen_s, timeout_s=timeout_ms / 1000)
     if not passive:

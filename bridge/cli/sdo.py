@@ -15,7 +15,7 @@ from bridge.canopen import datatypes, width
 from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Plain, TypeName
 from bridge.canopen.decode_sdo import shown
 from bridge.canopen.sdo import SdoError
-from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_line, split_site, takes_bus, tell
+from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_bus, split_site, takes_bus, tell
 from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import printable, progress
 from bridge.errands.single import SdoErrand
@@ -57,7 +57,7 @@ def read(
 ) -> None:
     """Read an object. INDEX and SUB are hexadecimal; SUB is 0 where it is left out."""
     site, (node, name) = split_site(what, 2, _READ_USAGE)
-    line = choose_line(site, which)
+    line = choose_bus(site, which)
     index, sub = parse_object(name)
     target = _sdo_target(line, line.node_id(node), sdo_channel, timeout_ms, retries)
     data = _transfer(line, target, index, sub, None, as_json=as_json)
@@ -91,7 +91,7 @@ def write(
 ) -> None:
     """Write an object. On a terminal it asks first: a drive may move, and many keep it in EEPROM."""
     site, (node, name, text) = split_site(what, 3, _WRITE_USAGE)
-    line = choose_line(site, which)
+    line = choose_bus(site, which)
     index, sub = parse_object(name)
     node_id = line.node_id(node)
     try:

@@ -13,7 +13,7 @@ from typing import Final, TypeVar
 
 from bridge.base.errors import OperationFailed
 from bridge.base.guard import Guard
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 from bridge.command import Code, Event, Identity, Outcome, Rejection, Reply, Request
 from bridge.image import Image, Quality
 from bridge.mirror import protocol
@@ -232,7 +232,9 @@ class MirrorClient:
             await self._renew_link()
 
     async def _renew_link(self) -> None:
-        _log.warning("mirror: %s for %g s, connecting anew", UNREACHABLE, _RENEW_S, extra=about("mirror"))
+        _log.warning(
+            "mirror: %s for %g s, connecting anew", UNREACHABLE, _RENEW_S, extra=log_source("mirror")
+        )
         fresh = self._new_link()
         await self._open(fresh)
         before, self._link = self._link, fresh
@@ -374,5 +376,5 @@ class MirrorClient:
             return decode(message.payload)
         except Malformed as error:
             self.malformed += 1
-            _log.warning("mirror: a message that is none of ours: %s", error, extra=about("mirror"))
+            _log.warning("mirror: a message that is none of ours: %s", error, extra=log_source("mirror"))
             return None

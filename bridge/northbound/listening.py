@@ -11,7 +11,7 @@ import socket
 from typing import Any, Final
 
 from bridge.base.errors import OperationFailed, Unavailable, is_exhausted
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 
 _log = logging.getLogger(__name__)
 
@@ -45,7 +45,9 @@ class ListeningSocket(socket.socket):
         except OSError as error:
             if not is_exhausted(error):
                 raise
-            _log.error("%s: no client can connect: %s", self._name, error.strerror, extra=about(self._name))
+            _log.error(
+                "%s: no client can connect: %s", self._name, error.strerror, extra=log_source(self._name)
+            )
             if self._turn_away():
                 raise BlockingIOError from error
             self._has_failed = True

@@ -13,7 +13,7 @@ from typing import Final, Protocol
 
 from bridge.base.errors import BridgeError, Unavailable
 from bridge.base.notify import Notifier
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 from bridge.base.ratelimit import Pauses
 from bridge.command import Event, Kind, Plant
 from bridge.text import Text
@@ -146,7 +146,7 @@ class Supervisor:
         except (BridgeError, OSError) as error:
             return f"has failed: {error}"
         except Exception as error:  # noqa: BLE001 - one of them must not stop the drives of the others
-            _log.exception("unexpected", extra=about(part.name))
+            _log.exception("unexpected", extra=log_source(part.name))
             return f"has failed: {error!r}"
 
     def _fails(self, part: Part, how: str, pause_s: float) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 from typing import Final
 
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 
 _LIBRARY: Final = "asyncua"
 _TOLD_BY_US: Final = "Got malformed header"
@@ -20,7 +20,7 @@ def _shorten(record: logging.LogRecord) -> bool:
     error = record.exc_info[1] if record.exc_info else None
     record.msg = f"{record.getMessage()}{f': {error!r}' if error else ''}"
     record.args, record.exc_info, record.exc_text = None, None, None
-    record.__dict__.update(about(_LIBRARY))
+    record.__dict__.update(log_source(_LIBRARY))
     return True
 
 

@@ -13,7 +13,7 @@ from typing import Final, cast
 from bridge.base.admission import Admission, Limits, Stage, Visitor
 from bridge.base.errors import Unavailable
 from bridge.base.notices import teller
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 from bridge.command import Identity, Role, Source
 from bridge.northbound.gateway.session import Net, Session
 from bridge.northbound.listening import ListeningSocket, listen, until_deaf
@@ -203,7 +203,7 @@ class _Client(asyncio.BufferedProtocol):
         try:
             step()
         except Exception:  # noqa: BLE001 - nothing that a client sends may end the service
-            _log.exception("gateway connection closed", extra=about("gateway"))
+            _log.exception("gateway connection closed", extra=log_source("gateway"))
             self.abort()
             return
         self._flush()

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 from bridge.base.sources import source_of
 from bridge.command import Action, Code, Identity, Outcome, Rejection, Request
 from bridge.command.messages.freshness import NOW_S
@@ -146,7 +146,7 @@ class Dispatcher:
     def _note_unknown(self, unit_id: int, caller: Identity) -> None:
         """A PLC that asks for a unit which is not there is set up wrongly, and shows its user a number."""
         source, why = source_of(caller.user), self._why(unit_id)
-        _log.warning("Modbus: %s is refused: %s", caller.address, why, extra=about(source, unit_id))
+        _log.warning("Modbus: %s is refused: %s", caller.address, why, extra=log_source(source, unit_id))
 
     def _why(self, unit_id: int) -> str:
         """Reason why nothing can be written to a unit id; empty for that of a drive or device."""

@@ -12,7 +12,7 @@ from typing import Final
 
 from bridge.base.admission import Admission, Limits, Stage, Visitor
 from bridge.base.notices import teller
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 from bridge.base.sources import source_of
 from bridge.command import Identity, Role, Source
 from bridge.config import ModbusTable
@@ -108,7 +108,7 @@ class ModbusServer:
             _log.warning(
                 "connection of %s refused: it is in none of the networks of modbus.allow",
                 address,
-                extra=about(source_of(str(address))),
+                extra=log_source(source_of(str(address))),
             )
             return None
         self._owner_names = frozenset(map(str, self._view.image.values(self._owners)))
@@ -157,7 +157,7 @@ class ModbusServer:
     def on_fault(self, session: Session, fault: str) -> None:
         """The session is closed for this reason."""
         self._count_broken()
-        _log.warning("connection of %s closed: %s", session.address, fault, extra=about(session.source))
+        _log.warning("connection of %s closed: %s", session.address, fault, extra=log_source(session.source))
 
     def _count_refused(self) -> None:
         self._view.count("modbus_refused_connections")

@@ -15,7 +15,7 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 from bridge.command.messages.request import (
     LEAST_ROLE,
     Action,
@@ -85,7 +85,7 @@ async def ask(view: View, request: Request) -> Outcome:
             request.action,
             request.target,
             ANSWER_LIMIT_S,
-            extra=about(request.target),
+            extra=log_source(request.target),
         )
         return Outcome(Code.TIMED_OUT, Text.of("request.no_outcome"), forwarded=False)
 

@@ -19,7 +19,7 @@ from typing import Final
 import zenoh
 
 from bridge.base.errors import Unavailable
-from bridge.base.quietlog import about
+from bridge.base.quietlog import log_source
 from bridge.base.sources import source_of
 from bridge.command import Code, Event, Identity, Outcome, Rejection, Reply, Request, Source
 from bridge.command.messages.request import STOP_ACTIONS
@@ -142,7 +142,9 @@ class ZenohServer:
         self._view.count("zenoh_broken_connections", len(places))
         sources = Counter(source_of(place.rpartition(":")[0].strip("[]")) for place in places)
         for source, count in sources.items():
-            _log.warning("connections of %s came to no zenoh session: %d", source, count, extra=about(source))
+            _log.warning(
+                "connections of %s came to no zenoh session: %d", source, count, extra=log_source(source)
+            )
 
     # in
 
@@ -275,7 +277,9 @@ class ZenohServer:
         try:
             request = self._request(owner, tail, message.payload, self._identity(owner, message))
         except BadCommand as bad:
-            _log.info("zenoh: a put on %s is no command: %s", message.key, bad.message, extra=about("puts"))
+            _log.info(
+                "zenoh: a put on %s is no command: %s", message.key, bad.message, extra=log_source("puts")
+            )
             self._note_refusal(owner, tail, message, bad)
             return
         self._submit(request, message.received_at, lambda _: None)

@@ -7,7 +7,7 @@ import logging
 
 import pytest
 
-from bridge.base.quietlog import QuietHandler, about
+from bridge.base.quietlog import QuietHandler, log_source
 from bridge.base.ratelimit import PAUSE_S
 
 
@@ -27,7 +27,7 @@ class Log:
         return found
 
     def refuses(self, source: str, text: str = "refused", *, first: int = 1, kind: str | None = None) -> None:
-        self.logger.warning("%s: %s", source, text, extra=about(source, kind, first=first))
+        self.logger.warning("%s: %s", source, text, extra=log_source(source, kind, first=first))
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def test_a_traceback_is_not_repeated_with_the_count(log: Log) -> None:
         try:
             raise ValueError("inside")
         except ValueError:
-            log.logger.exception("failed", extra=about("x"))
+            log.logger.exception("failed", extra=log_source("x"))
     assert "ValueError: inside" in log.lines()
     log.handler.close()
     assert log.lines() == ["failed (1 more of this kind)"]

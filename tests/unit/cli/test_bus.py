@@ -8,19 +8,19 @@ import pytest
 import typer
 
 from bridge.canopen.frame import Frame
-from bridge.cli.bus import BusChoice, choose_line, split_site
+from bridge.cli.bus import BusChoice, choose_bus, split_site
 from bridge.errands.single import SdoErrand
 
 
 def test_a_bus_is_named_by_its_options() -> None:
-    line = choose_line(None, BusChoice(None, "socketcan", "can0", 500_000))
+    line = choose_bus(None, BusChoice(None, "socketcan", "can0", 500_000))
     assert (line.table.channel, line.table.bitrate, line.is_of_site) == ("can0", 500_000, False)
 
 
 def test_a_site_with_two_buses_needs_the_name_of_one(site: Path) -> None:
     with pytest.raises(typer.BadParameter, match="one of north, south"):
-        choose_line(site, BusChoice())
-    line = choose_line(site, BusChoice("north"))
+        choose_bus(site, BusChoice())
+    line = choose_bus(site, BusChoice("north"))
     assert line.node_id("conveyor") == 5
     assert line.node_id("0x11") == 17
     with pytest.raises(typer.BadParameter, match="conveyor"):
@@ -33,12 +33,12 @@ def test_a_site_with_two_buses_needs_the_name_of_one(site: Path) -> None:
 )
 def test_half_a_bus_is_bad_usage(bus: str | None, interface: str | None, channel: str | None) -> None:
     with pytest.raises(typer.BadParameter):
-        choose_line(None, BusChoice(bus, interface, channel))
+        choose_bus(None, BusChoice(bus, interface, channel))
 
 
 def test_a_site_and_an_interface_are_two_buses(site: Path) -> None:
     with pytest.raises(typer.BadParameter, match="leave the options out"):
-        choose_line(site, BusChoice("north", "socketcan", "can0"))
+        choose_bus(site, BusChoice("north", "socketcan", "can0"))
 
 
 def test_the_site_may_stand_first() -> None:
@@ -51,14 +51,14 @@ def test_the_site_may_stand_first() -> None:
 def test_a_nodes_own_time_and_retries_are_taken_from_the_site(site: Path) -> None:
     text = site.read_text("utf-8").replace("id = 5", "id = 5\nsdo_timeout_ms = 700\nsdo_retries = 3")
     site.write_text(text, "utf-8")
-    line = choose_line(site, BusChoice("north"))
+    line = choose_bus(site, BusChoice("north"))
     assert line.sdo_policy(5) == (0.7, 3)
     assert line.sdo_policy(6) == (0.5, 0), "a node that the site does not have"
 
 
 def test_a_further_sdo_channel_has_the_cob_ids_of_the_mapping(site: Path) -> None:
     """BU 2500 §6.4: SDO3 is 440h and 3C0h + node id."""
-    line = choose_line(site, BusChoice("north"))
+    line = choose_bus(site, BusChoice("north"))
     assert line.sdo_server(5, 1) is None
     server = line.sdo_server(5, 3)
     assert server is not None
@@ -69,4 +69,4 @@ def test_a_further_sdo_channel_has_the_cob_ids_of_the_mapping(site: Path) -> Non
     with pytest.raises(typer.BadParameter, match="no SDO channel 9: 1, 2, 3, 4"):
         line.sdo_server(5, 9)
     with pytest.raises(typer.BadParameter, match="give SITE"):
-        choose_line(None, BusChoice(None, "socketcan", "can0")).sdo_server(5, 2)
+        choose_bus(None, BusChoice(None, "socketcan", "can0")).sdo_server(5, 2)

@@ -9,7 +9,7 @@ import pytest
 
 from bridge.canopen.frame import Frame
 from bridge.cli import known_servers
-from bridge.cli.bus import BusChoice, choose_line
+from bridge.cli.bus import BusChoice, choose_bus
 from bridge.cli.known_servers import KnownServers
 from bridge.errands.single import SdoErrand
 from tests.support.sdo_block import INDEX
@@ -25,7 +25,7 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def servers(channel: str = "can0") -> KnownServers:
-    return KnownServers(choose_line(None, BusChoice(None, "socketcan", channel)))
+    return KnownServers(choose_bus(None, BusChoice(None, "socketcan", channel)))
 
 
 def read(known: KnownServers) -> list[str]:

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bridge.base.quietlog import A_FEW, about
+from bridge.base.quietlog import A_FEW, log_source
 from bridge.base.ratelimit import PAUSE_S
 from bridge.cli.logs import _Formatter, log_fault, write_counts
 from tests.support.quiet import QuietLog, quiet_log
@@ -25,7 +25,7 @@ def log() -> Iterator[QuietLog]:
 
 
 def closed(host: str, number: int = 0) -> None:
-    _log.warning("connection of %s closed: %d", host, number, extra=about(host))
+    _log.warning("connection of %s closed: %d", host, number, extra=log_source(host))
 
 
 def test_the_first_of_each_kind_and_source_is_a_line_and_the_others_a_count(log: QuietLog) -> None:
@@ -51,7 +51,7 @@ def test_a_flood_that_goes_on_is_a_line_a_minute_and_then_it_begins_anew(log: Qu
 
 def test_a_kind_hides_no_other_one(log: QuietLog) -> None:
     for kind in ("trip", "trip", "stop ignored"):
-        _log.error("fu1: %s", kind, extra=about("fu1", kind))
+        _log.error("fu1: %s", kind, extra=log_source("fu1", kind))
     assert log.lines == ["fu1: trip", "fu1: stop ignored"]
 
 
@@ -81,7 +81,7 @@ def test_a_traceback_is_told_once(log: QuietLog) -> None:
         try:
             raise KeyError("x")
         except KeyError:
-            _log.exception("unexpected", extra=about("part"))
+            _log.exception("unexpected", extra=log_source("part"))
     assert sum("Traceback" in line for line in log.lines) == 1
     assert log.pass_minute() == ["unexpected (99 more of this kind)"]
 

@@ -38,7 +38,7 @@ class Bus:
 
 def run(monkeypatch: pytest.MonkeyPatch, bus: Bus, *arguments: str) -> Result:
     monkeypatch.setattr(nmt, "carry_out", bus)
-    monkeypatch.setattr(nmt, "choose_line", lambda site, which: Line())
+    monkeypatch.setattr(nmt, "choose_bus", lambda site, which: Line())
     return CliRunner().invoke(
         make_app(), ["nmt", *arguments, "--interface", "socketcan", "--channel", "can0"]
     )

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from bridge.canopen.datatypes import TypeName
 from bridge.canopen.datatypes import encode as as_site_file
 from bridge.cli.app import make_app
-from bridge.cli.bus import BusChoice, choose_line
+from bridge.cli.bus import BusChoice, choose_bus
 from bridge.cli.sdo import ValueType, decode, encode, parse_object, why_forced
 from bridge.image import DataType
 from bridge.parameter import ObjectRef
@@ -128,6 +128,6 @@ def test_what_is_protected_is_written_with_force_only(site: Path, address: str, 
 
 
 def test_anything_else_is_written_without(site: Path) -> None:
-    line = choose_line(site, BusChoice("north"))
+    line = choose_bus(site, BusChoice("north"))
     assert not why_forced(line, 5, ObjectRef(0x2066, 1))
     assert not why_forced(line, 6, ObjectRef(0x1017, 0)), "no node of the site"

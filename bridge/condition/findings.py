@@ -36,7 +36,7 @@ class Trouble:
     is_of_bus: bool = False
 
 
-class Look:
+class ImageReader:
     """Points by their names; None where there is none, or it has no value."""
 
     def __init__(self, image: Image) -> None:
@@ -71,43 +71,45 @@ class Look:
         return quality, why
 
 
-def is_bridge_dead(look: Look) -> bool:
+def is_bridge_dead(reader: ImageReader) -> bool:
     """The mirror gives every point the quality *dead* while the bus process does not answer. The bridge's own
     points have it at no other time."""
-    return bool(look.of_bridge) and all(look.quality(name)[0] is Quality.DEAD for name in look.of_bridge)
+    return bool(reader.of_bridge) and all(
+        reader.quality(name)[0] is Quality.DEAD for name in reader.of_bridge
+    )
 
 
-def of_bus(look: Look, bus: str, *, is_down: bool) -> Iterator[Trouble]:
+def of_bus(reader: ImageReader, bus: str, *, is_down: bool) -> Iterator[Trouble]:
     place = f"bus/{bus}"
-    if look(f"{place}/passive"):
+    if reader(f"{place}/passive"):
         return
     if is_down:
-        why = look.words(f"{place}/last_error")
-        kind = "bus_off" if look.label(f"{place}/state") == "bus_off" else "bus_down"
+        why = reader.words(f"{place}/last_error")
+        kind = "bus_off" if reader.label(f"{place}/state") == "bus_off" else "bus_down"
         yield Trouble(Rank.ALARM, kind, place, (("why", why),))
         return
-    state = look.label(f"{place}/state")
+    state = reader.label(f"{place}/state")
     if state in ("warning", "passive"):
-        yield Trouble(Rank.WARNING, "bus_errors", place, (("why", look.words(f"{place}/last_error")),))
-    if ids := look(f"{place}/duplicate_ids"):
+        yield Trouble(Rank.WARNING, "bus_errors", place, (("why", reader.words(f"{place}/last_error")),))
+    if ids := reader(f"{place}/duplicate_ids"):
         yield Trouble(Rank.ALARM, "duplicate_ids", place, (("ids", ids),))
-    if look(f"{place}/second_master"):
+    if reader(f"{place}/second_master"):
         yield Trouble(Rank.ALARM, "second_master", place)
-    if ids := look(f"{place}/unexpected_nodes"):
+    if ids := reader(f"{place}/unexpected_nodes"):
         yield Trouble(Rank.WARNING, "unexpected_nodes", place, (("ids", ids),))
-    if held_by := look(f"{place}/held_by"):
+    if held_by := reader(f"{place}/held_by"):
         yield Trouble(Rank.ALARM, "held", place, (("nodes", held_by),))
 
 
-def of_node(look: Look, node: str) -> Iterator[Trouble]:
-    if look(f"{node}/supervision/follows") is False:
+def of_node(reader: ImageReader, node: str) -> Iterator[Trouble]:
+    if reader(f"{node}/supervision/follows") is False:
         yield Trouble(Rank.DANGER, "outputs_ignore_stop", node)
-    state = look.label(f"{node}/node/state")
-    status = look.words(f"{node}/node/boot_status")
+    state = reader.label(f"{node}/node/state")
+    status = reader.words(f"{node}/node/boot_status")
     if state == "config_error":
         yield Trouble(Rank.ALARM, "not_as_configured", node, (("why", status),))
     elif state == "lost":
-        how = look.words(f"{node}/node/supervision_state")
+        how = reader.words(f"{node}/node/supervision_state")
         yield Trouble(Rank.ALARM, "node_lost", node, (("how", how),))
     elif state == "absent":
         yield Trouble(Rank.ALARM, "node_absent", node)
@@ -118,45 +120,45 @@ def of_node(look: Look, node: str) -> Iterator[Trouble]:
 
 
 def of_drive(
-    look: Look, drive: str, own_fault: OwnFault | None, bus_faults: frozenset[str] = frozenset()
+    reader: ImageReader, drive: str, own_fault: OwnFault | None, bus_faults: frozenset[str] = frozenset()
 ) -> Iterator[Trouble]:
     """``bus_faults`` are the numbers of those with which it answers a silent bus."""
-    if look(f"{drive}/supervision/follows") is False:
+    if reader(f"{drive}/supervision/follows") is False:
         yield Trouble(Rank.DANGER, "ignores_stop", drive)
-    is_tripped = look.label(f"{drive}/supervision/watchdog_state") == "tripped"
+    is_tripped = reader.label(f"{drive}/supervision/watchdog_state") == "tripped"
     if is_tripped:
-        owner = look(f"{drive}/supervision/owner") or ""
-        timeout = look(f"{drive}/supervision/fieldbus_timeout_ms") or 0
+        owner = reader(f"{drive}/supervision/owner") or ""
+        timeout = reader(f"{drive}/supervision/fieldbus_timeout_ms") or 0
         yield Trouble(Rank.ALARM, "controller_silent", drive, (("owner", owner), ("timeout_ms", timeout)))
-    quality, reason = look.quality(f"{drive}/status/state")
+    quality, reason = reader.quality(f"{drive}/status/state")
     if quality is Quality.CONFIG_ERROR:
         yield Trouble(Rank.ALARM, "drive_not_as_configured", drive, (("why", reason),))
     elif quality in (Quality.LOST, Quality.DEAD):
         yield Trouble(Rank.ALARM, "drive_lost", drive, (("why", reason),))
-    elif facts := _own(look, drive, own_fault) if is_tripped else _shown(look, drive):
+    elif facts := _own(reader, drive, own_fault) if is_tripped else _shown(reader, drive):
         is_of_bus = dict(facts).get("number") in bus_faults
         yield Trouble(Rank.ALARM, "drive_fault", drive, facts, is_of_bus)
     elif quality is Quality.STALE:
         yield Trouble(Rank.WARNING, "drive_stale", drive, (("why", reason),))
-    quality, reason = look.quality(f"{drive}/supervision/worst_case_bridge_ms")
+    quality, reason = reader.quality(f"{drive}/supervision/worst_case_bridge_ms")
     if quality is Quality.CONFIG_ERROR:
         yield Trouble(Rank.WARNING, "stop_unproven", drive, (("why", reason),))
 
 
-def _shown(look: Look, drive: str) -> tuple[tuple[str, Value], ...]:
+def _shown(reader: ImageReader, drive: str) -> tuple[tuple[str, Value], ...]:
     """The facts of the fault that the points show; none where there is none."""
-    text = look(f"{drive}/status/fault_text")
+    text = reader(f"{drive}/status/fault_text")
     if not text:
         return ()
-    rest = ((leaf, look(f"{drive}/status/fault_{leaf}") or "") for leaf in ("number", "cause", "remedy"))
+    rest = ((leaf, reader(f"{drive}/status/fault_{leaf}") or "") for leaf in ("number", "cause", "remedy"))
     return (("text", text), *rest)
 
 
-def _own(look: Look, drive: str, own_fault: OwnFault | None) -> tuple[tuple[str, Value], ...]:
+def _own(reader: ImageReader, drive: str, own_fault: OwnFault | None) -> tuple[tuple[str, Value], ...]:
     """The facts of the drive's own fault. After a trip the points show the bridge's, which says no more than
     that the controller is silent."""
-    word = look(f"{drive}/status/drive_status_word")
-    code = look(f"{drive}/status/emcy_code")
+    word = reader(f"{drive}/status/drive_status_word")
+    code = reader(f"{drive}/status/emcy_code")
     if own_fault is None or not isinstance(word, int):
         return ()
     fault = own_fault(word, code if isinstance(code, int) else 0)
@@ -165,26 +167,26 @@ def _own(look: Look, drive: str, own_fault: OwnFault | None) -> tuple[tuple[str,
     return (("text", str(fault)), ("number", fault.number), ("cause", fault.cause), ("remedy", fault.remedy))
 
 
-def of_meaning(look: Look, drive: str, main: str) -> Iterator[Trouble]:
+def of_meaning(reader: ImageReader, drive: str, main: str) -> Iterator[Trouble]:
     """The drive's words do not carry what moves it: its parameters say so."""
     for group in ("command", "actual"):
-        quality, reason = look.quality(f"{drive}/{group}/{main}")
+        quality, reason = reader.quality(f"{drive}/{group}/{main}")
         if quality is Quality.DISABLED and reason:
             yield Trouble(Rank.WARNING, f"no_{group}", drive, (("value", main), ("why", reason)))
 
 
-def silence_of(look: Look, bus: str, nodes: Sequence[str]) -> Iterator[Trouble]:
+def silence_of(reader: ImageReader, bus: str, nodes: Sequence[str]) -> Iterator[Trouble]:
     """None of the nodes that should be there answers, which breaks of each of them at once would not explain.
     A single one may be alone to blame, unless nobody acknowledges what the controller sends."""
     place = f"bus/{bus}"
-    states = [look.label(f"{node}/node/state") for node in nodes]
+    states = [reader.label(f"{node}/node/state") for node in nodes]
     expected = [state for state in states if state not in ("disabled", "stopped", "config_error")]
     if not expected or any(state not in ("lost", "absent") for state in expected):
         return
-    if len(expected) > 1 or look.label(f"{place}/state") == "passive":
+    if len(expected) > 1 or reader.label(f"{place}/state") == "passive":
         yield Trouble(Rank.ALARM, "bus_silent", place, (("nodes", len(expected)),))
 
 
-def of_bridge(look: Look) -> Iterator[Trouble]:
-    if failing := look("bridge/fronts_failing"):
+def of_bridge(reader: ImageReader) -> Iterator[Trouble]:
+    if failing := reader("bridge/fronts_failing"):
         yield Trouble(Rank.WARNING, "fronts_failing", "bridge", (("fronts", failing),))

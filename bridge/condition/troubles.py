@@ -13,7 +13,7 @@ from typing import Final
 from bridge.condition.causes import Causes, Key, Known, Shown
 from bridge.condition.findings import (
     DOWN,
-    Look,
+    ImageReader,
     Rank,
     Trouble,
     of_bridge,
@@ -46,7 +46,7 @@ class Troubles:
     """Looks at the image as often as it is asked. ``now_ms`` is monotonic, ``epoch_ms`` the time of day."""
 
     def __init__(self, image: Image, layout: Layout, now_ms: float) -> None:
-        self._look = Look(image)
+        self._reader = ImageReader(image)
         self._layout = layout
         self._began_ms = now_ms
         self._known: dict[Key, Known] = {}
@@ -88,7 +88,7 @@ class Troubles:
         for drive, node in self._layout.drives.items():
             found += self._of_drive(drive, node)
             yield
-        found += of_bridge(self._look)
+        found += of_bridge(self._reader)
         found += self._of_log(now_ms)
         found += self._of_standstill(now_ms)
         known = [self._known_as(one, now_ms, epoch_ms) for one in found]
@@ -143,7 +143,7 @@ class Troubles:
     ) -> bool:
         """Whether the counter ``name`` rose lately; with ``is_news_at_first`` what it had when the bridge
         began counts as well."""
-        count = self._look(name)
+        count = self._reader(name)
         if not isinstance(count, int):
             return False
         at_first = 0 if is_news_at_first else count
@@ -154,48 +154,48 @@ class Troubles:
         return now_ms - risen_ms < for_ms
 
     def _of_bus(self, bus: str, now_ms: float) -> Iterator[Trouble]:
-        look, nodes = self._look, self._nodes_of[bus]
-        is_down = look.label(f"bus/{bus}/state") in DOWN
-        yield from of_bus(look, bus, is_down=is_down)
+        reader, nodes = self._reader, self._nodes_of[bus]
+        is_down = reader.label(f"bus/{bus}/state") in DOWN
+        yield from of_bus(reader, bus, is_down=is_down)
         if self._has_risen(f"bus/{bus}/intruders", now_ms):
-            who = look(f"bus/{bus}/last_intruder") or ""
+            who = reader(f"bus/{bus}/last_intruder") or ""
             yield Trouble(Rank.ALARM, "intruder", f"bus/{bus}", (("who", who),))
         is_looking = now_ms - self._began_ms < _FOUND_MS
-        if not is_down and not is_looking and not look(f"bus/{bus}/passive"):
-            yield from silence_of(look, bus, nodes)
+        if not is_down and not is_looking and not reader(f"bus/{bus}/passive"):
+            yield from silence_of(reader, bus, nodes)
         for node in nodes:
-            if not is_looking or look.label(f"{node}/node/state") != "absent":
-                yield from of_node(look, node)
+            if not is_looking or reader.label(f"{node}/node/state") != "absent":
+                yield from of_node(reader, node)
             yield from self._of_booting(node, bus, now_ms)
 
     def _of_booting(self, node: str, bus: str, now_ms: float) -> Iterator[Trouble]:
         """Its time runs only while it may boot: neither before mandatory nodes, nor under another bridge."""
-        look, key = self._look, ("node_booting", node)
-        may_boot = not look(f"bus/{bus}/held_by") and not look(f"bus/{bus}/passive")
-        if look.label(f"{node}/node/state") != "booting" or not may_boot:
+        reader, key = self._reader, ("node_booting", node)
+        may_boot = not reader(f"bus/{bus}/held_by") and not reader(f"bus/{bus}/passive")
+        if reader.label(f"{node}/node/state") != "booting" or not may_boot:
             self._began.pop(key, None)
             return
         if now_ms - self._began.setdefault(key, now_ms) >= BOOTING_MS:
-            why = look.words(f"{node}/node/boot_status")
+            why = reader.words(f"{node}/node/boot_status")
             yield Trouble(Rank.WARNING, "node_booting", node, (("why", why),))
 
     def _of_drive(self, drive: str, node: str) -> Iterator[Trouble]:
-        look, layout = self._look, self._layout
+        reader, layout = self._reader, self._layout
         bus = layout.nodes[node]
-        if owner := look(f"{drive}/supervision/owner"):
+        if owner := reader(f"{drive}/supervision/owner"):
             self._owners[drive] = str(owner)
         of_bus = layout.bus_faults.get(drive, frozenset())
-        found = list(of_drive(look, drive, layout.own_faults.get(drive), of_bus))
+        found = list(of_drive(reader, drive, layout.own_faults.get(drive), of_bus))
         main = layout.mains.get(drive)
-        if main is not None and look.label(f"{node}/node/state") == "operational":
-            found += of_meaning(look, drive, main)
+        if main is not None and reader.label(f"{node}/node/state") == "operational":
+            found += of_meaning(reader, drive, main)
         yield from found
         if not found and self._is_waiting(drive, bus):
             self._waiting.append(drive)
 
     def _is_waiting(self, drive: str, bus: str) -> bool:
-        quality, _ = self._look.quality(f"{drive}/status/state")
-        return quality is not Quality.GOOD and not self._look(f"bus/{bus}/held_by")
+        quality, _ = self._reader.quality(f"{drive}/status/state")
+        return quality is not Quality.GOOD and not self._reader(f"bus/{bus}/held_by")
 
     def _silent_controllers(self, found: Iterable[Known]) -> Iterator[Trouble]:
         """One controller with several drives that have tripped together."""
@@ -215,11 +215,11 @@ class Troubles:
     def _of_log(self, now_ms: float) -> Iterator[Trouble]:
         # A disk that is full already when the service starts is as bad.
         if self._has_risen("bridge/audit_lost", now_ms, is_news_at_first=True):
-            lines = self._look("bridge/audit_lost") or 0
+            lines = self._reader("bridge/audit_lost") or 0
             yield Trouble(Rank.WARNING, "log_lost", "bridge", (("lines", lines),))
 
     def _of_standstill(self, now_ms: float) -> Iterator[Trouble]:
         if self._has_risen("bridge/hangs", now_ms, for_ms=_SLOW_SHOWN_MS):
-            ms = self._look("bridge/last_hang_ms") or 0
+            ms = self._reader("bridge/last_hang_ms") or 0
             self._began["box_slow", "bridge"] = now_ms - float(ms)
             yield Trouble(Rank.WARNING, "box_slow", "bridge", (("ms", ms),))

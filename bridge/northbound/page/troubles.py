@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import msgspec
 
-from bridge.condition.findings import Look, is_bridge_dead
+from bridge.condition.findings import ImageReader, is_bridge_dead
 from bridge.image import Image
 
 _TROUBLES: Final = "bridge/troubles"
@@ -24,7 +24,7 @@ class Troubles:
     """Troubles read from the image. ``epoch_ms`` is the time of day in ms since 1970."""
 
     def __init__(self, image: Image, epoch_ms: Callable[[], float]) -> None:
-        self._look = Look(image)
+        self._reader = ImageReader(image)
         self._epoch_ms = epoch_ms
         self._dead: dict[str, Any] | None = None
         self._told: tuple[str, str] = "", ""
@@ -38,7 +38,7 @@ class Troubles:
     def beat(self) -> bool:
         """Look again. True if ``shown``, ``waiting`` or ``recent`` has changed."""
         before = self.shown, self.waiting, self.recent
-        if is_bridge_dead(self._look):
+        if is_bridge_dead(self._reader):
             self._dead = self._dead or self._bridge_dead()
             self.shown, self.waiting, self._told = [self._dead], 0, ("", "")
         else:
@@ -47,11 +47,11 @@ class Troubles:
         return (self.shown, self.waiting, self.recent) != before
 
     def _take(self) -> None:
-        told = str(self._look(_TROUBLES) or "[]"), str(self._look(_RECENT) or "[]")
+        told = str(self._reader(_TROUBLES) or "[]"), str(self._reader(_RECENT) or "[]")
         if told != self._told:
             self._told = told
             self.shown, self.recent = _decode(told[0]), _decode(told[1])
-        waiting = self._look(_WAITING)
+        waiting = self._reader(_WAITING)
         self.waiting = waiting if isinstance(waiting, int) else 0
 
     def _bridge_dead(self) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.condition.findings import (
-    Look,
+    ImageReader,
     Rank,
     Trouble,
     is_bridge_dead,
@@ -35,15 +35,15 @@ def kinds(troubles: list[Trouble]) -> list[tuple[Rank, str]]:
 
 
 def bus(case: Watched, *, is_down: bool = False) -> list[Trouble]:
-    return list(of_bus(Look(case.image), "can0", is_down=is_down))
+    return list(of_bus(ImageReader(case.image), "can0", is_down=is_down))
 
 
 def node(case: Watched) -> list[Trouble]:
-    return list(of_node(Look(case.image), NODE))
+    return list(of_node(ImageReader(case.image), NODE))
 
 
 def drive(case: Watched, *numbers: str) -> list[Trouble]:
-    return list(of_drive(Look(case.image), DRIVE, None, frozenset(numbers)))
+    return list(of_drive(ImageReader(case.image), DRIVE, None, frozenset(numbers)))
 
 
 def test_where_all_is_in_order_there_is_none(case: Watched) -> None:
@@ -144,7 +144,7 @@ def test_after_a_trip_the_drives_own_fault_is_the_one_that_its_status_word_tells
         asked.append((word, code))
         return Explained("3.0", "overcurrent")
 
-    found = list(of_drive(Look(case.image), DRIVE, own))
+    found = list(of_drive(ImageReader(case.image), DRIVE, own))
     assert [one.kind for one in found] == ["controller_silent", "drive_fault"]
     assert asked == [(8, 0x2310)]
 
@@ -160,22 +160,22 @@ def test_a_fault_that_answers_a_silent_bus_is_marked(case: Watched) -> None:
 
 
 def test_a_bus_process_that_does_not_answer_is_told_by_the_bridges_own_points(case: Watched) -> None:
-    look = Look(case.image)
-    assert not is_bridge_dead(look)
-    own = [case.image.index[name] for name in look.of_bridge]
+    reader = ImageReader(case.image)
+    assert not is_bridge_dead(reader)
+    own = [case.image.index[name] for name in reader.of_bridge]
     case.image.judge(own[1:], Quality.DEAD, 1.0, "x")
-    assert not is_bridge_dead(look)
+    assert not is_bridge_dead(reader)
     case.image.judge(own, Quality.DEAD, 1.0, "x")
-    assert is_bridge_dead(look)
-    assert not is_bridge_dead(Look(Image([])))
+    assert is_bridge_dead(reader)
+    assert not is_bridge_dead(ImageReader(Image([])))
 
 
 def test_a_point_that_is_not_there_or_has_no_value_is_none(case: Watched) -> None:
-    look = Look(case.image)
-    assert look("nowhere/at/all") is None
+    reader = ImageReader(case.image)
+    assert reader("nowhere/at/all") is None
     case.set(f"{DRIVE}/status/state", 4, Quality.DEAD)
-    assert look(f"{DRIVE}/status/state") is None
-    assert look.label(f"{DRIVE}/status/state") == ""
+    assert reader(f"{DRIVE}/status/state") is None
+    assert reader.label(f"{DRIVE}/status/state") == ""
 
 
 def test_how_a_node_was_lost_and_why_it_is_not_as_configured_are_told(case: Watched) -> None:
@@ -190,30 +190,30 @@ def test_how_a_node_was_lost_and_why_it_is_not_as_configured_are_told(case: Watc
 
 
 def test_a_value_that_the_words_do_not_carry_is_a_warning_with_its_reason(case: Watched) -> None:
-    look = Look(case.image)
+    reader = ImageReader(case.image)
     (main,) = (m for m in ("velocity", "frequency", "speed") if f"{DRIVE}/actual/{m}" in case.image.index)
     point = f"{DRIVE}/actual/{main}"
-    assert list(of_meaning(look, DRIVE, main)) == []
+    assert list(of_meaning(reader, DRIVE, main)) == []
     case.set(point, 0.0, Quality.STALE, "no TPDO")
-    assert list(of_meaning(look, DRIVE, main)) == []
+    assert list(of_meaning(reader, DRIVE, main)) == []
     case.set(point, 0.0, Quality.DISABLED, "")
-    assert list(of_meaning(look, DRIVE, main)) == []
+    assert list(of_meaning(reader, DRIVE, main)) == []
     case.set(point, 0.0, Quality.DISABLED, "P1 is 2")
     facts = (("value", main), ("why", "P1 is 2"))
-    assert list(of_meaning(look, DRIVE, main)) == [Trouble(Rank.WARNING, "no_actual", DRIVE, facts)]
+    assert list(of_meaning(reader, DRIVE, main)) == [Trouble(Rank.WARNING, "no_actual", DRIVE, facts)]
 
 
 def test_a_bus_is_silent_where_none_of_several_nodes_answers() -> None:
     drive = sites.drive("fu1", "none", 0)
     nodes = sites.node(drive, name="a", node_id=2), sites.node(drive, name="b", node_id=3)
     case = Watched(sites.site(sites.bus(*nodes)))
-    look = Look(case.image)
+    reader = ImageReader(case.image)
     codes = {label: number for number, label in case.image.points[case.image.index["a/node/state"]].states}
 
     def silent(a: str, b: str) -> list[Trouble]:
         case.set("a/node/state", codes[a])
         case.set("b/node/state", codes[b])
-        return list(silence_of(look, "can0", ("a", "b")))
+        return list(silence_of(reader, "can0", ("a", "b")))
 
     assert silent("lost", "absent") == [Trouble(Rank.ALARM, "bus_silent", BUS, (("nodes", 2),))]
     assert silent("lost", "operational") == []
@@ -224,7 +224,7 @@ def test_a_bus_is_silent_where_none_of_several_nodes_answers() -> None:
 
 
 def test_fronts_that_fail_are_a_warning_of_the_bridge(case: Watched) -> None:
-    assert list(of_bridge(Look(case.image))) == []
+    assert list(of_bridge(ImageReader(case.image))) == []
     case.set("bridge/fronts_failing", "opcua")
     found = Trouble(Rank.WARNING, "fronts_failing", "bridge", (("fronts", "opcua"),))
-    assert list(of_bridge(Look(case.image))) == [found]
+    assert list(of_bridge(ImageReader(case.image))) == [found]

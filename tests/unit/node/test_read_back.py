@@ -12,7 +12,7 @@ import pytest
 from bridge.command import Action
 from bridge.command.audit import AuditEntry
 from bridge.command.stop_check.state import LastStop
-from bridge.condition.findings import Look, Rank, Trouble, of_node
+from bridge.condition.findings import ImageReader, Rank, Trouble, of_node
 from bridge.image import Quality
 from bridge.project import load_project
 from bridge.sim.catalogue import simulate_description
@@ -276,10 +276,10 @@ def test_a_tpdo_that_brings_outputs_alone_needs_no_input(tmp_path: Path) -> None
 
 def test_deaf_outputs_are_a_danger_of_their_node(tmp_path: Path) -> None:
     bench = go(block_bench(tmp_path, outputs='on_ignored_stop = "report"'))
-    assert not list(of_node(Look(bench.plant.image), "shaft"))
+    assert not list(of_node(ImageReader(bench.plant.image), "shaft"))
     block_of(bench).stuck["6200:01"] = 1, 0x81
     stop(bench, 0.5)
-    assert list(of_node(Look(bench.plant.image), "shaft")) == [
+    assert list(of_node(ImageReader(bench.plant.image), "shaft")) == [
         Trouble(Rank.DANGER, "outputs_ignore_stop", "shaft")
     ]
 

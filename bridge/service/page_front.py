@@ -21,7 +21,7 @@ from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.listening import ListeningSocket, listen
 from bridge.northbound.page.integration import Export
 from bridge.northbound.page.server import PageServer
-from bridge.northbound.page.web import Backstage, FaultTexts, Page
+from bridge.northbound.page.web import FaultTexts, Page, PageSources
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.project import Project
 from bridge.service.front_process import give_signs
@@ -57,13 +57,13 @@ def exports_of(project: Project) -> dict[str, Export]:
     return exports
 
 
-def backstage_of(project: Project) -> Backstage:
+def sources_of(project: Project) -> PageSources:
     """Sources of the page: files, buses and system of ``project``."""
     buses = Buses(project, clock.epoch_ns)
-    return Backstage(
+    return PageSources(
         fault_texts(project.families),
         exports_of(project),
-        buses.ears(),
+        buses.taps(),
         buses.layouts(),
         buses.capture,
         LedgerFile(Path(project.site.site.state_dir)).totals,
@@ -96,7 +96,7 @@ async def run_page(project: Project, signs: int | None = None, listening: int | 
         table = site.page
         key = "page.listen"
         bound = listen(table.listen, key) if listening is None else ListeningSocket(listening, key)
-        page = Page(mirror, site, project.families, backstage_of(project), clock.now, _kept_sessions(site))
+        page = Page(mirror, site, project.families, sources_of(project), clock.now, _kept_sessions(site))
         server = PageServer(page, bound, table.certificate, table.private_key)
         await server.start()
         stack.push_async_callback(server.close)

@@ -78,11 +78,11 @@ async def test_a_capture_of_the_page_is_read_by_python_can(tmp_path: Path) -> No
     send(Frame(0x205, bytes(8)), Frame(0x80))
     text = (await capturing).content.decode()
     assert [one.arbitration_id for one in can.CanutilsLogReader(io.StringIO(text))] == [0x205, 0x80]
-    ((_, _, ear),) = buses.ears()
-    ear.open()
+    ((_, _, tap),) = buses.taps()
+    tap.open()
     send(Frame(0x205, bytes.fromhex("7f04004000000000")))
     await asyncio.sleep(0.1)
-    (heard,) = ear.take()
+    (heard,) = tap.take()
     assert (heard.identifier, heard.label) == ("205", "RPDO1 conveyor/fu1")
     assert "control_word 047Fh" in heard.text
-    ear.close()
+    tap.close()

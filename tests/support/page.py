@@ -22,7 +22,7 @@ from bridge.config import Site
 from bridge.mapping import Family
 from bridge.northbound.listening import listen
 from bridge.northbound.page.server import PageServer
-from bridge.northbound.page.web import Backstage, Page
+from bridge.northbound.page.web import Page, PageSources
 from tests.support import sites
 from tests.support.passwords import cheap_hash
 
@@ -128,8 +128,8 @@ class Served:
         self.system = system or NoSystem()
         families: dict[str, Family] = {sites.FAMILY: sites.family(sites.FAMILY)}
         site: Site = plant.site
-        backstage = Backstage({}, {}, [], {"can0": {}}, capture, dict, {}, self.system)
-        self.page = Page(self.view, site, families, backstage, lambda: time.monotonic() + self.later_s, kept)
+        sources = PageSources({}, {}, [], {"can0": {}}, capture, dict, {}, self.system)
+        self.page = Page(self.view, site, families, sources, lambda: time.monotonic() + self.later_s, kept)
         self.bound = listen("127.0.0.1:0", "page.listen")
         self.port = self.bound.getsockname()[1]
         self.origin = f"http://127.0.0.1:{self.port}"

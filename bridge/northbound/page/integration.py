@@ -28,28 +28,28 @@ _encode = msgspec.json.Encoder().encode
 
 class Integration:
     """``exports`` are files by their names, such as ``modbus.csv``; each is made when it is asked for first.
-    ``is_inside`` says whether a request may read."""
+    ``has_session`` says whether a request may read."""
 
     def __init__(
-        self, site: Site, exports: Mapping[str, Export], is_inside: Callable[[Request], bool]
+        self, site: Site, exports: Mapping[str, Export], has_session: Callable[[Request], bool]
     ) -> None:
         self._description = _encode(servers_of(site) | {"exports": list(exports)})
         self._site_name = site.site.name
         self._exports = exports
         self._made: dict[str, str] = {}
-        self._is_inside = is_inside
+        self._has_session = has_session
         self.routes = [
             Route("/api/integration", self._servers),
             Route("/api/export/{name}", self._export),
         ]
 
     async def _servers(self, request: Request) -> Response:
-        if not self._is_inside(request):
+        if not self._has_session(request):
             return JSONResponse({"error": "login"}, 401)
         return Response(self._description, media_type="application/json")
 
     async def _export(self, request: Request) -> Response:
-        if not self._is_inside(request):
+        if not self._has_session(request):
             return JSONResponse({"error": "login"}, 401)
         name = request.path_params["name"]
         export = self._exports.get(name)

@@ -80,7 +80,7 @@ def holders_of(site: Site, families: Mapping[str, Family]) -> dict[str, Holder]:
 
 
 class Parameters:
-    """``dictionaries`` are the makers' descriptions, by mapping. ``is_inside`` says whether a request may
+    """``dictionaries`` are the makers' descriptions, by mapping. ``has_session`` says whether a request may
     read, ``has_token`` whether it comes from our page."""
 
     def __init__(
@@ -89,7 +89,7 @@ class Parameters:
         counts: Counts,
         dictionaries: Mapping[str, Path],
         read_body: ReadBody,
-        is_inside: Callable[[Request], bool],
+        has_session: Callable[[Request], bool],
         has_token: Callable[[Request], bool],
     ) -> None:
         self._holders = holders
@@ -97,7 +97,7 @@ class Parameters:
         self._dictionaries = dictionaries
         self._factories: dict[str, dict[str, Value]] = {}
         self._read_body = read_body
-        self._is_inside = is_inside
+        self._has_session = has_session
         self._has_token = has_token
         self._reading = asyncio.Semaphore(1)
         self.routes = [
@@ -107,7 +107,7 @@ class Parameters:
         ]
 
     def _refusal(self, request: Request) -> Response | None:
-        if not self._is_inside(request):
+        if not self._has_session(request):
             return JSONResponse({"error": "login"}, 401)
         if request.method == "POST" and not self._has_token(request):
             return JSONResponse({"error": "token"}, 403)

@@ -18,11 +18,11 @@ from bridge.base.sources import source_of
 from bridge.command import Event
 from bridge.condition.layout import Layout
 from bridge.image import Image
-from bridge.northbound.page.hearing import Hearings
 from bridge.northbound.page.sessions import Session, Sessions
 from bridge.northbound.page.shares import Seat, admit
 from bridge.northbound.page.tab import BAD_MESSAGE, GONE, NO_TOKEN, SESSION_OVER, TOO_MANY, Tab, close
 from bridge.northbound.page.topics import Topics
+from bridge.northbound.page.traffic import TrafficViews
 from bridge.northbound.page.troubles import Troubles
 from bridge.northbound.page.viewer import BadMessage
 from bridge.northbound.view import View
@@ -49,14 +49,14 @@ class Tabs:
         view: View,
         layout: Layout,
         sessions: Sessions,
-        hearings: Hearings,
+        traffic: TrafficViews,
         clock: Callable[[], float],
     ) -> None:
         self.keep: Callable[[list[Session]], None] = lambda sessions: None
         """Keeps the sessions for the front after this one."""
         self._view = view
         self._sessions = sessions
-        self._hearings = hearings
+        self._traffic = traffic
         self._clock = clock
         self._topics = Topics(view, layout)
         self._troubles = Troubles(view.image, self._epoch_ms)
@@ -78,7 +78,7 @@ class Tabs:
             with suppress(asyncio.CancelledError):
                 await beating
             self.keep_sessions()
-            self._hearings.close()
+            self._traffic.close()
             self._topics.close()
 
     async def serve(self, socket: WebSocket, session: Session | None) -> None:
@@ -218,8 +218,8 @@ class Tabs:
                     tab.show(changes[topic])
 
     def _hear(self, *, counts: bool) -> None:
-        wishes = [(tab.viewer.wish, tab.show) for tab in self._tabs if tab.viewer.wish is not None]
-        self._hearings.beat(wishes, self._clock(), counts=counts)
+        filters = [(tab.viewer.traffic, tab.show) for tab in self._tabs if tab.viewer.traffic is not None]
+        self._traffic.beat(filters, self._clock(), counts=counts)
 
     def _look_at_sessions(self) -> None:
         """Count the sessions of open tabs as used. Nothing here waits for a client."""

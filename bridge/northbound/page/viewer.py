@@ -16,7 +16,7 @@ import msgspec
 from bridge.base.ratelimit import RateLimit
 from bridge.command import Action, Code, Do, Identity, Outcome, Request, Role, Source
 from bridge.command.messages.request import COMMANDS
-from bridge.northbound.page.hearing import Wish
+from bridge.northbound.page.traffic import TrafficFilter
 from bridge.northbound.view import View
 from bridge.text import Text, as_json
 
@@ -68,7 +68,7 @@ class _Ask(msgspec.Struct, forbid_unknown_fields=True):
 class _Hear(msgspec.Struct, forbid_unknown_fields=True):
     """Filter for the traffic that is shown from now on; null shows none."""
 
-    hear: Wish | None
+    hear: TrafficFilter | None
 
 
 class _Hidden(msgspec.Struct, forbid_unknown_fields=True):
@@ -98,7 +98,7 @@ class Viewer:
         self.followed: tuple[int, ...] = ()
         self.choice = 0
         """Number that the tab gave its present trend."""
-        self.wish: Wish | None = None
+        self.traffic: TrafficFilter | None = None
         """Filter for the traffic that it shows, None for none."""
         self._places = view.image.index
         self._view = view
@@ -150,10 +150,10 @@ class Viewer:
         self.followed = tuple(self._places[name] for name in names)
         self.choice = trend.number
 
-    def _hear(self, wish: Wish | None, known: Callable[[str], bool]) -> None:
-        if wish is not None and not known(f"bus {wish.bus}"):
-            raise BadMessage(f"there is no bus {wish.bus[:80]!r}")
-        self.wish = wish
+    def _hear(self, wanted: TrafficFilter | None, known: Callable[[str], bool]) -> None:
+        if wanted is not None and not known(f"bus {wanted.bus}"):
+            raise BadMessage(f"there is no bus {wanted.bus[:80]!r}")
+        self.traffic = wanted
 
     def _ask(self, ask: _Ask) -> None:
         left = self._left

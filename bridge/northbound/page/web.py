@@ -30,7 +30,6 @@ from bridge.northbound.logins import PasswordChecks, TooManyChecks
 from bridge.northbound.page.bus import Bus, Capture
 from bridge.northbound.page.describe import described
 from bridge.northbound.page.guards import MOST_BODY, Guards
-from bridge.northbound.page.hearing import Ear, Hearings
 from bridge.northbound.page.integration import Export, Integration
 from bridge.northbound.page.parameters import Counts, Parameters, holders_of
 from bridge.northbound.page.sessionfile import SessionFile, credential_of
@@ -38,6 +37,7 @@ from bridge.northbound.page.sessions import Session, Sessions
 from bridge.northbound.page.system import System, SystemFacts
 from bridge.northbound.page.tabs import Tabs
 from bridge.northbound.page.throttle import FIRST_PAUSE_S, Throttle
+from bridge.northbound.page.traffic import BusTap, TrafficViews
 from bridge.northbound.view import View
 from bridge.text.templates import LANGUAGES, source
 
@@ -56,12 +56,12 @@ FaultTexts = Mapping[str, Mapping[str, Mapping[str, Mapping[str, str]]]]
 
 
 @dataclass(frozen=True, slots=True)
-class Backstage:
+class PageSources:
     """Sources of what the page shows beside the points: files, buses and the system."""
 
     fault_texts: FaultTexts
     exports: Mapping[str, Export]
-    ears: Sequence[tuple[str, int, Ear]]
+    taps: Sequence[tuple[str, int, BusTap]]
     """Name, bit rate in bit/s and tap of each bus."""
     layouts: Mapping[str, Any]
     capture: Capture
@@ -106,14 +106,14 @@ class Page:
         view: View,
         site: Site,
         families: dict[str, Family],
-        backstage: Backstage,
+        sources: PageSources,
         clock: Callable[[], float],
         kept: Path | None = None,
     ) -> None:
         """``kept`` is a file for the sessions, for a front after this one."""
         settings, table = site.opcua, site.page or PageTable.model_validate({})
         self._clock = clock
-        self._fault_texts = backstage.fault_texts
+        self._fault_texts = sources.fault_texts
         self._site_name = site.site.name
         self._users = {user.name: user for user in settings.user} if settings else {}
         self._anonymous = _ROLES.get(settings.anonymous) if settings else None
@@ -121,7 +121,7 @@ class Page:
         self._throttle = Throttle()
         self._checks = PasswordChecks(most=_MOST_CHECKS)
         layout = layout_of(view.image.points, site, families)
-        self._tabs = Tabs(view, layout, self._sessions, Hearings(backstage.ears), clock)
+        self._tabs = Tabs(view, layout, self._sessions, TrafficViews(sources.taps), clock)
         if kept is not None:
             file = SessionFile(kept, self._credentials(settings.user if settings else ()))
             self._sessions.restore(file.load(clock()))
@@ -145,17 +145,17 @@ class Page:
             Route("/api/texts/{language}", self._texts),
             Route("/api/login", self._login, methods=["POST"]),
             Route("/api/logout", self._logout, methods=["POST"]),
-            *Integration(site, backstage.exports, self._is_inside).routes,
+            *Integration(site, sources.exports, self._has_session).routes,
             *Parameters(
                 holders_of(site, families),
-                backstage.counts,
-                backstage.dictionaries,
+                sources.counts,
+                sources.dictionaries,
                 body_of,
-                self._is_inside,
+                self._has_session,
                 self._has_token,
             ).routes,
-            *Bus(site.site.name, backstage.layouts, backstage.capture, self._session_of).routes,
-            *System(backstage.system, lambda: self.shown, self._session_of).routes,
+            *Bus(site.site.name, sources.layouts, sources.capture, self._session_of).routes,
+            *System(sources.system, lambda: self.shown, self._session_of).routes,
             WebSocketRoute("/live", self._live),
             Mount("/static", _Files(directory=STATIC)),
         ]
@@ -191,7 +191,7 @@ class Page:
         session_id = connection.cookies.get(self._cookie)
         return self._sessions.find(session_id, self._clock()) if session_id else None
 
-    def _is_inside(self, connection: HTTPConnection) -> bool:
+    def _has_session(self, connection: HTTPConnection) -> bool:
         return self._session_of(connection) is not None
 
     def _has_token(self, connection: HTTPConnection) -> bool:

@@ -19,7 +19,7 @@ from bridge.errands.decode_pdo import PdoView, views
 from bridge.lint import family_dictionaries
 from bridge.mirror.endpoint import tap_path
 from bridge.northbound.page.bus import Captured, IsGone
-from bridge.northbound.page.hearing import Ear, Heard
+from bridge.northbound.page.traffic import BusTap, ShownFrame
 from bridge.project import Project
 from bridge.service.page.capture import CaptureFile
 
@@ -40,9 +40,9 @@ class Buses:
         devices = [name for name, family in project.families.items() if family.is_device]
         self._descriptions = family_dictionaries(devices, project.path)
 
-    def ears(self) -> list[tuple[str, int, Ear]]:
+    def taps(self) -> list[tuple[str, int, BusTap]]:
         """Name, bit rate in bit/s and tap of each bus."""
-        return [(name, table.bitrate, self._ear(table)) for name, table in self._tables.items()]
+        return [(name, table.bitrate, self._tap(table)) for name, table in self._tables.items()]
 
     def layouts(self) -> dict[str, Any]:
         """Nodes of each bus with the parts of their PDOs, for JSON."""
@@ -79,8 +79,8 @@ class Buses:
             raise OperationFailed(f"{bus}: {listener.failure}")
         return Captured(await asyncio.to_thread(file.content), is_cut)
 
-    def _ear(self, table: BusTable) -> Ear:
-        return _BusEar(table, lambda: self._listener(table), self._decoder(table), self._epoch_ns)
+    def _tap(self, table: BusTable) -> BusTap:
+        return _ListenerTap(table, lambda: self._listener(table), self._decoder(table), self._epoch_ns)
 
     def _listener(self, table: BusTable) -> Listener:
         site = self._project.site.site
@@ -102,7 +102,7 @@ class Buses:
             yield {"cob_id": f"{cob_id:03X}", "label": view.label, "bytes": view.codec.length, "parts": parts}
 
 
-class _BusEar:
+class _ListenerTap:
     """Tap of one bus that decodes its frames; each opening begins with a fresh decoder."""
 
     def __init__(
@@ -131,7 +131,7 @@ class _BusEar:
     def lost(self) -> int:
         return self._listener.lost if self._listener else 0
 
-    def take(self) -> list[Heard]:
+    def take(self) -> list[ShownFrame]:
         listener = self._listener
         if listener is None:
             return []
@@ -140,9 +140,9 @@ class _BusEar:
             raise OperationFailed(f"{self._table.name}: {listener.failure}")
         return heard
 
-    def _say(self, frame: Frame) -> Heard:
+    def _say(self, frame: Frame) -> ShownFrame:
         meaning = self._decoder.decode(frame)
-        return Heard(
+        return ShownFrame(
             round(self._epoch_ns(frame.time) / 1e6, 3),
             _identifier(frame),
             "R" if frame.can_id & REMOTE else frame.data.hex(" ").upper(),

@@ -35,10 +35,10 @@ def test_one_that_is_not_served_is_none() -> None:
 
 
 class Case:
-    def __init__(self, *, is_inside: bool = True) -> None:
+    def __init__(self, *, has_session: bool = True) -> None:
         self.made: list[str] = []
         exports: dict[str, Callable[[], str]] = {"modbus.csv": self._csv, "can0.dbc": self._dbc}
-        self.page = Integration(site(sites.modbus(1502)), exports, lambda request: is_inside)
+        self.page = Integration(site(sites.modbus(1502)), exports, lambda request: has_session)
 
     def _csv(self) -> str:
         self.made.append("csv")
@@ -57,7 +57,7 @@ class Case:
 
 
 async def test_who_is_not_logged_in_reads_nothing() -> None:
-    case = Case(is_inside=False)
+    case = Case(has_session=False)
     assert (await case.get("/api/integration")).status_code == 401
     assert (await case.export("modbus.csv")).status_code == 401
     assert case.made == []

@@ -136,8 +136,8 @@ def test_a_tab_shows_what_there_is() -> None:
 def test_a_wish_has_no_more_kinds_and_nodes_than_there_are() -> None:
     viewer = Seen().viewer()
     say(viewer, {"hear": {"bus": "can0", "kinds": ["pdo", "pdo"], "nodes": list(range(1, 128))}})
-    assert viewer.wish is not None
-    assert (viewer.wish.kinds, len(viewer.wish.nodes)) == ({"pdo"}, 127)
+    assert viewer.traffic is not None
+    assert (viewer.traffic.kinds, len(viewer.traffic.nodes)) == ({"pdo"}, 127)
     for wish in ({"kinds": [str(n) for n in range(17)]}, {"nodes": list(range(129))}):
         with pytest.raises(BadMessage):
             say(viewer, {"hear": {"bus": "can0", **wish}})
@@ -202,12 +202,12 @@ def test_an_observer_is_refused_by_the_plant_itself() -> None:
 
 def test_a_tab_hears_one_bus_at_a_time_until_it_has_heard_enough() -> None:
     viewer = Seen().viewer()
-    assert viewer.wish is None
+    assert viewer.traffic is None
     say(viewer, {"hear": {"bus": "can0", "view": "identifiers", "kinds": ["pdo"], "nodes": [5]}})
-    assert viewer.wish is not None
-    assert (viewer.wish.bus, viewer.wish.view, viewer.wish.kinds) == ("can0", "identifiers", {"pdo"})
+    assert viewer.traffic is not None
+    assert (viewer.traffic.bus, viewer.traffic.view, viewer.traffic.kinds) == ("can0", "identifiers", {"pdo"})
     say(viewer, {"hear": None})
-    assert viewer.wish is None
+    assert viewer.traffic is None
     for wrong in ({"bus": "can9"}, {"bus": "can0", "colour": 1}, {}, 1, {"bus": 1}):
         with pytest.raises(BadMessage):
             say(viewer, {"hear": wrong})

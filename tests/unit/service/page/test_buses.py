@@ -88,11 +88,11 @@ async def waits() -> bool:
 
 async def test_a_bus_that_nobody_drives_cannot_be_listened_to(tmp_path: Path) -> None:
     path = sites.write(tmp_path, sites.bus(sites.node(sites.drive("fu1", "lease", 1000))))
-    ((name, bitrate, ear),) = buses(path).ears()
-    assert (name, bitrate, ear.lost) == ("can0", 250_000, 0)
+    ((name, bitrate, tap),) = buses(path).taps()
+    assert (name, bitrate, tap.lost) == ("can0", 250_000, 0)
     with pytest.raises(OperationFailed, match="can0 cannot be listened to"):
-        ear.open()
-    assert ear.take() == []
-    ear.close()
+        tap.open()
+    assert tap.take() == []
+    tap.close()
     with pytest.raises(OperationFailed, match="can0 cannot be listened to"):
         await buses(path).capture("can0", 1.0, "asc", waits)

@@ -29,7 +29,7 @@ _RETRY_S: Final = 1.0
 _encode = msgspec.json.Encoder().encode
 
 
-class Heard(msgspec.Struct, frozen=True, array_like=True):
+class ShownFrame(msgspec.Struct, frozen=True, array_like=True):
     """One frame and its decoded text. ``at_ms`` is in ms since 1970; ``bits`` is what it took of the bus."""
 
     at_ms: float
@@ -42,14 +42,14 @@ class Heard(msgspec.Struct, frozen=True, array_like=True):
     bits: int = 0
 
 
-class Ear(Protocol):
+class BusTap(Protocol):
     """Source of the frames of one bus, while it is open."""
 
     def open(self) -> None:
         """Begin to listen. Raises ``OperationFailed``."""
         ...
 
-    def take(self) -> list[Heard]:
+    def take(self) -> list[ShownFrame]:
         """Frames since the last call. Raises ``OperationFailed`` where the bus cannot be heard any more."""
         ...
 
@@ -59,7 +59,7 @@ class Ear(Protocol):
     def close(self) -> None: ...
 
 
-class Wish(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+class TrafficFilter(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Filter of a tab; no kinds or no nodes are all of them."""
 
     bus: str
@@ -67,13 +67,13 @@ class Wish(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     kinds: Annotated[frozenset[str], msgspec.Meta(max_length=_MOST_KINDS)] = frozenset()
     nodes: Annotated[frozenset[int], msgspec.Meta(max_length=_MOST_NODES)] = frozenset()
 
-    def takes(self, heard: Heard) -> bool:
-        return (not self.kinds or heard.kind in self.kinds) and (not self.nodes or heard.node in self.nodes)
+    def takes(self, frame: ShownFrame) -> bool:
+        return (not self.kinds or frame.kind in self.kinds) and (not self.nodes or frame.node in self.nodes)
 
 
 @dataclass(slots=True)
 class _Count:
-    last: Heard
+    last: ShownFrame
     frames: int = 0
     frames_before: int = 0
     bits: int = 0
@@ -83,19 +83,19 @@ class _Count:
     load: float = 0.0
 
 
-class Hearing:
+class TrafficView:
     """Traffic of one bus of ``bitrate`` bit/s, for every tab that shows it."""
 
-    def __init__(self, bus: str, bitrate: int, ear: Ear) -> None:
+    def __init__(self, bus: str, bitrate: int, tap: BusTap) -> None:
         self._bus = bus
         self._bitrate = bitrate
-        self._ear = ear
+        self._tap = tap
         self._is_open = False
         self._failure = ""
         self._retry_at = float("-inf")
         self._counts: dict[str, _Count] = {}
         self._measured = 0.0
-        self._new: list[Heard] = []
+        self._new: list[ShownFrame] = []
 
     def listen(self, now: float, *, is_wanted: bool) -> None:
         """Take the frames received since the last call. ``now`` is monotonic; while no tab wants any, the tap
@@ -109,39 +109,39 @@ class Hearing:
                 if now < self._retry_at:
                     return
                 self._open(now)
-            self._new = self._ear.take()
+            self._new = self._tap.take()
             self._failure = ""
         except OperationFailed as error:
             self.close()
             self._failure = str(error)
             self._retry_at = now + _RETRY_S
-        for heard in self._new:
-            self._count(heard)
+        for frame in self._new:
+            self._count(frame)
         if now - self._measured >= 1.0:
             self._measure(now)
 
     def close(self) -> None:
         if self._is_open:
             self._is_open = False
-            self._ear.close()
+            self._tap.close()
 
     def _open(self, now: float) -> None:
-        self._ear.open()
+        self._tap.open()
         self._is_open = True
         self._counts.clear()
         self._measured = now
 
-    def frames_for(self, wish: Wish) -> bytes | None:
+    def frames_for(self, filter_: TrafficFilter) -> bytes | None:
         """JSON message with the new frames for this tab; None where there are none."""
         if self._failure:
             return self._told({"failure": self._failure})
-        wanted = [heard for heard in self._new if wish.takes(heard)]
+        wanted = [frame for frame in self._new if filter_.takes(frame)]
         if not wanted:
             return None
-        rows = [_row(heard) for heard in wanted[:MOST_ROWS]]
+        rows = [_row(frame) for frame in wanted[:MOST_ROWS]]
         return self._told({"frames": rows, "more": len(wanted) - len(rows)})
 
-    def identifiers_for(self, wish: Wish) -> bytes:
+    def identifiers_for(self, filter_: TrafficFilter) -> bytes:
         """JSON message with a row for each identifier so far: identifier, label, frames, frames a second,
         load in percent, shortest and longest gap in ms, newest data and its text."""
         if self._failure:
@@ -159,26 +159,26 @@ class Hearing:
                 one.last.text,
             ]
             for key, one in sorted(self._counts.items(), key=lambda pair: (len(pair[0]), pair[0]))
-            if wish.takes(one.last)
+            if filter_.takes(one.last)
         ]
         return self._told({"identifiers": rows})
 
     def _told(self, facts: dict[str, Any]) -> bytes:
-        return _encode({"heard": self._bus, "lost": self._ear.lost, **facts})
+        return _encode({"heard": self._bus, "lost": self._tap.lost, **facts})
 
-    def _count(self, heard: Heard) -> None:
-        one = self._counts.get(heard.identifier)
+    def _count(self, frame: ShownFrame) -> None:
+        one = self._counts.get(frame.identifier)
         if one is None:
             if len(self._counts) >= _MOST_IDENTIFIERS:
                 return
-            one = self._counts[heard.identifier] = _Count(heard)
+            one = self._counts[frame.identifier] = _Count(frame)
         else:
-            gap_ms = heard.at_ms - one.last.at_ms
+            gap_ms = frame.at_ms - one.last.at_ms
             one.shortest_ms = min(one.shortest_ms, gap_ms) if one.frames > 1 else gap_ms
             one.longest_ms = max(one.longest_ms, gap_ms)
-            one.last = heard
+            one.last = frame
         one.frames += 1
-        one.bits += heard.bits
+        one.bits += frame.bits
 
     def _measure(self, now: float) -> None:
         """Once a second: rates, smoothed over some seconds."""
@@ -193,40 +193,40 @@ class Hearing:
             one.frames_before, one.bits = one.frames, 0
 
 
-def _row(heard: Heard) -> list[Any]:
-    return [heard.at_ms, heard.identifier, heard.data, heard.kind, heard.node, heard.label, heard.text]
+def _row(frame: ShownFrame) -> list[Any]:
+    return [frame.at_ms, frame.identifier, frame.data, frame.kind, frame.node, frame.label, frame.text]
 
 
-class Hearings:
+class TrafficViews:
     """All buses of a site, by name."""
 
-    def __init__(self, buses: Iterable[tuple[str, int, Ear]]) -> None:
-        self._hearings = {name: Hearing(name, bitrate, ear) for name, bitrate, ear in buses}
+    def __init__(self, buses: Iterable[tuple[str, int, BusTap]]) -> None:
+        self._views = {name: TrafficView(name, bitrate, tap) for name, bitrate, tap in buses}
 
     def __contains__(self, bus: object) -> bool:
-        return bus in self._hearings
+        return bus in self._views
 
     def beat(
         self,
-        wishes: Iterable[tuple[Wish, Callable[[bytes], None]]],
+        filters: Iterable[tuple[TrafficFilter, Callable[[bytes], None]]],
         now: float,
         *,
         counts: bool,
     ) -> None:
         """Send each tab the frames that its filter lets through, and with ``counts`` those that show
         identifiers theirs."""
-        wanted = list(wishes)
-        for name, hearing in self._hearings.items():
-            own = [(wish, show) for wish, show in wanted if wish.bus == name]
-            hearing.listen(now, is_wanted=bool(own))
-            for wish, show in own:
-                if wish.view == "identifiers":
-                    message = hearing.identifiers_for(wish) if counts else None
+        wanted = list(filters)
+        for name, view in self._views.items():
+            own = [(filter_, show) for filter_, show in wanted if filter_.bus == name]
+            view.listen(now, is_wanted=bool(own))
+            for filter_, show in own:
+                if filter_.view == "identifiers":
+                    message = view.identifiers_for(filter_) if counts else None
                 else:
-                    message = hearing.frames_for(wish)
+                    message = view.frames_for(filter_)
                 if message is not None:
                     show(message)
 
     def close(self) -> None:
-        for hearing in self._hearings.values():
-            hearing.close()
+        for view in self._views.values():
+            view.close()

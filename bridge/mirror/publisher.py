@@ -10,8 +10,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
 
-from bridge.base.beat import LOOK_EVERY_S, next_before_look
 from bridge.base.errors import Unavailable
+from bridge.base.publishing_clock import PUBLISH_EVERY_S, next_send
 from bridge.command import Code, Event, Outcome, PlantView
 from bridge.command.messages.freshness import NEVER, TAKEN_LATE
 from bridge.image import Feed, Point
@@ -40,7 +40,7 @@ class MirrorPublisher:
     """
 
     def __init__(
-        self, view: PlantView, endpoint: str, clock: Callable[[], float], prompt_s: float = LOOK_EVERY_S
+        self, view: PlantView, endpoint: str, clock: Callable[[], float], prompt_s: float = PUBLISH_EVERY_S
     ) -> None:
         self.malformed = 0
         """Messages of fronts that could not be read."""
@@ -49,7 +49,7 @@ class MirrorPublisher:
         self._endpoint = endpoint
         self._clock = clock
         self._link = self._new_link()
-        self._pace = Pace(self._tick, LOOK_EVERY_S, _HEARTBEAT_S, beat=next_before_look)
+        self._pace = Pace(self._tick, PUBLISH_EVERY_S, _HEARTBEAT_S, beat=next_send)
         self._feed = self._image.feed(self._pace.wake)
         self._has_fronts = False
         self._prompt_pace = Pace(self._tell_promptly, prompt_s)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Final
 
-from bridge.base.beat import LOOK_EVERY_S
+from bridge.base.publishing_clock import PUBLISH_EVERY_S
 from bridge.uaserver.eventfilter import EventFilter, Occurrence
 from bridge.uaserver.filters import ChangeFilter
 from bridge.uaserver.library import (
@@ -29,8 +29,8 @@ from bridge.uaserver.library import (
 )
 from bridge.uaserver.reading import Window
 
-LEAST_SAMPLING_MS: Final = LOOK_EVERY_S * 1000
-_HALF_LOOK_S: Final = LOOK_EVERY_S / 2
+LEAST_SAMPLING_MS: Final = PUBLISH_EVERY_S * 1000
+_HALF_GRID_S: Final = PUBLISH_EVERY_S / 2
 
 MOST_SAMPLING_MS: Final = 3_600_000.0
 VALUE_QUEUE: Final = 100
@@ -100,9 +100,9 @@ class ValueItem:
         """The attribute may have changed. Between two samples the newest value waits for the next."""
         if self.mode == Monitoring.Disabled:
             return
-        if self._held is not None and now - self._due > 2 * _HALF_LOOK_S:
+        if self._held is not None and now - self._due > 2 * _HALF_GRID_S:
             # Nobody has looked since: what was there when the sample was due is told, too.
-            self.sample(self._due + _HALF_LOOK_S)
+            self.sample(self._due + _HALF_GRID_S)
         self._held = value
         self.sample(now)
 
@@ -113,7 +113,7 @@ class ValueItem:
         self._held = None
         if self.settings.sampling_ms > LEAST_SAMPLING_MS:
             # Half the time between two looks early is not too early.
-            self._due = now + self.settings.sampling_ms / 1000 - _HALF_LOOK_S
+            self._due = now + self.settings.sampling_ms / 1000 - _HALF_GRID_S
         value = self.window.part(held)
         if self.filter.reports(self._last, value):
             self._last = value

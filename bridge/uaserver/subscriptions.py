@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.base.beat import cycle_by
+from bridge.base.publishing_clock import cycle_by
 from bridge.base.sources import source_of
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.uaserver.monitoring import MonitoredItems, code_of, loop_time

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Sequence
 from typing import Final
 
-from bridge.base.beat import next_look
 from bridge.base.guard import Guard
+from bridge.base.publishing_clock import next_publish
 from bridge.image import Image
 from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.point_values import AllWatched
@@ -38,7 +38,7 @@ class Publisher:
                     left -= len(taken)
                     await self._publish(taken)
                 now = asyncio.get_running_loop().time()
-                await asyncio.sleep(next_look(now) - now)
+                await asyncio.sleep(next_publish(now) - now)
         finally:
             self._image.drop_feed(feed)
 

@@ -1,4 +1,4 @@
-"""Common part of the commands on a bus: the choice of the bus, and running an errand on it."""
+"""Common part of the commands on a bus: the choice of the bus, and running a task on it."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from bridge.base import clock
+from bridge.bustools.task import BusTask
 from bridge.can import Bus, open_bus
 from bridge.can.interface import ControllerState
 from bridge.cli.stopping import until_stopped
 from bridge.cli.terminal import printable
 from bridge.config import BusTable
-from bridge.errands.errand import Errand
 from bridge.mapping import Family
 from bridge.mapping.model import SdoServer
 from bridge.node.places.sdo_channels import FIRST
@@ -168,11 +168,11 @@ def split_site(words: list[str], count: int, usage: str) -> tuple[Path | None, l
     raise typer.BadParameter(f"usage: {usage}")
 
 
-_E = TypeVar("_E", bound=Errand)
+_E = TypeVar("_E", bound=BusTask)
 
 
-async def run_errand(bus: Bus, errand: Errand, watch: Callable[[], None] = lambda: None) -> None:
-    """Run ``errand`` on ``bus`` until it is finished; ``watch`` is called after every round.
+async def run_task(bus: Bus, task: BusTask, watch: Callable[[], None] = lambda: None) -> None:
+    """Run ``task`` on ``bus`` until it is finished; ``watch`` is called after every round.
 
     Raises ``Unavailable`` where the bus cannot be opened.
     """
@@ -184,16 +184,16 @@ async def run_errand(bus: Bus, errand: Errand, watch: Callable[[], None] = lambd
             work.clear()
             now = clock.now()
             for frame in bus.drain(now):
-                errand.on_frame(frame)
-            errand.on_time(now)
-            for frame in errand.take_frames():
-                errand.sent += 1
+                task.on_frame(frame)
+            task.on_time(now)
+            for frame in task.take_frames():
+                task.sent += 1
                 bus.send(frame, now, now + _SEND_WITHIN_S)
             bus.on_time(now)
             watch()
-            if errand.is_finished(now):
+            if task.is_finished(now):
                 return
-            deadlines = [t for t in (errand.next_deadline(), bus.next_deadline()) if t is not None]
+            deadlines = [t for t in (task.next_deadline(), bus.next_deadline()) if t is not None]
             delay_s = max(0.0, min(deadlines) - clock.now()) if deadlines else None
             timer = None if delay_s is None else loop.call_later(delay_s, work.set)
             try:
@@ -208,11 +208,11 @@ async def run_errand(bus: Bus, errand: Errand, watch: Callable[[], None] = lambd
 def carry_out(
     line: CliBus,
     make: Callable[[float], _E],
-    watch: Callable[[_E], None] = lambda errand: None,
+    watch: Callable[[_E], None] = lambda task: None,
     *,
     paced: bool = False,
 ) -> _E:
-    """Make an errand of now and run it on the bus; returns it when it is finished or was interrupted.
+    """Make a task of now and run it on the bus; returns it when it is finished or was interrupted.
 
     One that is ``paced`` sends as much as a bus of this bit rate bears: a slower one is refused with
     ``Unavailable``.
@@ -226,13 +226,13 @@ def carry_out(
         0 if assumed else table.bitrate,
         at_least=table.bitrate if assumed and paced else 0,
     )
-    errand = make(clock.now())
-    until_stopped(run_errand(bus, errand, lambda: watch(errand)))
-    errand.unsent = bus.status.frames_expired
+    task = make(clock.now())
+    until_stopped(run_task(bus, task, lambda: watch(task)))
+    task.unsent = bus.status.frames_expired
     if bus.status.state is not ControllerState.OK:
         state = bus.status.state.name.lower().replace("_", "-")
         tell(f"warning: bus {table.channel} is {state}")
-    return errand
+    return task
 
 
 def tell(text: str) -> None:

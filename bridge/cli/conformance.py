@@ -15,14 +15,14 @@ import typer
 
 from bridge import __version__
 from bridge.base.errors import OperationFailed
+from bridge.bustools.conformance import Conformance, Slave, Verdict
+from bridge.bustools.conformance_checks import checks, lengths, put_back
+from bridge.bustools.lss import LssTask, inquire
 from bridge.canopen.lss import LssAddress, LssError
 from bridge.cli import drop_report, drop_test
 from bridge.cli.bus import AsJson, CliBus, carry_out, print_table, tell
 from bridge.cli.parameter_drive import SiteArgument, Target, Yes, find
 from bridge.cli.terminal import progress
-from bridge.errands.conformance import Conformance, Slave, Verdict
-from bridge.errands.conformance_checks import checks, lengths, put_back
-from bridge.errands.lss import LssErrand, inquire
 from bridge.parameter import backups
 from bridge.parameter.backup_file import IDENTITY
 from bridge.project import load_project
@@ -89,14 +89,14 @@ def conformance(
 
 def _try_out(line: CliBus, node: str, slave: Slave, *, reset: bool) -> None:
     with progress(node) as show:
-        errand = carry_out(
+        task = carry_out(
             line,
             lambda now: Conformance(slave, checks(slave, reset=reset), put_back(slave), now),
             lambda one: show(one.done, one.total, f"{len(slave.findings)} rules"),
         )
-    if errand.done < errand.total:
+    if task.done < task.total:
         raise OperationFailed("interrupted; what was changed is put back")
-    lengths(slave, errand.heard)
+    lengths(slave, task.heard)
 
 
 def _ask_by_lss(target: Target, identity: Mapping[str, int], slave: Slave) -> None:
@@ -106,9 +106,9 @@ def _ask_by_lss(target: Target, identity: Mapping[str, int], slave: Slave) -> No
         slave.skipped(clause, rule, "1018h is not whole, and LSS cannot single it out", Verdict.NOT_SEEN)
         return
     address = LssAddress(*(identity[name] for name in IDENTITY))
-    errand = carry_out(target.line, lambda now: LssErrand(inquire(address), now, _LSS_S))
+    task = carry_out(target.line, lambda now: LssTask(inquire(address), now, _LSS_S))
     try:
-        told, node_id = errand.result
+        told, node_id = task.result
     except LssError as error:
         slave.skipped(clause, rule, str(error))
         return

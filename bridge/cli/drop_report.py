@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from bridge import __version__
+from bridge.bustools.drop_test import DropOutcome, DropTest
 from bridge.command.node import Node
-from bridge.errands.drop_test import DropOutcome, DropTest
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,14 +16,14 @@ import typer
 from bridge import __version__
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
+from bridge.bustools.bystander import command_ids
+from bridge.bustools.drop_test import DropTest, ForeignMaster, Phase
+from bridge.bustools.muted_bus import MutableBus
 from bridge.cli import drop_report
 from bridge.cli.bus import AsJson, CliBus, carry_out, not_virtual, tell
 from bridge.cli.stopping import until_stopped
 from bridge.command import Plant
 from bridge.config import BusTable, NodeTable, Site
-from bridge.errands.bystander import command_ids
-from bridge.errands.drop_test import DropTest, ForeignMaster, Phase
-from bridge.errands.muted_bus import MutableBus
 from bridge.mapping import Family
 from bridge.master.master import Master
 from bridge.master.network import Network

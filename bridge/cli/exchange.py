@@ -15,6 +15,7 @@ import typer
 
 from bridge import __version__
 from bridge.base.errors import OperationFailed
+from bridge.bustools.open_channels import OpenChannels
 from bridge.cli import drop_report, drop_test, exchange_report
 from bridge.cli.bus import AsJson, CliBus, carry_out, tell
 from bridge.cli.exchange_report import Exchange
@@ -31,7 +32,6 @@ from bridge.cli.parameter_drive import SiteArgument, Target, find
 from bridge.cli.parameter_sets import write_all
 from bridge.command import Plant
 from bridge.config import BusTable, NodeTable
-from bridge.errands.open_channels import OpenChannels
 from bridge.parameter import backups
 from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.factory import DESCRIPTIONS
@@ -182,11 +182,11 @@ def _judge(
 def _open_channels(project: Project, bus: BusTable, name: str) -> None:
     """A new interface may have only its first SDO channel open, which does not reach all of its drives."""
     node = Plant(project.site, project.families, __version__).nodes[name]
-    errand = carry_out(CliBus(bus, project.families, is_of_site=True), lambda now: OpenChannels(node, now))
-    for note in errand.notes:
+    task = carry_out(CliBus(bus, project.families, is_of_site=True), lambda now: OpenChannels(node, now))
+    for note in task.notes:
         tell(f"{name}: {note}")
-    if errand.failure:
-        raise OperationFailed(f"{name}: {errand.failure}")
+    if task.failure:
+        raise OperationFailed(f"{name}: {task.failure}")
 
 
 def _restore(place: _Place, done: Exchange, wait_s: float, *, force: bool, quiet: bool) -> None:

@@ -12,11 +12,11 @@ from typing import Annotated
 import typer
 
 from bridge.base.errors import OperationFailed
+from bridge.bustools.fault_memory import fault_memory
 from bridge.cli.parameter_drive import find
 from bridge.cli.terminal import printable
 from bridge.drive import FaultWords
 from bridge.drive.fault_words import Explained, Language, emergency_codes, listed_faults
-from bridge.errands.fault_memory import fault_memory
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names
 from bridge.mapping.model import Family

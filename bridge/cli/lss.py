@@ -11,12 +11,12 @@ from typing import Annotated, TypeVar
 import typer
 
 from bridge.base.errors import OperationFailed
+from bridge.bustools import lss as lss_task
+from bridge.bustools.lss import LssTask
 from bridge.canopen.lss import BIT_RATES, NO_NODE_ID, LssAddress, LssError, Service
 from bridge.canopen.lss_scan import Scanned, find_all
 from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_bus, print_table, takes_bus, tell
 from bridge.cli.terminal import progress
-from bridge.errands import lss as lss_errand
-from bridge.errands.lss import LssErrand
 
 app = typer.Typer(help="Give devices node ids and bit rates (CiA 305).", no_args_is_help=True)
 
@@ -84,7 +84,7 @@ def inquire(
 ) -> None:
     """Ask a device for its identity and node id."""
     line = choose_bus(site, which)
-    found, node_id = _run(line, lss_errand.inquire(_which(identity, only)), timeout_ms)
+    found, node_id = _run(line, lss_task.inquire(_which(identity, only)), timeout_ms)
     if as_json:
         print(json.dumps({"node_id": None if node_id == NO_NODE_ID else node_id} | found._asdict()))
         return
@@ -107,7 +107,7 @@ def set_id(
     if 127 < node_id < NO_NODE_ID:
         raise typer.BadParameter(f"{node_id} is no node id: 1…127, or 255 for none")
     line = choose_bus(site, which)
-    _run(line, lss_errand.set_node_id(_which(identity, only), node_id, keep=keep), timeout_ms)
+    _run(line, lss_task.set_node_id(_which(identity, only), node_id, keep=keep), timeout_ms)
     _report({"ok": True, "node_id": node_id, "stored": keep}, f"node id {node_id}", keep, as_json)
 
 
@@ -132,7 +132,7 @@ def set_bitrate(
     if rate is not None and rate not in rates:
         raise typer.BadParameter(f"{new!r} is no bit rate of LSS: {', '.join(map(str, rates))} or auto")
     line = choose_bus(site, which)
-    service = lss_errand.set_bit_rate(_which(identity, only), rate, keep=keep, activate_ms=activate_ms)
+    service = lss_task.set_bit_rate(_which(identity, only), rate, keep=keep, activate_ms=activate_ms)
     _run(line, service, timeout_ms)
     facts = {"ok": True, "bitrate": rate, "stored": keep, "active": activate_ms is not None}
     _report(facts, f"{new} bit/s" if rate else "automatic bit rate", keep, as_json)
@@ -150,7 +150,7 @@ def store(
 ) -> None:
     """Make a device store its node id and bit rate."""
     line = choose_bus(site, which)
-    _run(line, lss_errand.keep_settings(_which(identity, only)), timeout_ms)
+    _run(line, lss_task.keep_settings(_which(identity, only)), timeout_ms)
     _report({"ok": True, "stored": True}, "node id and bit rate", True, as_json)
 
 
@@ -185,14 +185,14 @@ def _report(facts: Mapping[str, object], what: str, keep: bool, as_json: bool) -
 def _run(line: CliBus, service: Service[_T], timeout_ms: int) -> _T:
     """Carry it out, with the present step on a terminal. Raises ``OperationFailed``."""
 
-    def make(now: float) -> LssErrand[_T]:
-        return LssErrand(service, now, timeout_ms / 1000)
+    def make(now: float) -> LssTask[_T]:
+        return LssTask(service, now, timeout_ms / 1000)
 
     with progress("LSS") as show:
-        errand = carry_out(line, make, lambda e: show(e.steps % _QUESTIONS, _QUESTIONS, e.step))
-    if errand.late:
-        tell(f"warning: answers came too late ({errand.late}): --timeout-ms gives more time")
+        task = carry_out(line, make, lambda e: show(e.steps % _QUESTIONS, _QUESTIONS, e.step))
+    if task.late:
+        tell(f"warning: answers came too late ({task.late}): --timeout-ms gives more time")
     try:
-        return errand.result
+        return task.result
     except LssError as error:
         raise OperationFailed(str(error)) from None

@@ -14,22 +14,22 @@ import typer
 
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
+from bridge.bustools.decode import Decoder, Kind, Meaning
+from bridge.bustools.habit_watch import HabitWatch
+from bridge.bustools.silence_watch import SilenceWatch, bounds
+from bridge.bustools.statistics import Statistics
+from bridge.bustools.task import BusTask
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_bus, print_table, takes_bus, tell
 from bridge.cli.terminal import printable
 from bridge.cli.trace import SUFFIXES, Trace
-from bridge.errands.decode import Decoder, Kind, Meaning
-from bridge.errands.errand import Errand
-from bridge.errands.habit_watch import HabitWatch
-from bridge.errands.silence_watch import SilenceWatch, bounds
-from bridge.errands.statistics import Statistics
 from bridge.lint import family_dictionaries
 
 _IDENTIFIER = 0x1FFF_FFFF
 
 
-class _Listener(Errand):
-    """An errand that only listens: decodes, filters, shows, and knows when it is enough."""
+class _Listener(BusTask):
+    """A task that only listens: decodes, filters, shows, and knows when it is enough."""
 
     def __init__(
         self,

@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from bridge.base.errors import OperationFailed
+from bridge.bustools.single import NmtTask
 from bridge.canopen.nmt import NmtCommand
 from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_bus, split_site, takes_bus
 from bridge.cli.terminal import progress
-from bridge.errands.single import NmtErrand
 
 _USAGE = "drivebridge nmt [SITE] COMMAND NODE|all"
 
@@ -56,18 +56,16 @@ def nmt(
     node_id = 0 if node == "all" else line.node_id(node)
     with progress(f"{name}: waiting up to {seconds:g} s") as show:
 
-        def watch(errand: NmtErrand) -> None:
-            show(0, None, f"{len(errand.states)} heard, {len(errand.reached)} there")
+        def watch(task: NmtTask) -> None:
+            show(0, None, f"{len(task.states)} heard, {len(task.reached)} there")
 
-        errand = carry_out(line, lambda now: NmtErrand(command, node_id, now, seconds), watch)
+        task = carry_out(line, lambda now: NmtTask(command, node_id, now, seconds), watch)
     # The master's own heartbeat goes on; a command to all is not for the one who gives it.
-    states = {
-        n: s for n, s in sorted(errand.states.items()) if n == node_id or n != line.table.master_node_id
-    }
-    stuck = [n for n in states if n not in errand.reached]
+    states = {n: s for n, s in sorted(task.states.items()) if n == node_id or n != line.table.master_node_id}
+    stuck = [n for n in states if n not in task.reached]
     if as_json:
         nodes = [
-            {"id": n, "nmt_state": state.label, "reached": n in errand.reached} for n, state in states.items()
+            {"id": n, "nmt_state": state.label, "reached": n in task.reached} for n, state in states.items()
         ]
         print(json.dumps({"command": name, "node": node_id or "all", "nodes": nodes}))
     else:

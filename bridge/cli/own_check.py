@@ -12,12 +12,12 @@ import typer
 
 from bridge import __version__
 from bridge.base.errors import Unavailable
+from bridge.bustools.own_check import OwnCheck
 from bridge.cli.bus import AsJson, BusName, CliBus, carry_out, print_table, tell
 from bridge.cli.terminal import progress
 from bridge.command import Plant
 from bridge.command.node import Node
 from bridge.drive import OwnJudgement, OwnVerdict
-from bridge.errands.own_check import OwnCheck
 from bridge.lint import WorstCase, lint
 from bridge.mapping.own_places import OwnWant, channels_needed, suggested, suggested_ms
 from bridge.project import Project, load_project
@@ -128,11 +128,11 @@ def audit_drives(
 def _ask(line: CliBus, nodes: Sequence[Node], unavailable: list[str]) -> _Answers:
     try:
         with progress(f"bus {line.table.name}"):
-            errand = carry_out(line, lambda now: OwnCheck(nodes, now))
+            task = carry_out(line, lambda now: OwnCheck(nodes, now))
     except Unavailable as error:
         unavailable.append(str(error))
         return {}, {node.name: "its bus cannot be opened" for node in nodes}
-    return errand.found, errand.failed
+    return task.found, task.failed
 
 
 def _rows(one: Audited) -> Iterator[tuple[str, ...]]:

@@ -11,13 +11,13 @@ import typer
 
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
+from bridge.bustools.bystander import Bystander, Standstill
+from bridge.bustools.parameter import ParameterTask
 from bridge.cli.bus import CliBus, carry_out, not_virtual, tell
 from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import Show, progress
 from bridge.command.output_words import OutputWords
 from bridge.config import BusTable, NodeTable
-from bridge.errands.bystander import Bystander, Standstill
-from bridge.errands.parameter import ParameterErrand
 from bridge.mapping.model import Family, Slot
 from bridge.node.parameters.run import Procedure
 from bridge.parameter import DriveParameters, Entry, Ledger, Names, ParameterError, Why
@@ -142,18 +142,18 @@ class Target:
         known = servers.known()
         try:
             with progress(self.name) as show:
-                errand = carry_out(
+                task = carry_out(
                     self.line,
-                    lambda now: ParameterErrand(self.node, self.family, self.slot, make, now, known),
+                    lambda now: ParameterTask(self.node, self.family, self.slot, make, now, known),
                     lambda _: watch(show),
                 )
         finally:
             if writes:
                 self.count()
-        servers.learn(errand.take_learned())
-        if not errand.is_done:
+        servers.learn(task.take_learned())
+        if not task.is_done:
             raise OperationFailed("interrupted")
-        return errand.result  # pyright: ignore[reportReturnType]  # None is what some procedures return
+        return task.result  # pyright: ignore[reportReturnType]  # None is what some procedures return
 
     def count(self) -> None:
         """Keep the counts of the EEPROM guard. Raises ``OperationFailed`` where they cannot be kept."""

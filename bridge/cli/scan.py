@@ -11,10 +11,10 @@ from typing import Annotated
 import typer
 
 from bridge.base.errors import OperationFailed
+from bridge.bustools.scan import FoundNode, Scanner
 from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_bus, print_table, takes_bus, tell
 from bridge.cli.scan_site import write_site
 from bridge.cli.terminal import progress
-from bridge.errands.scan import FoundNode, Scanner
 from bridge.mapping import Family, family_names, load_family
 from bridge.mapping.loader import mapping_folders
 from bridge.mapping.match import Found, Match, best_match

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Final
 
 from bridge.base.errors import BridgeError, FileFaults, OperationFailed
+from bridge.bustools.scan import FoundNode
 from bridge.config import BusTable
 from bridge.derive import Derived, ProposedBus, ProposedNode, derive_family, describe, propose_site
 from bridge.derive.device import is_of
 from bridge.derive.toml import file_name
 from bridge.eds import Description, read_device_file, read_whole_device_file
-from bridge.errands.scan import FoundNode
 from bridge.mapping import Family
 from bridge.mapping.loader import mappings_dir, read_family
 from bridge.mapping.match import Match

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import typer
 
 from bridge.base.errors import OperationFailed
+from bridge.bustools.single import SdoTask
 from bridge.canopen import datatypes, width
 from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Plain, TypeName
 from bridge.canopen.decode_sdo import shown
@@ -18,7 +19,6 @@ from bridge.canopen.sdo import SdoError
 from bridge.cli.bus import AsJson, BusChoice, CliBus, carry_out, choose_bus, split_site, takes_bus, tell
 from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import printable, progress
-from bridge.errands.single import SdoErrand
 from bridge.mapping.model import SdoServer
 from bridge.parameter import Names, ObjectRef
 from bridge.parameter.number_text import NumberError, command_line_number
@@ -205,8 +205,8 @@ def _transfer(
     node_id, servers = target.node_id, KnownServers(line)
     known = servers.known()
 
-    def make(now: float) -> SdoErrand:
-        return SdoErrand(
+    def make(now: float) -> SdoTask:
+        return SdoTask(
             node_id,
             index,
             sub,
@@ -220,19 +220,19 @@ def _transfer(
 
     with progress(f"{index:04X}h:{sub:02X} of node {node_id}") as show:
 
-        def watch(errand: SdoErrand) -> None:
-            done, total = errand.done_bytes, errand.total_bytes
+        def watch(task: SdoTask) -> None:
+            done, total = task.done_bytes, task.total_bytes
             show(done, total, f"{done} bytes" if total is None else f"{done} of {total} bytes")
 
-        errand = carry_out(line, make, watch)
-    servers.learn(errand.take_learned())
-    if isinstance(errand.result, bytes):
-        return errand.result
-    if errand.result is None:
+        task = carry_out(line, make, watch)
+    servers.learn(task.take_learned())
+    if isinstance(task.result, bytes):
+        return task.result
+    if task.result is None:
         raise OperationFailed("interrupted")
     if as_json:
-        print(json.dumps(_failure(node_id, errand.result)))
-    raise OperationFailed(f"node {node_id}: {errand.result}")
+        print(json.dumps(_failure(node_id, task.result)))
+    raise OperationFailed(f"node {node_id}: {task.result}")
 
 
 def _failure(node_id: int, error: SdoError) -> dict[str, object]:

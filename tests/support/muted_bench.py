@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from bridge.bustools.drop_test import DropTest, Phase
+from bridge.bustools.muted_bus import MutableBus
 from bridge.canopen.frame import Frame
-from bridge.errands.drop_test import DropTest, Phase
-from bridge.errands.muted_bus import MutableBus
 from tests.support.bench import Bench, ClockBus
 
 

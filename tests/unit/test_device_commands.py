@@ -12,12 +12,12 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.base.errors import FileFaults
+from bridge.bustools.bystander import Bystander, Standstill
+from bridge.bustools.decode import Decoder
+from bridge.bustools.parameter import ParameterTask
 from bridge.canopen.frame import Frame
 from bridge.cli.app import make_app
 from bridge.cli.parameter_drive import find
-from bridge.errands.bystander import Bystander, Standstill
-from bridge.errands.decode import Decoder
-from bridge.errands.parameter import ParameterErrand
 from bridge.lint import family_dictionaries
 from bridge.parameter import Names, Reading
 from bridge.project import load_project
@@ -168,14 +168,14 @@ def test_a_parameter_is_written_to_them_without_asking_for_a_status_word(site: P
         written = yield from target.access.write(entry, 5, now, guard.gate)
         found.append(written.reading)
 
-    errand = ParameterErrand(target.node, target.family, target.slot, procedure, 0.0)
+    task = ParameterTask(target.node, target.family, target.slot, procedure, 0.0)
     now = 0.0
-    while not errand.is_finished(now) and now < 2.0:
-        errand.on_time(now)
-        for frame in errand.take_frames():
+    while not task.is_finished(now) and now < 2.0:
+        task.on_time(now)
+        for frame in task.take_frames():
             node.on_frame(frame._replace(time=now), now)
         for frame in node.take_frames():
-            errand.on_frame(frame._replace(time=now))
+            task.on_frame(frame._replace(time=now))
         now += 0.001
     assert [one.value for one in found] == [5]
     assert node.dictionary.find(0x6000, 0).upload() == b"\5\0"

@@ -11,6 +11,7 @@ import pytest
 from tests.support.process import REPOSITORY
 
 ROOMS = (
+    "bustools",
     "can",
     "canclient",
     "canopen",
@@ -20,7 +21,6 @@ ROOMS = (
     "derive",
     "dictionary",
     "eds",
-    "errands",
     "lint",
     "northbound/modbus",
     "northbound/opcua",

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from bridge.base.errors import OperationFailed
+from bridge.bustools.decode import Decoder
+from bridge.bustools.decode_device import DevicePdoView, device_views
+from bridge.bustools.decode_pdo import PdoView, views
 from bridge.can.listener import Listener, listener_of
 from bridge.can.wirebits import exact_bits
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.config import BusTable
-from bridge.errands.decode import Decoder
-from bridge.errands.decode_device import DevicePdoView, device_views
-from bridge.errands.decode_pdo import PdoView, views
 from bridge.lint import family_dictionaries
 from bridge.mirror.endpoint import tap_path
 from bridge.northbound.page.bus import Captured, IsGone

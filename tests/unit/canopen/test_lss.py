@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bridge.bustools import lss as lss_task
+from bridge.bustools.lss import LssTask
 from bridge.canopen import lss
 from bridge.canopen.frame import Frame
 from bridge.canopen.lss import LssAddress, LssError, Service
 from bridge.canopen.lss_scan import find_all
-from bridge.errands import lss as lss_errand
-from bridge.errands.lss import LssErrand
 from tests.support.lss_slave import CONFIGURATION, WAITING, LssSlave
 
 T = TypeVar("T")
@@ -45,11 +45,11 @@ class LssBus:
         self.now = 100.0
         self.requests: list[bytes] = []
 
-    def run(self, service: Service[T]) -> LssErrand[T]:
-        errand = LssErrand(service, self.now, TIMEOUT_S)
+    def run(self, service: Service[T]) -> LssTask[T]:
+        task = LssTask(service, self.now, TIMEOUT_S)
         coming: list[Frame] = []
-        while not errand.is_finished(self.now):
-            for frame in errand.take_frames():
+        while not task.is_finished(self.now):
+            for frame in task.take_frames():
                 assert frame.can_id == 0x7E5
                 assert len(frame.data) == 8
                 self.requests.append(frame.data)
@@ -59,25 +59,25 @@ class LssBus:
                         delay_s = number * self.delay_s + self.delays(frame.data)
                         coming.append(Frame(0x7E4, answer, self.now + delay_s))
             times = [frame.time for frame in coming]
-            deadline = errand.next_deadline()
+            deadline = task.next_deadline()
             if deadline is None:
                 break
             self.now = min([*times, deadline])
             for frame in [frame for frame in coming if frame.time <= self.now]:
                 coming.remove(frame)
-                errand.on_frame(frame)
-            errand.on_time(self.now)
-        for frame in errand.take_frames():
+                task.on_frame(frame)
+            task.on_time(self.now)
+        for frame in task.take_frames():
             self.requests.append(frame.data)
             for slave in self.slaves:
                 slave.on_request(frame.data)
-        return errand
+        return task
 
 
 def test_the_messages_are_those_of_cia_305() -> None:
     slave = LssSlave(NORD)
     bus = LssBus(slave)
-    bus.run(lss_errand.set_node_id(NORD, 5, keep=True))
+    bus.run(lss_task.set_node_id(NORD, 5, keep=True))
     assert [request.hex().upper() for request in bus.requests] == [
         "0400000000000000",
         "4038000000000000",
@@ -94,9 +94,9 @@ def test_the_messages_are_those_of_cia_305() -> None:
 @settings(max_examples=60, deadline=None)
 def test_a_scan_finds_every_device_and_leaves_it_waiting(present: list[tuple[int, int, int, int]]) -> None:
     slaves = [LssSlave(identity) for identity in present]
-    errand = LssBus(*slaves).run(find_all(None))
-    assert sorted(errand.result.found) == sorted(present)
-    assert not errand.result.keeps_answering
+    task = LssBus(*slaves).run(find_all(None))
+    assert sorted(task.result.found) == sorted(present)
+    assert not task.result.keeps_answering
     assert all(slave.state == WAITING for slave in slaves)
 
 
@@ -109,9 +109,9 @@ def test_late_answers_of_several_devices_do_not_spoil_the_scan() -> None:
 def test_devices_slower_than_the_answer_time_are_given_what_they_need() -> None:
     """The first question waits longer, and measures how slow they are."""
     slow_s = 2 * TIMEOUT_S
-    errand = LssBus(LssSlave(NORD), LssSlave(OTHER), delay_s=slow_s).run(find_all(None))
-    assert set(errand.result.found) == {NORD, OTHER}
-    assert errand.late == 0
+    task = LssBus(LssSlave(NORD), LssSlave(OTHER), delay_s=slow_s).run(find_all(None))
+    assert set(task.result.found) == {NORD, OTHER}
+    assert task.late == 0
 
 
 def test_a_device_that_becomes_slow_in_the_middle_is_found_in_the_next_scan() -> None:
@@ -122,8 +122,8 @@ def test_a_device_that_becomes_slow_in_the_middle_is_found_in_the_next_scan() ->
         asked += 1
         return 1.5 * TIMEOUT_S if asked > 20 else 0.0
 
-    errand = LssBus(LssSlave(NORD), delays=delays).run(find_all(None))
-    assert errand.result.found == [NORD]
+    task = LssBus(LssSlave(NORD), delays=delays).run(find_all(None))
+    assert task.result.found == [NORD]
 
 
 def test_a_late_answer_that_passes_for_the_last_confirmation_finds_no_phantom() -> None:
@@ -138,42 +138,42 @@ def test_a_late_answer_that_passes_for_the_last_confirmation_finds_no_phantom() 
         return 1.1 * TIMEOUT_S
 
     slave = LssSlave(NORD)
-    errand = LssBus(slave, delays=delays).run(find_all(None))
+    task = LssBus(slave, delays=delays).run(find_all(None))
     assert hits
-    assert errand.result.found == [NORD]
+    assert task.result.found == [NORD]
     assert slave.state == WAITING
 
 
 def test_a_device_that_is_too_slow_for_the_first_question_is_not_found_but_noticed() -> None:
-    errand = LssErrand(find_all(None), 0.0, TIMEOUT_S)
+    task = LssTask(find_all(None), 0.0, TIMEOUT_S)
     now = 0.0
-    while not errand.is_finished(now):
-        asked = any(frame.data[0] == 0x51 for frame in errand.take_frames())
-        now = errand.next_deadline() or now
-        errand.on_time(now)
+    while not task.is_finished(now):
+        asked = any(frame.data[0] == 0x51 for frame in task.take_frames())
+        now = task.next_deadline() or now
+        task.on_time(now)
         if asked:
-            errand.on_frame(Frame(0x7E4, b"\x4f" + bytes(7), now + 0.001))
-    assert errand.result.found == []
-    assert errand.late == 1
+            task.on_frame(Frame(0x7E4, b"\x4f" + bytes(7), now + 0.001))
+    assert task.result.found == []
+    assert task.late == 1
 
 
 def test_a_scan_that_was_spoilt_by_a_late_answer_is_made_again() -> None:
     bus = LssBus(LssSlave(NORD), delay_s=0.001)
     service = find_all(None)
-    errand = LssErrand(service, 0.0, TIMEOUT_S)
+    task = LssTask(service, 0.0, TIMEOUT_S)
     asked, now = 0, 0.0
-    while not errand.is_finished(now):
-        for frame in errand.take_frames():
+    while not task.is_finished(now):
+        for frame in task.take_frames():
             answer = bus.slaves[0].on_request(frame.data)
             asked += 1
             # Somebody else's late answer says "this bit is 0" in the middle of the first scan.
             if asked == 20:
                 answer = b"\x4f" + bytes(7)
             if answer:
-                errand.on_frame(Frame(0x7E4, answer, now))
-        now = errand.next_deadline() or now
-        errand.on_time(now)
-    assert errand.result.found == [NORD]
+                task.on_frame(Frame(0x7E4, answer, now))
+        now = task.next_deadline() or now
+        task.on_time(now)
+    assert task.result.found == [NORD]
 
 
 def test_a_scan_passes_over_devices_that_have_a_node_id() -> None:
@@ -182,66 +182,66 @@ def test_a_scan_passes_over_devices_that_have_a_node_id() -> None:
 
 def test_what_is_known_is_not_searched() -> None:
     bus = LssBus(LssSlave(NORD))
-    errand = bus.run(find_all(LssAddress(NORD.vendor, NORD.product, NORD.revision, 0)))
-    assert errand.result.found == [NORD]
+    task = bus.run(find_all(LssAddress(NORD.vendor, NORD.product, NORD.revision, 0)))
+    assert task.result.found == [NORD]
     assert len(bus.requests) < 50
 
 
 def test_a_device_without_a_node_id_has_one_afterwards() -> None:
     one, other = LssSlave(NORD), LssSlave(OTHER)
-    LssBus(one, other).run(lss_errand.set_node_id(OTHER, 17, keep=False))
+    LssBus(one, other).run(lss_task.set_node_id(OTHER, 17, keep=False))
     assert (one.node_id, other.node_id) == (255, 17)
     assert other.stored is None
 
 
 def test_the_only_device_is_asked_without_its_identity() -> None:
     slave = LssSlave(NORD, node_id=9)
-    assert LssBus(slave).run(lss_errand.inquire(None)).result == (NORD, 9)
+    assert LssBus(slave).run(lss_task.inquire(None)).result == (NORD, 9)
     assert slave.state == WAITING
 
 
 def test_bit_rate_is_set_stored_and_activated() -> None:
     slave = LssSlave(NORD)
-    LssBus(slave).run(lss_errand.set_bit_rate(NORD, 250_000, keep=True, activate_ms=500))
+    LssBus(slave).run(lss_task.set_bit_rate(NORD, 250_000, keep=True, activate_ms=500))
     assert (slave.bit_timing, slave.stored, slave.activated_ms) == (3, (255, 3), 500)
 
 
 def test_a_refusal_is_told_and_the_device_left_in_waiting_state() -> None:
     slave = LssSlave(NORD)
-    errand = LssBus(slave).run(lss_errand.set_bit_rate(NORD, 800_000, keep=True, activate_ms=None))
+    task = LssBus(slave).run(lss_task.set_bit_rate(NORD, 800_000, keep=True, activate_ms=None))
     with pytest.raises(LssError, match="this bit rate is not supported"):
-        _ = errand.result
+        _ = task.result
     assert slave.stored is None
     assert slave.state == WAITING
 
 
 def test_a_device_that_cannot_store_says_so() -> None:
-    errand = LssBus(LssSlave(NORD, cannot_store=True)).run(lss_errand.keep_settings(None))
+    task = LssBus(LssSlave(NORD, cannot_store=True)).run(lss_task.keep_settings(None))
     with pytest.raises(LssError, match="the device cannot store"):
-        _ = errand.result
+        _ = task.result
 
 
 def test_nobody_with_this_identity_is_told() -> None:
-    errand = LssBus(LssSlave(OTHER)).run(lss_errand.inquire(NORD))
+    task = LssBus(LssSlave(OTHER)).run(lss_task.inquire(NORD))
     with pytest.raises(LssError, match="no device has this identity"):
-        _ = errand.result
+        _ = task.result
 
 
 def test_a_silent_device_is_told_by_the_step_it_was_silent_at() -> None:
-    errand = LssBus(LssSlave(NORD), mute=True).run(lss_errand.inquire(None))
+    task = LssBus(LssSlave(NORD), mute=True).run(lss_task.inquire(None))
     with pytest.raises(LssError, match="no answer: asking for its vendor id"):
-        _ = errand.result
+        _ = task.result
 
 
 @given(st.lists(st.tuples(st.sampled_from([0x7E4, 0x7E5, 0x185]), st.binary(max_size=8)), max_size=40))
 def test_nothing_on_the_wire_raises(frames: list[tuple[int, bytes]]) -> None:
-    errand = LssErrand(find_all(None), 0.0, TIMEOUT_S)
+    task = LssTask(find_all(None), 0.0, TIMEOUT_S)
     now = 0.0
     for can_id, data in frames:
-        errand.take_frames()
-        errand.on_frame(Frame(can_id, data, now))
-        now = errand.next_deadline() or now
-        errand.on_time(now)
+        task.take_frames()
+        task.on_frame(Frame(can_id, data, now))
+        now = task.next_deadline() or now
+        task.on_time(now)
 
 
 def test_a_selected_device_is_in_configuration_state() -> None:
@@ -299,9 +299,9 @@ def test_errors_are_told_in_words(answer: str, text: str) -> None:
 
 def test_whoever_refuses_a_node_id_is_no_success() -> None:
     slave = LssSlave(NORD, state=CONFIGURATION)
-    errand = LssBus(slave).run(lss.configure_node_id(200))
+    task = LssBus(slave).run(lss.configure_node_id(200))
     with pytest.raises(LssError, match="1…127 or 255"):
-        _ = errand.result
+        _ = task.result
     assert requests(lss.configure_node_id(lss.NO_NODE_ID)) == ["11 FF 00 00 00 00 00 00"]
 
 

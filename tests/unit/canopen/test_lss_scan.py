@@ -6,9 +6,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from bridge.bustools.lss import LssTask
 from bridge.canopen.lss import LssAddress
 from bridge.canopen.lss_scan import Scanned, find_all
-from bridge.errands.lss import LssErrand
 from tests.support.lss_slave import WAITING, LssSlave
 from tests.unit.canopen.test_lss import NORD, OTHER, TIMEOUT_S, LssBus
 
@@ -72,24 +72,24 @@ def test_what_was_found_is_kept_where_the_rest_is_spoilt() -> None:
         asked += 1
         return (asked % 7) * TIMEOUT_S if asked > 150 else 0.0
 
-    errand = LssBus(LssSlave(NORD), LssSlave(OTHER), delays=delays).run(find_all(None))
-    assert set(errand.result.found) <= {NORD, OTHER}
-    assert errand.result.found
-    assert errand.result.problem or len(errand.result.found) == 2
+    task = LssBus(LssSlave(NORD), LssSlave(OTHER), delays=delays).run(find_all(None))
+    assert set(task.result.found) <= {NORD, OTHER}
+    assert task.result.found
+    assert task.result.problem or len(task.result.found) == 2
 
 
 def test_what_an_interrupted_scan_has_found_is_there() -> None:
     scanned = Scanned()
     slave = LssSlave(NORD)
-    errand = LssErrand(find_all(None, scanned), 0.0, TIMEOUT_S)
+    task = LssTask(find_all(None, scanned), 0.0, TIMEOUT_S)
     now = 0.0
     while not scanned.found:
-        for frame in errand.take_frames():
+        for frame in task.take_frames():
             answer = slave.on_request(frame.data)
             if answer:
-                errand.on_frame(frame._replace(can_id=0x7E4, data=answer, time=now))
-        now = errand.next_deadline() or now
-        errand.on_time(now)
+                task.on_frame(frame._replace(can_id=0x7E4, data=answer, time=now))
+        now = task.next_deadline() or now
+        task.on_time(now)
     assert scanned.found == [NORD]
 
 

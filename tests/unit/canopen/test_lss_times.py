@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from bridge.bustools import lss as lss_task
+from bridge.bustools.lss import LssTask
 from bridge.canopen import lss
 from bridge.canopen.lss import LssError, Service
-from bridge.errands import lss as lss_errand
-from bridge.errands.lss import LssErrand
 from tests.support.lss_slave import CONFIGURATION, LssSlave
 from tests.unit.canopen.test_lss import NORD, TIMEOUT_S, LssBus
 
@@ -40,11 +40,11 @@ def test_whoever_is_asked_alone_is_waited_for_until_it_answers(make: Make, answe
 
 
 @pytest.mark.parametrize("make", [lss.inquire_identity, lss.inquire_node_id, lss.store])
-def test_silence_of_the_one_that_is_asked_ends_the_errand(make: Make) -> None:
+def test_silence_of_the_one_that_is_asked_ends_the_task(make: Make) -> None:
     bus = LssBus()
-    errand = bus.run(make())
+    task = bus.run(make())
     with pytest.raises(LssError, match="no answer"):
-        _ = errand.result
+        _ = task.result
     assert bus.now - 100.0 == pytest.approx(TIMEOUT_S)
 
 
@@ -70,9 +70,9 @@ def test_late_answers_are_waited_for_a_whole_answer_time() -> None:
         (lss.to_waiting, "all devices to waiting state"),
         (lambda: lss.configure_bit_rate(250_000), "setting 250000 bit/s"),
         (lambda: lss.configure_bit_rate(None), "setting automatic bit rate"),
-        (lambda: lss_errand.inquire(NORD), "all devices to waiting state"),
-        (lambda: lss_errand.inquire(None), "all devices to configuration state"),
+        (lambda: lss_task.inquire(NORD), "all devices to waiting state"),
+        (lambda: lss_task.inquire(None), "all devices to configuration state"),
     ],
 )
 def test_the_step_is_told(make: Make, step: str) -> None:
-    assert LssErrand(make(), 0.0, TIMEOUT_S).step == step
+    assert LssTask(make(), 0.0, TIMEOUT_S).step == step

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.bustools import scan
 from bridge.canopen import width
 from bridge.canopen.datatypes import INTEGERS, Integer
 from bridge.cli.sdo import ValueType
 from bridge.cli.sdo import decode as sdo_decode
 from bridge.cli.sdo import surplus as sdo_surplus
-from bridge.errands import scan
 from bridge.mapping.model import ObjectRef, Parameter
 from bridge.node.boot.actions import number, same
 from bridge.parameter import Entry

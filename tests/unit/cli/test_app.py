@@ -18,7 +18,7 @@ _OTHERS = (
     "bridge.sim",
     "bridge.master",
     "bridge.node",
-    "bridge.errands",
+    "bridge.bustools",
     "bridge.lint",
     "bridge.eds",
     "bridge.dbc",

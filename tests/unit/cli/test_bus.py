@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import typer
 
+from bridge.bustools.single import SdoTask
 from bridge.canopen.frame import Frame
 from bridge.cli.bus import BusChoice, choose_bus, split_site
-from bridge.errands.single import SdoErrand
 
 
 def test_a_bus_is_named_by_its_options() -> None:
@@ -62,10 +62,10 @@ def test_a_further_sdo_channel_has_the_cob_ids_of_the_mapping(site: Path) -> Non
     assert line.sdo_server(5, 1) is None
     server = line.sdo_server(5, 3)
     assert server is not None
-    errand = SdoErrand(5, 0x2069, 1, None, 10.0, 0.5, server=server)
-    assert [frame.can_id for frame in errand.take_frames()] == [0x445]
-    errand.on_frame(Frame(0x3C5, bytes.fromhex("4B692001F4010000"), 10.1))
-    assert errand.result == b"\xf4\x01"
+    task = SdoTask(5, 0x2069, 1, None, 10.0, 0.5, server=server)
+    assert [frame.can_id for frame in task.take_frames()] == [0x445]
+    task.on_frame(Frame(0x3C5, bytes.fromhex("4B692001F4010000"), 10.1))
+    assert task.result == b"\xf4\x01"
     with pytest.raises(typer.BadParameter, match="no SDO channel 9: 1, 2, 3, 4"):
         line.sdo_server(5, 9)
     with pytest.raises(typer.BadParameter, match="give SITE"):

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from bridge.bustools.single import SdoTask
 from bridge.canopen.frame import Frame
 from bridge.cli import known_servers
 from bridge.cli.bus import BusChoice, choose_bus
 from bridge.cli.known_servers import KnownServers
-from bridge.errands.single import SdoErrand
 from tests.support.sdo_block import INDEX
 
 LENGTH = "8C000000"
@@ -30,19 +30,19 @@ def servers(channel: str = "can0") -> KnownServers:
 
 def read(known: KnownServers) -> list[str]:
     """What one ``sdo read`` of a long object sends to a node that refuses blocks."""
-    errand = SdoErrand(5, INDEX, 0, None, 0.0, 0.5, known=known.known())
+    task = SdoTask(5, INDEX, 0, None, 0.0, 0.5, known=known.known())
     sent: list[str] = []
     for answer in (f"41201F00{LENGTH}", "80201F0000000008", f"41201F00{LENGTH}"):
-        sent += [frame.data.hex()[:2] for frame in errand.take_frames()]
+        sent += [frame.data.hex()[:2] for frame in task.take_frames()]
         if sent[-1] == "60":
             break
-        errand.on_frame(Frame(0x585, bytes.fromhex(answer), 0.0))
+        task.on_frame(Frame(0x585, bytes.fromhex(answer), 0.0))
     for place in range(20):
         head = (place % 2) << 4 | (place == 19)
-        errand.on_frame(Frame(0x585, bytes((head,)) + b"abcdefg", 0.0))
-        sent += [frame.data.hex()[:2] for frame in errand.take_frames()]
-    assert errand.result == b"abcdefg" * 20
-    known.learn(errand.take_learned())
+        task.on_frame(Frame(0x585, bytes((head,)) + b"abcdefg", 0.0))
+        sent += [frame.data.hex()[:2] for frame in task.take_frames()]
+    assert task.result == b"abcdefg" * 20
+    known.learn(task.take_learned())
     return sent
 
 

@@ -25,18 +25,18 @@ def scan(
 
     def carry_out(line: object, make: Callable[[float], Any], watch: object) -> Any:
         bus = LssBus(*slaves)
-        errand = make(bus.now)
+        task = make(bus.now)
         steps = 0
-        while not errand.is_finished(bus.now) and (until is None or steps < until):
+        while not task.is_finished(bus.now) and (until is None or steps < until):
             steps += 1
-            frames = errand.take_frames()
+            frames = task.take_frames()
             for frame in frames:
                 for answer in [one for one in (slave.on_request(frame.data) for slave in slaves) if one]:
-                    errand.on_frame(frame._replace(can_id=0x7E4, data=answer, time=bus.now))
+                    task.on_frame(frame._replace(can_id=0x7E4, data=answer, time=bus.now))
             if not frames:
-                bus.now = errand.next_deadline() or bus.now
-                errand.on_time(bus.now)
-        return errand
+                bus.now = task.next_deadline() or bus.now
+                task.on_time(bus.now)
+        return task
 
     monkeypatch.setattr(lss, "carry_out", carry_out)
     return CliRunner().invoke(make_app("lss"), [*SCAN, *options])

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from bridge.bustools.decode import Kind, Meaning
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.cli.monitor import Record, for_people
-from bridge.errands.decode import Kind, Meaning
 
 SAID = Meaning(next(iter(Kind)), 5, "TPDO1 conveyor", "ready")
 

@@ -10,30 +10,30 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from bridge.base.errors import OperationFailed
+from bridge.bustools.single import NmtTask
 from bridge.canopen.frame import Frame
 from bridge.cli import nmt
 from bridge.cli.app import make_app
-from bridge.errands.single import NmtErrand
 
 BUS = ["--interface", "virtual", "--channel", "x"]
 
 
 class Bus:
-    """Runs the errand on a bus on which these nodes answer so."""
+    """Runs the task on a bus on which these nodes answer so."""
 
     def __init__(self, **answers: int) -> None:
         self.answers = {int(node.removeprefix("n")): octet for node, octet in answers.items()}
         self.sent: list[Frame] = []
 
     def __call__(
-        self, line: Any, make: Callable[[float], NmtErrand], watch: Callable[[NmtErrand], None]
-    ) -> NmtErrand:
-        errand = make(10.0)
-        self.sent = errand.take_frames()
+        self, line: Any, make: Callable[[float], NmtTask], watch: Callable[[NmtTask], None]
+    ) -> NmtTask:
+        task = make(10.0)
+        self.sent = task.take_frames()
         for node, octet in self.answers.items():
-            errand.on_frame(Frame(0x700 + node, bytes((octet,)), 10.1))
-        watch(errand)
-        return errand
+            task.on_frame(Frame(0x700 + node, bytes((octet,)), 10.1))
+        watch(task)
+        return task
 
 
 def run(monkeypatch: pytest.MonkeyPatch, bus: Bus, *arguments: str) -> Result:

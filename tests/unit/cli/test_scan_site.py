@@ -11,12 +11,12 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.base.errors import OperationFailed
+from bridge.bustools.scan import FoundNode, Scanner
 from bridge.cli.app import make_app
 from bridge.cli.scan_site import write_site
 from bridge.cli.simulation import simulated_nodes
 from bridge.config import BusTable
 from bridge.eds import read_device_file
-from bridge.errands.scan import FoundNode, Scanner
 from bridge.mapping import family_names, load_family
 from bridge.mapping.match import Found, Match, best_match
 from bridge.project import load_project

@@ -13,13 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.base.errors import OperationFailed
+from bridge.bustools.decode import Kind, Meaning
+from bridge.bustools.single import SdoTask
 from bridge.canopen.frame import Frame
 from bridge.cli import logs, monitor, sdo
 from bridge.cli.app import run_app
 from bridge.cli.bus import print_table
 from bridge.cli.terminal import printable, progress
-from bridge.errands.decode import Kind, Meaning
-from bridge.errands.single import SdoErrand
 
 CLEAR = "\x1b[2J"
 
@@ -135,27 +135,27 @@ def test_where_nobody_looks_nothing_is_shown(capsys: pytest.CaptureFixture[str])
 
 
 def test_a_long_read_knows_how_much_has_come() -> None:
-    errand = SdoErrand(5, 0x1008, 0, None, 0.0, 0.5)
-    errand.take_frames()
-    assert (errand.done_bytes, errand.total_bytes) == (0, None)
-    errand.on_frame(Frame(0x585, b"\x41\x08\x10\x00" + struct.pack("<I", 16), 0.1))
-    assert (errand.done_bytes, errand.total_bytes) == (0, 16)
+    task = SdoTask(5, 0x1008, 0, None, 0.0, 0.5)
+    task.take_frames()
+    assert (task.done_bytes, task.total_bytes) == (0, None)
+    task.on_frame(Frame(0x585, b"\x41\x08\x10\x00" + struct.pack("<I", 16), 0.1))
+    assert (task.done_bytes, task.total_bytes) == (0, 16)
     for count, toggle in ((7, 0x00), (14, 0x10)):
-        errand.take_frames()
-        errand.on_frame(Frame(0x585, bytes((toggle,)) + b"drivebr", 0.2))
-        assert errand.done_bytes == count
-    errand.on_frame(Frame(0x585, b"\x0bge\0\0\0\0\0", 0.3))
-    assert errand.done_bytes == 16
-    assert errand.result == b"drivebrdrivebrge"
+        task.take_frames()
+        task.on_frame(Frame(0x585, bytes((toggle,)) + b"drivebr", 0.2))
+        assert task.done_bytes == count
+    task.on_frame(Frame(0x585, b"\x0bge\0\0\0\0\0", 0.3))
+    assert task.done_bytes == 16
+    assert task.result == b"drivebrdrivebrge"
 
 
 def test_a_long_write_knows_how_much_has_gone() -> None:
-    errand = SdoErrand(5, 0x1F50, 1, bytes(16), 0.0, 0.5)
-    assert (errand.done_bytes, errand.total_bytes) == (0, 16)
-    errand.take_frames()
-    errand.on_frame(Frame(0x585, bytes.fromhex("60501F0100000000"), 0.1))
-    errand.take_frames()
-    assert errand.done_bytes == 7
+    task = SdoTask(5, 0x1F50, 1, bytes(16), 0.0, 0.5)
+    assert (task.done_bytes, task.total_bytes) == (0, 16)
+    task.take_frames()
+    task.on_frame(Frame(0x585, bytes.fromhex("60501F0100000000"), 0.1))
+    task.take_frames()
+    assert task.done_bytes == 7
 
 
 def test_a_log_file_that_cannot_be_opened_is_one_sentence(tmp_path: Path) -> None:

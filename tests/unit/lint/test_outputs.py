@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from bridge.bustools.own_check import OwnCheck
 from bridge.canopen.frame import Frame
 from bridge.cli.app import make_app
 from bridge.command import Plant
 from bridge.drive import OwnVerdict
-from bridge.errands.own_check import OwnCheck
 from bridge.lint import Severity, Verdict, lint
 from bridge.project import Project, load_project
 from bridge.sim.catalogue import simulate_description
@@ -123,17 +123,17 @@ def test_the_node_is_asked(tmp_path: Path, watch_ms: int, mode: int, verdict: Ow
     simulated.on_frame(Frame(0x615, b"\x23\x16\x10\x01" + word), 0.0)
     simulated.on_frame(Frame(0x615, bytes((0x2F, 0x06, 0x62, 0x02, mode, 0, 0, 0))), 0.0)
     simulated.take_frames()
-    errand = OwnCheck(list(plant.nodes.values()), 0.0)
+    task = OwnCheck(list(plant.nodes.values()), 0.0)
     now = 0.0
-    while not errand.is_finished(now) and now < 5.0:
-        errand.on_time(now)
-        for frame in errand.take_frames():
+    while not task.is_finished(now) and now < 5.0:
+        task.on_time(now)
+        for frame in task.take_frames():
             simulated.on_frame(frame._replace(time=now), now)
         for frame in simulated.take_frames():
-            errand.on_frame(frame._replace(time=now))
+            task.on_frame(frame._replace(time=now))
         now += 0.001
-    assert not errand.failed
-    assert errand.found["io"].verdict is verdict
+    assert not task.failed
+    assert task.found["io"].verdict is verdict
 
 
 @pytest.mark.parametrize(("name", "kind"), [("6200:01", "uint8"), ("6200:02", "uint8"), ("6411:01", "int16")])

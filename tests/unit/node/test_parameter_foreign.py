@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import canopen
 
+from bridge.bustools.parameter import ParameterTask
 from bridge.canopen.frame import Frame
 from bridge.config import NodeTable
-from bridge.errands.parameter import ParameterErrand
 from bridge.image import Value
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
@@ -37,16 +37,16 @@ class ForeignNode(canopen.Network):
         self.sent.append((can_id, bytes(data)))
 
     def carry_out(self, make: Callable[[float], backups.Steps]) -> ParameterError | None:
-        errand = ParameterErrand(NODE, FAMILY, FAMILY.slot[0], make, 1.0)
-        while not errand.is_finished(1.0):
-            frames = errand.take_frames()
+        task = ParameterTask(NODE, FAMILY, FAMILY.slot[0], make, 1.0)
+        while not task.is_finished(1.0):
+            frames = task.take_frames()
             assert frames, "it waits for an answer that does not come"
             for frame in frames:
                 self.notify(frame.can_id, bytearray(frame.data), 0.0)
             sent, self.sent = self.sent, []
             for can_id, data in sent:
-                errand.on_frame(Frame(can_id, data, 1.0))
-        return errand.result
+                task.on_frame(Frame(can_id, data, 1.0))
+        return task.result
 
 
 def test_a_foreign_drive_is_backed_up_compared_with_its_factory_settings_and_restored() -> None:

@@ -14,9 +14,9 @@ from typing import Final
 
 import pytest
 
+from bridge.bustools.bystander import Standstill
 from bridge.canopen.sdo import SdoChannel
 from bridge.command import Action, Identity, Outcome, Request, Role, Source, WriteParameter
-from bridge.errands.bystander import Standstill
 from bridge.node.parameters.run import run
 from bridge.northbound.gateway.nets import net_of
 from bridge.northbound.gateway.session import Session
@@ -182,8 +182,8 @@ def test_who_has_made_outputs_safe_another_way_has_their_stop_time_read_again(tm
 
 WRITES: Final = {
     "bridge/node/parameters/run.py": "transfers of DriveParameters, which has the gate",
-    "bridge/errands/single.py": "`sdo write`, which asks Protection.why_forced",
-    "bridge/errands/open_channels.py": "1201h and up: the SDO servers of a node",
+    "bridge/bustools/single.py": "`sdo write`, which asks Protection.why_forced",
+    "bridge/bustools/open_channels.py": "1201h and up: the SDO servers of a node",
     "bridge/node/boot": "the boot-up: the site file, judged by check_moving",
 }
 """The modules that write objects of nodes, each with what keeps it from moving anything."""

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from bridge.bustools.decode import Decoder
 from bridge.canopen.frame import Frame
-from bridge.errands.decode import Decoder
 from bridge.northbound.modbus.registers import DriveMap, Table
 from bridge.northbound.opcua.nodes import ObjectNode, VariableKind, VariableNode, layout
 from bridge.northbound.zenoh.keys import KeySpace

@@ -1,6 +1,6 @@
 """Backups of parameters: what was backed up can be restored, and whatever ends it is told.
 
-The command line's errand with the simulated NORD interface, on a virtual clock.
+The command line's task with the simulated NORD interface, on a virtual clock.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from bridge.base.errors import FileFaults
+from bridge.bustools.parameter import ParameterTask
 from bridge.canopen import abort
 from bridge.config import NodeTable
-from bridge.errands.parameter import ParameterErrand
 from bridge.image import Value
 from bridge.mapping import load_family
 from bridge.node.parameters.run import Procedure
@@ -59,18 +59,18 @@ class Workshop:
             self.node.take_frames()
 
     def run(self, make: Callable[[float], Procedure[None]]) -> ParameterError | None:
-        errand = ParameterErrand(NODE, NORD, NORD.slot_named("fu1"), make, self.now)
+        task = ParameterTask(NODE, NORD, NORD.slot_named("fu1"), make, self.now)
         for _ in range(20_000):
-            for frame in errand.take_frames():
+            for frame in task.take_frames():
                 self.node.on_frame(frame, self.now)
             self.node.on_time(self.now)
             for frame in self.node.take_frames():
-                errand.on_frame(frame._replace(time=self.now))
-            errand.on_time(self.now)
-            if errand.is_finished(self.now):
-                return errand.result
+                task.on_frame(frame._replace(time=self.now))
+            task.on_time(self.now)
+            if task.is_finished(self.now):
+                return task.result
             self.now += 0.001
-        raise AssertionError("the errand does not end")
+        raise AssertionError("the task does not end")
 
     def back_up(self) -> backups.Backup:
         found = backups.Backup()

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from bridge.bustools.drop_test import ForeignMaster, Proof
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.config import load_site
 from bridge.drive import OwnVerdict
-from bridge.errands.drop_test import ForeignMaster, Proof
 from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.node.boot import BootError, BootMemory, BootResult, Read, Write

@@ -1,0 +1,77 @@
+"""Question to nodes, beside a running bridge: what their drives would do if it fell silent. Sans-IO."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+
+from bridge.bustools.task import SdoTasks
+from bridge.canopen import dialogue
+from bridge.canopen.dialogue import Dialogue, Read
+from bridge.canopen.sdo import SdoError
+from bridge.command.node import Node
+from bridge.command.outputs import Outputs
+from bridge.drive import OwnJudgement
+from bridge.drive.own_supervision import judge
+from bridge.node.boot import BootError
+from bridge.node.boot.device_watch import keeps_outputs, read_why_not_safe
+from bridge.node.boot.own_supervision import read_places
+from bridge.node.places.sdo_channels import SdoChannels
+
+Judgements = dict[str, OwnJudgement]
+
+
+def ask(node: Node) -> Generator[Read, bytes | None, Judgements]:
+    """Judgement of each drive of the node, by the drive's name, or of the node itself with its outputs."""
+    of_node = yield from read_places(node, None, link=True)
+    found: Judgements = {}
+    for drive in node.drives:
+        of_drive = yield from read_places(node, drive, link=True)
+        accepted = drive.table.accepts.runs_on or ""
+        found[drive.name] = judge(drive.family, {**of_node, **of_drive}, node.bus, node.table, accepted)
+    if node.device and node.device.outputs:
+        found[node.name] = yield from _of_outputs(node, node.device.outputs, of_node)
+    return found
+
+
+def _of_outputs(
+    node: Node, outputs: Outputs, of_node: Mapping[tuple[int, int], int]
+) -> Generator[Read, bytes | None, OwnJudgement]:
+    own = judge(node.family, of_node, node.bus, node.table, outputs.table.accepts.runs_on or "")
+    for place in outputs.words.places.values():
+        if place.safe is not None and (why := (yield from read_why_not_safe(place, place.safe))):
+            return keeps_outputs(own, why)
+    return own
+
+
+class OwnCheck(SdoTasks):
+    """Task that asks all nodes side by side. ``found`` has the judgements by drive, ``failed`` the reasons
+    why nodes could not be asked, by node."""
+
+    def __init__(self, nodes: Sequence[Node], now: float) -> None:
+        of_nodes = [SdoChannels(node) for node in nodes]
+        super().__init__((channel for sdo in of_nodes for channel in sdo), now)
+        self.found: Judgements = {}
+        self.failed: dict[str, str] = {}
+        self._left = len(nodes)
+        for node, sdo in zip(nodes, of_nodes, strict=True):
+            self._begin(node, sdo)
+
+    def _begin(self, node: Node, sdo: SdoChannels) -> None:
+        def do(step: Read, now: float) -> bool:
+            dialogue.ask(step, sdo[step.channel], now, lambda answer: asking.go_on(answer, self._now))
+            return True
+
+        def done(end: Judgements | SdoError | BootError, now: float) -> None:
+            self._left -= 1
+            if isinstance(end, dict):
+                self.found |= end
+            else:
+                self.failed[node.name] = str(end)
+
+        asking = Dialogue[Read, bytes | None, Judgements, SdoError | BootError](
+            ask(node), do, done, (SdoError, BootError)
+        )
+        asking.go_on(None, self._now)
+
+    def is_finished(self, now: float) -> bool:
+        return not self._left

@@ -37,7 +37,7 @@ from bridge.project import Project, count
 from bridge.service.audit_log import AuditLog
 from bridge.service.event_log import log_event
 from bridge.service.front_process import FRONTS, Front
-from bridge.service.parts import Ports, ServerPart, Supervisor
+from bridge.service.parts import Ports, SupervisedServer, Supervisor
 from bridge.service.plant_condition import PlantCondition
 from bridge.service.preflight import check_files
 from bridge.service.wear import WearKeeper
@@ -226,14 +226,14 @@ class Service:
                 task.result()
         raise OperationFailed(f"the service has lost a task: {', '.join(task.get_name() for task in done)}")
 
-    def _servers(self) -> Iterator[ServerPart]:
+    def _servers(self) -> Iterator[SupervisedServer]:
         has = self._opened.has
         if self.modbus:
-            yield ServerPart("modbus", "the Modbus server", self.modbus, is_started=has("modbus"))
+            yield SupervisedServer("modbus", "the Modbus server", self.modbus, is_started=has("modbus"))
         for bus, gateway in self.gateways.items():
             name = f"gateway {bus}"
-            yield ServerPart(name, f"the gateway of {bus}", gateway, is_started=has(name))
-        yield ServerPart("mirror", "the link to the fronts", self.mirror)
+            yield SupervisedServer(name, f"the gateway of {bus}", gateway, is_started=has(name))
+        yield SupervisedServer("mirror", "the link to the fronts", self.mirror)
 
     async def _start(self) -> None:
         """Report "ready" once each part serves or is known not to, and wait for ever."""

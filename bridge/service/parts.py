@@ -28,7 +28,7 @@ _LONGEST_REASON: Final = 300
 _FAILING: Final = "bridge/fronts_failing"
 
 
-class Part(Protocol):
+class Supervised(Protocol):
     """A supervised server or front. ``name`` is that of its point, ``title`` that in sentences."""
 
     name: str
@@ -74,7 +74,7 @@ class Ports:
             raise Unavailable("\n".join(self._failed.values()))
 
 
-class ServerPart:
+class SupervisedServer:
     """A server of this process, which ``is_started`` already or is to be started first."""
 
     def __init__(self, name: str, title: str, server: Server, *, is_started: bool = True) -> None:
@@ -119,7 +119,7 @@ class Supervisor:
     def _failing_text(self) -> str:
         return "; ".join(f"{name}: {self._failing[name]}" for name in sorted(self._failing))
 
-    def expect(self, parts: Sequence[Part]) -> None:
+    def expect(self, parts: Sequence[Supervised]) -> None:
         """Set the parts that must have served or failed before ``all_known`` returns."""
         self._unknown = {part.name for part in parts}
         self._look()
@@ -128,7 +128,7 @@ class Supervisor:
         """Wait until each part has served or failed for the first time."""
         await self._all_known.wait()
 
-    async def keep(self, part: Part) -> None:
+    async def keep(self, part: Supervised) -> None:
         """Keep ``part`` going until cancelled; restart it after each end, with growing pauses."""
         pause_s = _FIRST_PAUSE_S
         while True:
@@ -140,7 +140,7 @@ class Supervisor:
             await asyncio.sleep(pause_s)
             pause_s = min(pause_s * 2, _LAST_PAUSE_S)
 
-    async def _run_once(self, part: Part) -> str:
+    async def _run_once(self, part: Supervised) -> str:
         try:
             return await part.run_once(lambda: self._serves(part))
         except (BridgeError, OSError) as error:
@@ -149,7 +149,7 @@ class Supervisor:
             _log.exception("unexpected", extra=log_source(part.name))
             return f"has failed: {error!r}"
 
-    def _fails(self, part: Part, how: str, pause_s: float) -> None:
+    def _fails(self, part: Supervised, how: str, pause_s: float) -> None:
         """Report a failure, at most once a minute: a part that never comes up must not fill a disk."""
         self._failing[part.name] = how
         now = self._clock()
@@ -160,7 +160,7 @@ class Supervisor:
             said = Text.of("front.ended", what=what, pause_s=pause_s)
             self._plant.report(Event(now, Kind.FRONT, "bridge", 700, said))
 
-    def _serves(self, part: Part) -> None:
+    def _serves(self, part: Supervised) -> None:
         if part.name not in self._failing and part.name not in self._unknown:
             return
         self._failing.pop(part.name, None)
@@ -171,7 +171,7 @@ class Supervisor:
             said = Text.of("front.serves_again", part=Text.plain(part.title))
             self._plant.report(Event(now, Kind.FRONT, "bridge", 200, said))
 
-    def _settled(self, part: Part, now: float) -> None:
+    def _settled(self, part: Supervised, now: float) -> None:
         self._unknown.discard(part.name)
         self._look()
         self._plant.set(_FAILING, self._failing_text, now)

@@ -10,7 +10,7 @@ import pytest
 from bridge.base.errors import OperationFailed, Unavailable
 from bridge.base.notify import Notifier
 from bridge.command import Event
-from bridge.service.parts import Ports, ServerPart, Supervisor
+from bridge.service.parts import Ports, SupervisedServer, Supervisor
 from tests.support import sites
 
 
@@ -124,12 +124,12 @@ class Server:
 
 async def test_a_server_that_is_started_already_is_started_from_the_second_time_on() -> None:
     server, served = Server(), list[int]()
-    part = ServerPart("modbus", "the Modbus server", server)
+    part = SupervisedServer("modbus", "the Modbus server", server)
     assert await part.run_once(lambda: served.append(server.starts)) == "has ended"
     await part.run_once(lambda: served.append(server.starts))
     assert served == [0, 1]
     other = Server()
-    await ServerPart("x", "x", other, is_started=False).run_once(lambda: None)
+    await SupervisedServer("x", "x", other, is_started=False).run_once(lambda: None)
     assert other.starts == 1
 
 

@@ -79,71 +79,89 @@ class BackupFile:
 
 
 def read_backup(path: Path) -> BackupFile:
-    """Raises ``FileFaults`` with everything that is wrong."""
-    file = TomlFile(path)
-    content = file.data
+    """Read the file at ``path``. Raises ``FileFaults`` with everything that is wrong."""
+    return _Reader(TomlFile(path)).read()
 
-    def fault(key: tuple[str, ...], message: str, hint: str = "") -> None:
+
+class _Reader:
+    """Reading of one file, step by step; each step notes its faults."""
+
+    def __init__(self, file: TomlFile) -> None:
+        self._file = file
+        self._content = file.data
+
+    def read(self) -> BackupFile:
+        form = self._format()
+        mapping = self._text("mapping")
+        self._check_present(mapping)
+        values, objects = self._table("parameters"), self._table("objects")
+        for name in values.keys() & objects.keys():
+            self._fault(("objects", name), "stands in [parameters], too: leave one of them out")
+        identity = self._identity()
+        self._check_end(form)
+        self._file.finish()
+        lines = {"mapping": self._file.line(("mapping",))}
+        for table, names in (("identity", identity), ("parameters", values), ("objects", objects)):
+            lines |= {name: self._file.line((table, name)) for name in names}
+        drive, saved = self._text("drive"), self._text("saved")
+        return BackupFile(mapping, drive, saved, values, {}, identity=identity, objects=objects, lines=lines)
+
+    def _fault(self, key: tuple[str, ...], message: str, hint: str = "") -> None:
         shown = dotted(key if key[0] == "identity" else (key[0], *map(_quoted, key[1:])))
-        file.faults.append(Fault(str(path), file.line(key), shown, message, hint))
+        self._file.faults.append(Fault(str(self._file.path), self._file.line(key), shown, message, hint))
 
-    form = content.get("format")
-    if form not in _READ:
-        fault(("format",), f"must be {_FORMAT}", "is this a file of `drivebridge parameters backup`?")
-    texts = {key: str(content.get(key, "")) for key in ("mapping", "drive", "saved")}
-    if not texts["mapping"]:
-        fault(("mapping",), "is missing", "the mapping that the parameters are named by")
-    if "parameters" not in content:
-        fault(("parameters",), "is missing", "a table of names and values")
+    def _text(self, key: str) -> str:
+        return str(self._content.get(key, ""))
 
-    def table(key: str) -> dict[str, Value]:
+    def _format(self) -> object:
+        form = self._content.get("format")
+        if form not in _READ:
+            hint = "is this a file of `drivebridge parameters backup`?"
+            self._fault(("format",), f"must be {_FORMAT}", hint)
+        return form
+
+    def _check_present(self, mapping: str) -> None:
+        if not mapping:
+            self._fault(("mapping",), "is missing", "the mapping that the parameters are named by")
+        if "parameters" not in self._content:
+            self._fault(("parameters",), "is missing", "a table of names and values")
+
+    def _table(self, key: str) -> dict[str, Value]:
+        """Values of a table by name, without those that no parameter can have."""
         values: dict[str, Value] = {}
-        found: object = content.get(key, {})
+        found: object = self._content.get(key, {})
         if not isinstance(found, dict):
-            fault((key,), "must be a table of names and values")
+            self._fault((key,), "must be a table of names and values")
             return values
         for name, value in cast("dict[str, object]", found).items():
             if not isinstance(value, bool | int | float | str) or (
                 isinstance(value, float) and not math.isfinite(value)
             ):
-                fault((key, name), "must be a number, a text, true or false")
+                self._fault((key, name), "must be a number, a text, true or false")
             else:
                 values[name] = value
         return values
 
-    values, objects = table("parameters"), table("objects")
-    for name in values.keys() & objects.keys():
-        fault(("objects", name), "stands in [parameters], too: leave one of them out")
-    identity: dict[str, int] = {}
-    for name, value in table("identity").items():
-        if name not in IDENTITY or isinstance(value, bool) or not isinstance(value, int):
-            fault(("identity", name), f"must be a whole number, called {', '.join(IDENTITY)}")
+    def _identity(self) -> dict[str, int]:
+        identity: dict[str, int] = {}
+        for name, value in self._table("identity").items():
+            if name not in IDENTITY or isinstance(value, bool) or not isinstance(value, int):
+                self._fault(("identity", name), f"must be a whole number, called {', '.join(IDENTITY)}")
+            else:
+                identity[name] = value
+        return identity
+
+    def _check_end(self, form: object) -> None:
+        """Note a file that breaks off."""
+        lines = self._file.text.splitlines()
+        if not self._file.text.endswith("\n"):
+            # Half a number is a number: 12.5 that breaks off is 12.
+            said = "the file ends within this line", "a line end, if it is whole"
+        elif form == _ENDED and _END not in lines:
+            said = "the file ends before its last line", f"it is {_END!r}"
         else:
-            identity[name] = value
-    breaks_off: tuple[str, str] | None = None
-    if not file.text.endswith("\n"):
-        # Half a number is a number: 12.5 that breaks off is 12.
-        breaks_off = "the file ends within this line", "a line end, if it is whole"
-    elif form == _ENDED and _END not in file.text.splitlines():
-        breaks_off = "the file ends before its last line", f"it is {_END!r}"
-    if breaks_off:
-        file.faults.append(Fault(str(path), len(file.text.splitlines()), "", *breaks_off))
-    file.finish()
-    return BackupFile(
-        texts["mapping"],
-        texts["drive"],
-        texts["saved"],
-        values,
-        {},
-        identity=identity,
-        objects=objects,
-        lines={
-            "mapping": file.line(("mapping",)),
-            **{name: file.line(("identity", name)) for name in identity},
-            **{name: file.line(("parameters", name)) for name in values},
-            **{name: file.line(("objects", name)) for name in objects},
-        },
-    )
+            return
+        self._file.faults.append(Fault(str(self._file.path), len(lines), "", *said))
 
 
 def _one_line(text: str) -> str:

@@ -41,6 +41,20 @@ _ALL_BITS = 0xFFFF_FFFF
 
 
 @dataclass(frozen=True, slots=True)
+class _Options:
+    """Options of one call; ``wait_s`` is the time to wait for the node."""
+
+    site: Path
+    files: Sequence[Path]
+    at_the_machine: bool
+    same_serial: bool
+    force: bool
+    operator: str | None
+    wait_s: float
+    as_json: bool
+
+
+@dataclass(frozen=True, slots=True)
 class _Place:
     """One drive of the node, and the backup that it gets."""
 
@@ -73,6 +87,7 @@ def exchange(
     as_json: AsJson = False,
 ) -> None:
     """After NODE was exchanged: restore its backups, save, do the drop test, audit, and write a report."""
+    options = _Options(site, files, at_the_machine, same_serial, force, operator, wait, as_json)
     project = load_project(site)
     bus, table = drop_test.find_node(project, node)
     if project.families[table.mapping_key].is_device:
@@ -82,23 +97,48 @@ def exchange(
         )
     places = _places(project, site, table, files)
     drop_test.refuse_company(project, bus, table)
-    identity: dict[str, int] = {}
-    places[0].target.run(lambda now: backups.identify(identity))
-    _judge(site, table, places, identity, same_serial=same_serial)
-    consent = drop_test.agree(
-        table,
-        at_the_machine=at_the_machine,
-        first=f"The settings of {node} are overwritten with those of the backups. ",
-    )
-    now = datetime.now(UTC)
-    occasion = drop_report.Occasion(operator or getpass.getuser(), socket.gethostname(), consent, now, site)
-    done = exchange_report.begin(Path(project.site.site.state_dir), occasion, table.name, identity, files)
-    if done.began != done.last:
-        tell(f"{node}: goes on with what was begun at {done.began}")
+    occasion, done = _begin(project, table, places, options)
     _open_channels(project, bus, node)
     for place in places:
-        _restore(place, done, wait, force=force, quiet=as_json)
+        _restore(place, done, options)
     _save(places[0].target, done)
+    facts, failure = _prove(project, bus, table, places, occasion, done)
+    _report(done, facts, as_json=as_json)
+    if not facts["ok"]:
+        raise OperationFailed(failure or "the node has the settings, and is not proven to stop")
+
+
+def _begin(
+    project: Project, table: NodeTable, places: Sequence[_Place], options: _Options
+) -> tuple[drop_report.Occasion, Exchange]:
+    """Judge the new device and ask for consent, then begin the exchange or go on with one."""
+    identity: dict[str, int] = {}
+    places[0].target.run(lambda now: backups.identify(identity))
+    _judge(options.site, table, places, identity, same_serial=options.same_serial)
+    consent = drop_test.agree(
+        table,
+        at_the_machine=options.at_the_machine,
+        first=f"The settings of {table.name} are overwritten with those of the backups. ",
+    )
+    now = datetime.now(UTC)
+    operator = options.operator or getpass.getuser()
+    occasion = drop_report.Occasion(operator, socket.gethostname(), consent, now, options.site)
+    state_dir = Path(project.site.site.state_dir)
+    done = exchange_report.begin(state_dir, occasion, table.name, identity, options.files)
+    if done.began != done.last:
+        tell(f"{table.name}: goes on with what was begun at {done.began}")
+    return occasion, done
+
+
+def _prove(
+    project: Project,
+    bus: BusTable,
+    table: NodeTable,
+    places: Sequence[_Place],
+    occasion: drop_report.Occasion,
+    done: Exchange,
+) -> tuple[dict[str, Any], str]:
+    """Do the drop test and the audit. Returns the facts of the report, and why the test has no result."""
     plant, test = drop_test.perform(project, bus, table)
     dropped = drop_report.facts(occasion, plant.nodes[table.name], test)
     audited = list(audit_drives(project, bus.name, [], of_node=table.name))
@@ -111,6 +151,11 @@ def exchange(
         [audit_facts(one) for one in audited],
         ok=dropped["ok"] and all(one.is_ok for one in audited),
     )
+    return facts, test.failure
+
+
+def _report(done: Exchange, facts: dict[str, Any], *, as_json: bool) -> None:
+    """Write the report and print it. Raises ``OperationFailed`` where it cannot be written."""
     try:
         written = done.end(facts)
     except OSError as error:
@@ -121,8 +166,6 @@ def exchange(
     else:
         print(exchange_report.markdown(facts))
         tell(f"report: {written[0]}, {written[1]}")
-    if not facts["ok"]:
-        raise OperationFailed(test.failure or "the node has the settings, and is not proven to stop")
 
 
 def _places(project: Project, site: Path, node: NodeTable, files: Sequence[Path]) -> list[_Place]:
@@ -189,20 +232,20 @@ def _open_channels(project: Project, bus: BusTable, name: str) -> None:
         raise OperationFailed(f"{name}: {task.failure}")
 
 
-def _restore(place: _Place, done: Exchange, wait_s: float, *, force: bool, quiet: bool) -> None:
+def _restore(place: _Place, done: Exchange, options: _Options) -> None:
     """Show the differences, write the backup, and keep what was written also where it ends early. Raises
     ``OperationFailed``."""
     found = differences(place.target, place.content.all)
-    if not quiet:
+    if not options.as_json:
         print_comparison(place.target, found, as_json=False)
     target = place.target
     restored = backups.Restored(same=found.same, missing=found.missing)
     try:
         if found.differences:
             changes = [one.entry for one in found.differences]
-            standstill = target.alone(force=force, whole=True)
+            standstill = target.alone(force=options.force, whole=True)
             target.run(lambda now: standstill.check(changes))
-            write_all(target, place.content.all, done.identity, restored, standstill.gate, wait_s)
+            write_all(target, place.content.all, done.identity, restored, standstill.gate, options.wait_s)
     finally:
         done.keep(place.name, _facts(restored))
     tell(f"{target.name}: {len(restored.written)} written")

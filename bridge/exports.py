@@ -1,4 +1,4 @@
-"""What a site serves, as tables for PLC, SCADA and fleet programmers, and as DBC files."""
+"""Tables of all that a site serves, for PLC, SCADA and fleet programmers, and DBC files."""
 
 from __future__ import annotations
 

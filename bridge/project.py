@@ -83,7 +83,7 @@ _NEVER_SILENT: Final = 'has no effect with on_expiry = "hold": what it goes on w
 
 
 def _own_watch(family: Family, node: NodeTable, slot: Slot) -> str:
-    """What makes silence a stop."""
+    """Text on the settings that make silence a stop."""
     channels = channels_needed(family, node, [slot])
     watch = "own_timeout_ms and enforce = true where it has a watch of its own over its process data"
     reached = f", and sdo_channels = {channels}, over which its own parameters are reached"
@@ -91,7 +91,7 @@ def _own_watch(family: Family, node: NodeTable, slot: Slot) -> str:
 
 
 def _settings(node: NodeTable, from_file: Sequence[Download]) -> Raw:
-    """What will have been downloaded; the site file wins over a configuration file."""
+    """Values after the downloads; the site file wins over a configuration file."""
     downloads = (*from_file, *(one.download for one in node.configure))
     return {(one.index, one.sub): int.from_bytes(one.data, "little") for one in downloads}
 

@@ -61,7 +61,7 @@ class Visitor:
 
     source: str
     since: float
-    """When it began to be without a session, or where there are none, was last heard."""
+    """Time from which it has been without a session, or where there are no sessions, was last heard."""
     stage: Callable[[], Stage]
     close: Callable[[], None]
     held: Callable[[], int] = lambda: 0
@@ -152,7 +152,8 @@ class Admission:
             self._end(heaviest, "connections closed that had too much under way", "")
 
     def _keep_places(self) -> None:
-        """Who has the last place keeps it only with rights; anybody may try."""
+        """Close connections beyond the limit: clients without rights may try, but do not keep the places that
+        are for clients with rights."""
         limits = self._limits
         settled = [one for one in self._visitors if not one.is_waiting()]
         beyond = len(settled) - (limits.connections - limits.kept)
@@ -171,8 +172,9 @@ class Admission:
         crowds[newcomer.source] += 1
 
         def order(visitor: Visitor) -> tuple[int, bool, int, float]:
-            """Who comes in the largest crowd goes first, then who is slow, the oldest of them; else who has
-            said least: a flood of idle sockets must not push out a client in the middle of its handshake."""
+            """Connection that gives way: from the largest crowd first, then a slow one, the oldest of them;
+            else the one that has sent least: a flood of idle sockets must not push out a client in the middle
+            of its handshake."""
             is_slow = now - visitor.since > self._limits.slow_s
             stage = 0 if is_slow else visitor.stage()
             return -crowds[visitor.source], not is_slow, stage, visitor.since

@@ -1,4 +1,4 @@
-"""What strangers on the network do wrong, in the log: one line for each kind and source, then counts."""
+"""Log lines on errors of strangers on the network: one line for each kind and source, then counts."""
 
 from __future__ import annotations
 

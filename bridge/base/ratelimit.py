@@ -1,4 +1,4 @@
-"""How often something may be reported: what anybody can cause at will must not fill a disk. Sans-IO."""
+"""Limits of repeated reports: events that anybody can cause at will must not fill a disk. Sans-IO."""
 
 from __future__ import annotations
 
@@ -80,8 +80,8 @@ class Pauses:
 
 @dataclass(slots=True)
 class _Kept(Generic[Item]):
-    """What is kept of one kind and source since ``at``: ``lines`` were told, and ``last`` is the newest of
-    those that were not."""
+    """State of one kind and source since ``at``: ``lines`` is the number of those reported, ``last`` the
+    newest of those that were not."""
 
     at: float
     lines: int = 1
@@ -138,7 +138,7 @@ class Repeats(Generic[Item]):
                 del self._told[kind]
 
     def next_due(self) -> float | None:
-        """When the next report is due; None if nothing was left out."""
+        """Time of the next report; None if nothing was left out."""
         waiting = (told.at for sources in self._told.values() for told in sources.values() if told.left_out)
         first = min(waiting, default=None)
         return None if first is None else first + PAUSE_S

@@ -1,4 +1,4 @@
-"""Why an SDO transfer has failed, as a text: ``canopen`` says it in English."""
+"""Texts for failed SDO transfers: ``canopen`` has them in English only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the plant is: what is wrong with it, what causes what, and how bad that is for each part. Sans-IO.
+"""Condition of the plant: its troubles, their causes, and their weight for each part. Sans-IO.
 
 One judgement for all who tell people: points, events, log and page.
 """

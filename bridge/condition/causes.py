@@ -22,7 +22,7 @@ Occurrence = tuple[Key, float]
 BUS_FAULT: Final = "drive_fault of the bus"
 """The kind of a fault with which a drive answers a silent bus, as ``RULES`` has it."""
 KEPT_MS: Final = 600_000.0
-"""How long a cause that is over can still explain what begins to be seen."""
+"""Time in ms for which a cause that is over can still explain new troubles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,7 @@ def _through_front(layout: Layout, cause: Known, one: Known) -> bool:
 
 
 _SERVED_BY: Final = {"local": "page"}
-"""What serves the owners of a protocol, where it is called otherwise."""
+"""Front that serves the owners of a protocol, where its name differs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ _SILENT_NODE: Final = frozenset(("node_lost", "node_absent", "node_booting", *_U
 _NOTICED_MS: Final = 5000.0
 """The longest time between two notices of one break: nodes are missed by their own supervision times."""
 _BACK_MS: Final = 60_000.0
-"""How long nodes may take to boot and to tell their faults when their bus is back."""
+"""Longest time in ms for nodes to boot and to report their faults when their bus is back."""
 _OF_BUS: Final = frozenset(("bus_silent", "bus_errors", "held", *_SILENT_NODE))
 _LEFT: Final = frozenset((BUS_FAULT,))
 _OF_CONTROLLER: Final = frozenset(("controller_silent", "controllers_silent"))
@@ -156,7 +156,7 @@ RULES: Final = (
     Rule("fronts_failing", _through_front, leaves=_OF_CONTROLLER, before_ms=10_000.0, after_ms=_BACK_MS),
     Rule("controllers_silent", _of_owner, leaves=frozenset(("controller_silent",)), before_ms=_NOTICED_MS),
 )
-"""What explains what; an earlier rule explains the causes of later ones, too."""
+"""Rules by which one trouble explains others; an earlier rule explains the causes of later ones, too."""
 _PLACE: Final = {rule.cause: place for place, rule in enumerate(RULES)}
 
 
@@ -182,11 +182,12 @@ class Causes:
     def __init__(self, layout: Layout) -> None:
         self._layout = layout
         self._causes: dict[Occurrence, Known] = {}
-        """What a first break has left is not of the second. Those that reach furthest come first."""
+        """Known causes by occurrence, the furthest-reaching first: consequences of a first break are not
+        those of the second."""
 
     def fold(self, found: Iterable[Known], now_ms: float, epoch_ms: float) -> list[Shown]:
-        """What is wrong, each cause with what it explains: the worst first, and of the same rank what began
-        first. A cause that came twice and has left something each time is there twice."""
+        """Troubles to be shown, each cause with those that it explains: the worst first, of the same rank the
+        oldest. A cause that came twice and has left something each time is there twice."""
         present = {one.occurrence: one for one in found}
         self._remember(present, now_ms, epoch_ms)
         roots: dict[Occurrence, Known] = {}

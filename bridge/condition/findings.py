@@ -1,4 +1,4 @@
-"""What the points of one bus, node or drive say of a trouble with it. Sans-IO."""
+"""Troubles of one bus, node or drive, by its points. Sans-IO."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DOWN: Final = ("bus_off", "down")
 
 
 class Rank(IntEnum):
-    """How much a trouble matters; people may be in danger, something stands still, or it may soon."""
+    """Weight of a trouble: people may be in danger, something stands still, or it may soon."""
 
     DANGER = 0
     ALARM = 1
@@ -37,7 +37,7 @@ class Trouble:
 
 
 class ImageReader:
-    """Points by their names; None where there is none, or it has no value."""
+    """Values of points by name; None where there is no such point, or it has no value."""
 
     def __init__(self, image: Image) -> None:
         self._image = image
@@ -57,7 +57,8 @@ class ImageReader:
         return self._labels[name].get(code, "") if isinstance(code, int) else ""
 
     def words(self, name: str) -> Text | str:
-        """What a point says: its text where it is the words of one, else the words; empty where none."""
+        """Words of a point: its text with code and facts where it has one, else the plain words; empty where
+        none."""
         words = self(name)
         if not isinstance(words, str):
             return ""

@@ -1,4 +1,4 @@
-"""Which drives are on which nodes, and these on which bus. Sans-IO."""
+"""Layout of a plant: its drives by node, its nodes by bus. Sans-IO."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bridge.image import Point
 from bridge.mapping import Family
 
 MOVES_BY: Final = ("velocity", "frequency", "speed", "position", "torque")
-"""What a drive is moved by, the most telling first."""
+"""Values by which a drive is moved, the most telling first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Layout:
     nodes: Mapping[str, str]
     buses: tuple[str, ...]
     mains: Mapping[str, str] = field(default_factory=dict[str, str])
-    """What each drive is moved by, such as ``frequency``, as far as it has that."""
+    """Main value of each drive, such as ``frequency``, as far as it has one."""
     own_faults: Mapping[str, OwnFault] = field(default_factory=dict[str, OwnFault])
     bus_faults: Mapping[str, frozenset[str]] = field(default_factory=dict[str, frozenset[str]])
     """The numbers of the faults with which each drive answers a silent bus."""
@@ -39,7 +39,7 @@ class Layout:
 
 
 def layout_of(points: Sequence[Point], site: Site, families: Mapping[str, Family]) -> Layout:
-    """Which drives are where, and what moves them."""
+    """Layout of the site, with the main value of each drive."""
     units = {point.name: point.unit for point in points}
     nodes = [(bus.name, node) for bus in site.bus for node in bus.node]
     drives = {

@@ -47,7 +47,8 @@ def _own_fault(family: Family) -> OwnFault:
 
 
 def _bus_faults(family: Family) -> frozenset[str]:
-    """Those of the drive, and those that the bridge reports in its place, in the maker's form."""
+    """Numbers of faults by a silent bus, in the maker's form: those of the drive, and those that the bridge
+    reports in its place."""
     words, faults = FaultWords(family), family.faults
     own = (words.own(one).number for one in (faults.telegram_downtime, faults.node_missing))
     return frozenset([*own, *(words.listed(name).number for name in faults.silent_bus)])

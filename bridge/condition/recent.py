@@ -1,4 +1,4 @@
-"""What was wrong and is over: a fault that comes and goes leaves a trace. Sans-IO, times in ms."""
+"""Troubles that are over: a fault that comes and goes leaves a trace. Sans-IO, times in ms."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Ended:
     until_ms: float
     times: int
     forgotten_ms: float
-    """When it is not shown any more, of the monotonic clock."""
+    """Time of the monotonic clock from which it is not shown any more."""
 
 
 class Recent:
@@ -50,5 +50,5 @@ class Recent:
 
     @property
     def shown(self) -> list[Ended]:
-        """Those that are not back, the latest first."""
+        """Ended troubles that are not back, the latest first."""
         return [one for key, one in reversed(self._ended.items()) if key not in self._present]

@@ -1,4 +1,5 @@
-"""What is wrong as points tell it: JSON, with codes and facts, for whoever has the texts. Sans-IO."""
+"""Troubles as the points publish them: JSON with codes and facts, for clients that have the texts.
+Sans-IO."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from bridge.text import Text, as_json, in_english
 MOST: Final = 100
 """Troubles in one text; each explains at most as many. The worst come first."""
 CONDITIONS: Final = ((0, "ok"), (1, "warning"), (2, "alarm"), (3, "danger"))
-"""How bad it is at a place, as points number it."""
+"""Conditions of a place, as points number them."""
 _encode = msgspec.json.Encoder().encode
 
 
@@ -32,7 +33,8 @@ def troubles_json(shown: Iterable[Shown]) -> str:
 
 
 def recent_json(ended: Iterable[Ended]) -> str:
-    """As ``troubles_json``, with ``until`` and ``times``, how often each ended."""
+    """A list like that of ``troubles_json``, with ``until`` and ``times``, the number of times that each
+    ended."""
     return _json([_shown(one.shown) | {"until": round(one.until_ms), "times": one.times} for one in ended])
 
 

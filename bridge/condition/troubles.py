@@ -1,4 +1,4 @@
-"""What is wrong on the plant at present, the worst first, each with what it is about, since when, and what it
+"""Present troubles of the plant, the worst first, each with its place, its beginning, and those that it
 explains. Sans-IO.
 
 A trouble is a kind, a place and what its text needs; whoever tells people has the texts. Causes come first:
@@ -30,14 +30,14 @@ from bridge.image import Image, Quality
 BOOTING_MS: Final = 10_000.0
 """A node may boot for this long before it is a trouble."""
 _BEGINNING_MS: Final = 4000.0
-"""What is there so soon after the bridge has begun may have been there before."""
+"""Time in ms after start in which a trouble that is found may have begun before it."""
 _FOUND_MS: Final = 3000.0
-"""How long the bridge looks for its nodes at first, before one counts as absent."""
+"""Time in ms after start before a node counts as absent."""
 RECENT_MS: Final = 600_000.0
-"""How long something that happens, and then is over, is shown after it has happened last."""
+"""Time in ms for which a short event is shown after it has happened last."""
 _SLOW_SHOWN_MS: Final = 3000.0
-"""How long a standstill of this box is shown by itself, and what begins is taken for its consequence: what is
-noticed later has another reason."""
+"""Time in ms for which a standstill of this box is shown by itself, and new troubles are taken for its
+consequences: later ones have another reason."""
 _AT_ONCE_MS: Final = 5000.0
 """Drives of one controller that trip within this time have it in common."""
 
@@ -51,11 +51,11 @@ class Troubles:
         self._began_ms = now_ms
         self._known: dict[Key, Known] = {}
         self._began: dict[Key, float] = {}
-        """When something had begun that is a trouble only after a while."""
+        """Beginnings of what is a trouble only after a while."""
         self._counts: dict[str, tuple[int, float]] = {}
         """Counters, and when they rose last."""
         self._owners: dict[str, str] = {}
-        """Who has commanded each drive last."""
+        """Latest owner of each drive."""
         self._waiting: list[str] = []
         self._causes = Causes(layout)
         self._recent = Recent()
@@ -63,13 +63,14 @@ class Troubles:
             bus: [node for node, its_bus in layout.nodes.items() if its_bus == bus] for bus in layout.buses
         }
         self.shown: list[Shown] = []
-        """What is wrong, the worst first."""
+        """Present troubles, the worst first."""
         self.recent = self._recent.shown
-        """What was wrong and is over, the latest first."""
+        """Troubles that are over, the latest first."""
 
     @property
     def waiting(self) -> int:
-        """How many drives do not tell their state yet, though nothing is wrong with them: they start up."""
+        """Number of drives that have not reported their state yet though nothing is wrong with them: they
+        start up."""
         return len(self._waiting)
 
     def beat(self, now_ms: float, epoch_ms: float) -> None:
@@ -102,7 +103,7 @@ class Troubles:
         self.recent = self._recent.shown
 
     def cause_of(self, trouble: Trouble, now_ms: float) -> Trouble | None:
-        """What explains something that has just been noticed, None where nothing known does."""
+        """Cause of a trouble that was noticed just now; None where none is known."""
         known = Known(trouble, now_ms, 0.0, self._owners.get(trouble.place, ""))
         cause = self._causes.of(known, now_ms)
         return cause.trouble if cause else None

@@ -67,7 +67,7 @@ class Feed:
         return taken
 
     def take_of(self, indices: Iterable[int]) -> list[int]:
-        """Those of ``indices`` that have changed; they count as seen from now on."""
+        """Changed points among ``indices``; they count as seen from now on."""
         taken = [index for index in indices if index in self._dirty]
         for index in taken:
             del self._dirty[index]
@@ -95,7 +95,7 @@ class Image:
         self._times = [0.0] * count
         self._whys: list[Text | str] = [""] * count
         self._said: dict[int, tuple[Value, Text]] = {}
-        """What points said last, with its words."""
+        """Latest texts of points, with their words."""
         self._feeds: list[Feed] = []
         self._untold: dict[int, None] = {}
 
@@ -202,7 +202,7 @@ class Image:
             self._untold.clear()
 
     def tell_kept_of(self, indices: Iterable[int]) -> None:
-        """As ``tell_kept``, of these points alone: what others keep can wait."""
+        """Like ``tell_kept``, for these points alone: those kept by others can wait."""
         told = {index: None for index in indices if index in self._untold}
         if told:
             for feed in self._feeds:

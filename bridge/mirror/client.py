@@ -97,7 +97,7 @@ class MirrorClient:
         return round(time * 1e9)
 
     def look(self, drive: str) -> None:
-        """What was told last is all that is known here."""
+        """Do nothing: the latest readings received are all that is known here."""
 
     def hurry(self, *, is_wanted: bool) -> None:
         if is_wanted is self._is_hurried:

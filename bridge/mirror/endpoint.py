@@ -1,4 +1,4 @@
-"""Where the bus process and its fronts meet: a Unix socket in the runtime folder."""
+"""Meeting point of the bus process and its fronts: a Unix socket in the runtime folder."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def socket_endpoint(runtime_dir: Path, site: str) -> str:
 
 
 def tap_path(runtime_dir: Path, site: str, bus: str) -> Path:
-    """Where the bus process passes on the frames of a bus that only it can hear."""
+    """Socket on which the bus process passes on the frames of a bus that only it can hear."""
     return runtime_dir.absolute() / f"{site}-{bus}.frames"
 
 

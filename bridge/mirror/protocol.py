@@ -1,4 +1,4 @@
-"""What goes over the link between the bus process and its fronts, in MessagePack. Pure.
+"""Messages on the link between the bus process and its fronts, in MessagePack. Pure.
 
 Times are seconds since 1970 UTC, except those of a request and of ``Rejected``, which are of the monotonic
 clock that both ends have: they run on one machine. A stepped wall clock must not make a request old.
@@ -59,7 +59,7 @@ class Snapshot(msgspec.Struct, array_like=True, frozen=True):
 
 
 class Delta(msgspec.Struct, array_like=True, frozen=True):
-    """What has changed since delta ``sequence - 1``; empty ones say that the bus process lives."""
+    """Changes since delta ``sequence - 1``; empty ones show that the bus process lives."""
 
     instance: int
     sequence: int
@@ -96,7 +96,7 @@ class _Asked(msgspec.Struct, array_like=True, frozen=True):
 
 
 class Rejected(msgspec.Struct, array_like=True, frozen=True):
-    """What a front has refused by itself, ``count`` times since it last said so."""
+    """A refusal by a front itself, ``count`` times since its last report."""
 
     time_s: float
     count: int
@@ -104,7 +104,7 @@ class Rejected(msgspec.Struct, array_like=True, frozen=True):
 
 
 class Counted(msgspec.Struct, array_like=True, frozen=True):
-    """What a front has counted since it last said so, for a point of the bridge's own."""
+    """A count of a front since its last report, for a point of the bridge's own."""
 
     leaf: str
     by: int

@@ -124,7 +124,7 @@ class MirrorPublisher:
             self._prompt_pace.start()
 
     def _tell_promptly(self) -> None:
-        """Where one of these is lost, the delta that follows has the same."""
+        """Send the prompt points at once. Where a message is lost, the next delta has the same changes."""
         feed = self._prompt_feed
         if feed is None:
             return
@@ -135,7 +135,7 @@ class MirrorPublisher:
             self._prompt_pace.wake()
 
     def _tick(self) -> None:
-        """What has changed waits while nobody listens."""
+        """Publish all changes; they wait while no front listens."""
         self._publish(len(self._feed))
 
     def _publish(self, left: int, then: Callable[[], None] | None = None) -> None:

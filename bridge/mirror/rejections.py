@@ -1,7 +1,7 @@
-"""What a front has refused by itself, condensed: a client that is refused fast must not flood the bus
-process.
+"""Refusals by a front itself, condensed: a client that is refused fast must not flood the bus process.
 
-Sans-IO."""
+Sans-IO.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from bridge.command.audit import client_of, shared_by
 from bridge.mirror.protocol import Rejected
 
 _MOST_KINDS: Final = 20
-"""Of one client, told one by one each time; of what comes on top how many there were, and what all have in
-common."""
+"""Most kinds of one client that are reported one by one each time; of further ones their number, and what all
+have in common."""
 _MOST_CLIENTS: Final = 20
 _Kind = tuple[str, ...]
 
@@ -53,7 +53,8 @@ class Rejections:
 
 
 def _both(one: Rejection, other: Rejection) -> Rejection:
-    """What is true of both; empty in what they differ. Of one kind the values of the last are an example."""
+    """The refusal common to both, empty where they differ. Of one kind the values of the last are an
+    example."""
     is_kind = (one.target, one.action, one.code) == (other.target, other.action, other.code)
     return Rejection(
         shared_by(one.identity, other.identity),

@@ -35,7 +35,7 @@ class ListeningSocket(socket.socket):
         self._has_failed = False
 
     def accept(self) -> tuple[socket.socket, Any]:
-        """As that of ``socket``; raises BlockingIOError where a client was turned away."""
+        """Accept like ``socket``; raises BlockingIOError where a client was turned away."""
         if self._has_failed:
             # asyncio asks again, up to its backlog, also after an error.
             self._has_failed = False
@@ -140,7 +140,7 @@ class Port:
         self._socket: socket.socket | None = None
 
     async def open(self) -> None:
-        """As ``socket``, for who opens several things."""
+        """Open the socket, awaitable like the other things that a server opens."""
         self.socket()
 
     def socket(self) -> socket.socket:

@@ -88,7 +88,7 @@ class PasswordChecks:
         return is_right
 
     def _forget(self, address: str, check: _Check) -> None:
-        """Where the connection has gone before its turn came."""
+        """Forget a check whose connection has gone before its turn came."""
         queue = self._queues.get(address)
         if queue and check in queue.checks:
             queue.checks.remove(check)

@@ -1,4 +1,4 @@
-"""Whose turn it is where many connections want to be served at once. Sans-IO.
+"""Turns of connections where many want to be served at once. Sans-IO.
 
 The address that was served longest ago is next, and of an address the connection that was: any number of
 connections has the turns of one address, and who asks now and then does not wait for those who ask without a

@@ -1,4 +1,4 @@
-"""What a northbound server sees of the plant, in the bus process and in a front alike."""
+"""View of the plant for a northbound server, the same in the bus process and in a front."""
 
 from __future__ import annotations
 

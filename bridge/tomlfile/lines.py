@@ -33,7 +33,7 @@ class _Scanner:
         self._line_ends = [place for place, char in enumerate(text) if char == "\n"]
         self._lines: dict[Key, int] = {}
         self._items: dict[Key, int] = {}
-        """How many [[tables]] there are so far, by the name of the list."""
+        """Number of [[tables]] so far, by the name of the list."""
 
     def scan(self) -> dict[Key, int]:
         table: Key = ()

@@ -1,4 +1,4 @@
-"""What pydantic found, in words for people who edit the file."""
+"""Findings of pydantic, in words for people who edit the file."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _SENTENCES: Final = {
     "string_too_long": "must have at most {max_length} characters",
 }
 _SAYS_ALL: Final = ("missing", "extra_forbidden", "too_short", "too_long")
-"""Where the value itself would tell nothing."""
+"""Kinds of fault for which the value itself would tell nothing."""
 
 
 def explain(model: type[BaseModel], detail: ErrorDetails) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""What the gateway serves of a bus."""
+"""Networks of the gateway: the part of a bus that it serves."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def net_of(bus: BusTable, number: int, nodes: Iterable[Node], tap: Path) -> Net:
 
 
 def _on_first(node: Node) -> str | None:
-    """Whose parameters the node's first SDO channel reaches: a drive's, or those of a node that is none."""
+    """Name of the drive, or of a node that is none, whose parameters the node's first SDO channel reaches."""
     if node.device:
         return node.device.name
     drives = (drive.name for drive in node.drives if drive.slot.parameters_by_sdo)

@@ -22,7 +22,8 @@ from bridge.northbound.view import View
 _log = logging.getLogger(__name__)
 
 MOST_CLIENTS: Final = 4
-"""Of one bus: with what each may ask at once it is half of an SDO queue, and others get the other half."""
+"""Most clients of one bus: with the requests that each may have at once they fill half of an SDO queue, and
+leave the other half to others."""
 _READ_MOST: Final = 512
 """Bytes that are handled before others get their turn: some thirty lines, less than a millisecond."""
 _UNREAD_MOST: Final = 256 * 1024
@@ -55,7 +56,7 @@ class GatewayServer:
 
     @property
     def port(self) -> int | None:
-        """Of TCP, where it is served."""
+        """TCP port, None where it is not served by TCP."""
         return self._sockets[1].getsockname()[1] if len(self._sockets) > 1 else None
 
     async def start(self) -> None:

@@ -40,7 +40,7 @@ _SDO_CODES: Final = {
     Code.TOO_OFTEN: 0x0800_0020,
     Code.BUSY: abort.BUSY,
 }
-"""What the bridge refuses instead of the node, in the words of SDO."""
+"""SDO abort codes for refusals of the bridge itself."""
 _CODES: Final = {
     Code.TIMED_OUT: ErrorCode.TIMED_OUT,
     Code.UNKNOWN_TARGET: ErrorCode.UNSUPPORTED_NODE,
@@ -105,7 +105,7 @@ class Session:
         return len(self._pending)
 
     def receive(self, data: bytes, now: float) -> None:
-        """What the client has sent: whole lines are carried out, the rest waits for more."""
+        """Take bytes of the client: whole lines are carried out, the rest waits for more."""
         self._is_working = True
         try:
             for piece in data.splitlines(keepends=True) if data else ():
@@ -263,7 +263,7 @@ class Session:
     # lines
 
     def take_lines(self) -> bytes:
-        """What is to be sent to the client."""
+        """Bytes to be sent to the client."""
         lines, self._lines = self._lines, []
         return "".join(lines).encode("utf-8")
 

@@ -20,7 +20,7 @@ _NUMBER: Final = re.compile(r"0x[0-9a-f]{1,8}|[0-9]{1,10}", re.IGNORECASE | re.A
 
 
 class ErrorCode(IntEnum):
-    """Of the gateway itself (CiA 309-3); of a node it is an SDO abort code."""
+    """Error codes of the gateway itself (CiA 309-3); those of a node are SDO abort codes."""
 
     NOT_SUPPORTED = 100
     SYNTAX = 101

@@ -124,7 +124,7 @@ PROFILES: Final[dict[str, dict[str, Any]]] = {
         "on_expiry": "hold",
     },
 }
-"""As few events as the faults need to show."""
+"""Profiles by name, with as few events as the faults need to show."""
 
 DOES_NOTHING: Final = "does nothing"
 LEAVES_DEED_OUT: Final = "goes to the next stage and does nothing else"

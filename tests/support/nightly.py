@@ -1,4 +1,4 @@
-"""How much of what takes long is tried: a part by default, all of it with ``NIGHTLY=1`` (``make nightly``).
+"""Extent of long trials: a part by default, all of them with ``NIGHTLY=1`` (``make nightly``).
 
 A plugin of pytest, too. A test that is marked ``nightly`` is left out by default. No mark leaves a test out
 of a nightly run.
@@ -21,7 +21,7 @@ _LEAST: Final = 5
 
 
 def examples(every: int, few: int | None = None) -> int:
-    """How many of ``every`` are tried: ``few``, or the sixth part, unless it is night."""
+    """Number of ``every`` that are tried: ``few``, or the sixth part, unless it is night."""
     return every if IS_NIGHTLY else min(every, max(every // _PART, _LEAST) if few is None else few)
 
 

@@ -1,4 +1,4 @@
-"""What an edge box is given: the service unit, its user, the network files, the example site."""
+"""Files for an edge box: the service unit, its user, the network files, the example site."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def citations(*patterns: str) -> Iterator[tuple[str, bool, str]]:
 
 
 def read(path: Path) -> str:
-    """As one line: a citation may be broken."""
+    """Text of a file as one line: a citation may be broken."""
     return re.sub(r"\s*\n\s*#?\s*", " ", path.read_text(encoding="utf-8"))
 
 

@@ -1,4 +1,4 @@
-"""What ``tests/bench/end_to_end.py`` makes of what its plant and its clients have written down."""
+"""Figures that ``tests/bench/end_to_end.py`` makes of the records of its plant and clients."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ WORDS = (Frame(0x205, b"\x7e\x04"), Frame(0x205, b"\x7f\x04"))
 
 
 def played(manager: BroadcastManager, until: float, step: float = 0.001) -> list[tuple[float, bytes]]:
-    """What it sends until then, from 0 on."""
+    """Data that it sends from 0 until then, with their times."""
     sent: list[tuple[float, bytes]] = []
     for number in range(round(until / step)):
         now = number * step

@@ -292,7 +292,7 @@ def test_that_the_bus_is_well_again_is_no_warning(tmp_path: Path) -> None:
 
 @dataclass(eq=False)
 class _Visitor:
-    """As much of a session as the server looks at."""
+    """Session, with as much of it as the server uses."""
 
     identity: Identity | None = None
     heard_at: float = 0.0

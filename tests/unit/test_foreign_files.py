@@ -1,4 +1,4 @@
-"""What is taken out of other people's archives, and when they are refused."""
+"""Files taken out of other people's archives, and refusals of these."""
 
 from __future__ import annotations
 

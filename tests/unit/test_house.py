@@ -1,4 +1,4 @@
-"""What `make house` counts."""
+"""Counts of `make house`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What others say ends up in the log, and is never taken for a line of the bridge's."""
+"""Foreign text in the log: it is never taken for a line of the bridge's."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FORGED = "a drive\r\n00:00:00 ERROR   conveyor/fu1: forged\x1b[2J"
 
 
 def lines_of(message: str) -> list[str]:
-    """What ``message`` becomes with each of the formatters."""
+    """Lines of ``message`` with each of the formatters."""
     record = logging.LogRecord("bridge", logging.WARNING, __file__, 1, "put on %s", (message,), None)
     formatters = (logs._Formatter("%(asctime)s %(levelname)-7s %(message)s"), logs._JournalFormatter())
     return [line for one in formatters for line in one.format(record).split("\n")]

@@ -1,4 +1,4 @@
-"""What is left out by day because it takes long is tried by night, with all that is tried by day."""
+"""Long trials: left out by day, they run by night, with all that runs by day."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_no_test_of_this_run_is_one_that_should_not_be_in_it(request: pytest.Fix
 
 
 def test_nothing_is_left_out_by_night() -> None:
-    """Who asks whether it is night does so to try more: nobody leaves a test out for that reason."""
+    """Tests ask whether it is night only to try more: none is left out for that reason."""
     asks = re.compile(r"skipif\([^)]*NIGHTLY|not nightly|-m [\"']?nightly")
     here = Path(__file__)
     files = [path for path in (REPOSITORY / "tests").rglob("*.py") if path != here]

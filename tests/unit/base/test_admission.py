@@ -1,4 +1,4 @@
-"""Which connections are let in, closed and made room; no server."""
+"""Connections let in, closed and made room for; no server."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_a_flood_of_idle_sockets_pushes_out_no_handshake(rig: Rig) -> None:
 
 
 def test_channels_that_wait_push_out_no_newcomer(rig: Rig) -> None:
-    """Who sits on open channels goes before a client that has only just connected."""
+    """A client that sits on an open channel gives way before one that has only just connected."""
     sitting = rig.crowd(MOST_WAITING, stage=Stage.CHANNEL)
     rig.now = 6.0
     newcomers = rig.crowd(5)

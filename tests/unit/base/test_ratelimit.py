@@ -1,4 +1,4 @@
-"""How often something may be told."""
+"""Limits of repeated reports."""
 
 from __future__ import annotations
 

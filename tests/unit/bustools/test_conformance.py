@@ -65,7 +65,7 @@ class SmallSlave:
         return self.state == 5 or (self.fault == "early" and self.state == 0x7F)
 
     def next_at(self) -> float:
-        """When it speaks by itself."""
+        """Time at which it sends by itself."""
         return min(at for at in (self.beat_at, self.timer_at, math.inf) if at is not None)
 
     def on_time(self, now: float) -> list[Frame]:

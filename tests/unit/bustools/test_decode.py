@@ -1,4 +1,4 @@
-"""What the monitor says about frames: those of the three manuals, and whatever else a bus carries."""
+"""Texts of the monitor for frames: those of the three manuals, and others."""
 
 from __future__ import annotations
 

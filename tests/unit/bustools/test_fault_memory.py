@@ -1,4 +1,4 @@
-"""What a drive remembers of its faults is read as a list, whatever it has of it."""
+"""Fault memory of a drive, read as a list, as far as it has one."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from bridge.canopen.habits import HABITS, HabitCounter, Odd
 
 
 def heard(*frames: tuple[int, str, float]) -> list[str]:
-    """What is said of node 5; its TPDO1 has four bytes by its mapping file."""
+    """Habits found of node 5; its TPDO1 has four bytes by its mapping file."""
     watch = HabitWatch(lambda node_id: 0.5, lambda cob_id: 4 if cob_id == 0x185 else None)
     for can_id, data, time in frames:
         watch.on_frame(Frame(can_id, bytes.fromhex(data), time), 5)

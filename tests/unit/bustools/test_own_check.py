@@ -1,4 +1,4 @@
-"""What nodes are asked about their own supervision, side by side: judgements by drive, failures by node."""
+"""Questions to nodes about their own supervision, side by side: judgements by drive, failures by node."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which nodes a scan finds, and which it does not take for nodes."""
+"""Nodes that a scan finds, and others that it does not take for nodes."""
 
 from __future__ import annotations
 

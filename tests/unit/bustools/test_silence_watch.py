@@ -20,7 +20,7 @@ def table(**values: object) -> BusTable:
 
 
 def watch(*times: float, end: float) -> list[str]:
-    """What is said of SYNC at these times, in a trace that begins at 10 s."""
+    """Sentences on SYNC at these times, in a trace that begins at 10 s."""
     silences = SilenceWatch(ALLOWED)
     for time in times:
         silences.on_frame(Frame(SYNC, b"", time))

@@ -27,7 +27,7 @@ class Bench:
         self.now = 100.0
         self.late = 0.0
         self.stalls: list[float] = []
-        """How long the process stands still at its next looks at the clock and messages, before each."""
+        """Pauses of the process before each of its next looks at the clock and the messages, seconds."""
         self.seen: list[tuple[float, Frame]] = []
         self.kernel = BroadcastManager(lambda: self.now, lambda frame: self.seen.append((self.now, frame)))
         self.beats = KernelBursts(self.clock)

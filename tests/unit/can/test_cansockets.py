@@ -23,7 +23,7 @@ class Raw:
         self.filters = list(struct.iter_unpack("=II", value))
 
     def lets_in(self, can_id: int) -> bool:
-        """As the kernel judges: the frame's identifier and the filter's agree under the mask."""
+        """The kernel's judgement: the frame's identifier and the filter's agree under the mask."""
         return any(can_id & mask == wanted & mask for wanted, mask in self.filters)
 
 

@@ -1,4 +1,4 @@
-"""Why a bus cannot be opened, in words that say what helps."""
+"""Reasons why a bus cannot be opened, in words that name the remedy."""
 
 from __future__ import annotations
 

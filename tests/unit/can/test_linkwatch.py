@@ -1,4 +1,4 @@
-"""When the kernel is asked about an interface. Its answers come from a thread; time is given."""
+"""Times at which the kernel is asked about an interface. Its answers come from a thread; time is given."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class Kernel:
         self.due = float("inf")
 
     def single(self, data: bytes) -> None:
-        """As ``tell``, with a look before it."""
+        """Send like ``tell``, with a look before it."""
         assert self.look() == []
         self.own.sent(Frame(RPDO, data), self.now)
         self.send(data)
@@ -81,7 +81,7 @@ class Kernel:
         self.now = end
 
     def look(self) -> list[bytes]:
-        """What comes back by now that is called somebody else's."""
+        """Frames that came back by now and are taken for somebody else's."""
         strangers: list[bytes] = []
         while self.waiting and self.waiting[0][0] <= self.now:
             at, _, data = heapq.heappop(self.waiting)

@@ -133,7 +133,7 @@ async def test_error_frames_are_counted_and_put_into_words(adapter: Adapter) -> 
 
 
 HEARTBEAT = 0x77F
-"""Of the bridge: nobody else sends it."""
+"""Heartbeat identifier of the bridge: nobody else sends it."""
 
 
 def message(data: bytes, *, is_rx: bool = True, is_fd: bool = False) -> can.Message:
@@ -145,8 +145,8 @@ def message(data: bytes, *, is_rx: bool = True, is_fd: bool = False) -> can.Mess
 async def heard(
     adapter: Adapter, bus: PythonCanBus, *messages: can.Message
 ) -> tuple[list[bytes], list[bytes]]:
-    """What the bus makes of these, after it has sent its own heartbeat: frames of others on what is ours
-    alone, and received ones."""
+    """Result of these messages after the bus has sent its own heartbeat: foreign frames on identifiers that
+    are ours alone, and received frames."""
     bus.watch(frozenset({HEARTBEAT}))
     now = time.monotonic()
     bus.send(Frame(HEARTBEAT, b"\x05"), now, now + 60)

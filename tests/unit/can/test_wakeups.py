@@ -1,4 +1,4 @@
-"""How often a bus wakes the event loop, and how long a frame waits."""
+"""Wake-ups of the event loop by a bus, and the wait of a frame."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from tests.support.sdo_block import LONG, Link, once
 
 
 def heard(*lines: str, listener: SdoListener | None = None) -> list[SdoSaid]:
-    """What these frames say: "> …" is from the client, "< …" from the server."""
+    """Meanings of these frames: "> …" is from the client, "< …" from the server."""
     channel = listener or SdoListener()
     sides = {">": channel.request, "<": channel.reply}
     return [sides[line[0]](bytes.fromhex(line[1:])) for line in lines]

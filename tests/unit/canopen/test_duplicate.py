@@ -1,4 +1,4 @@
-"""What is taken for a sign of two devices with one node id, to the last heartbeat and answer."""
+"""Signs of two devices with one node id, to the last heartbeat and answer."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def check(period_s: float | None = 0.05) -> DuplicateCheck:
 
 
 def told(one: DuplicateCheck, heartbeats: list[tuple[float, int]]) -> list[tuple[int, str]]:
-    """What it says, and after how many of these heartbeats, (time, state)."""
+    """Reports, each with the number of heartbeats, (time, state), before it."""
     said = [one.on_heartbeat(state, time) for time, state in heartbeats]
     return [(number, text) for number, text in enumerate(said, 1) if text]
 
@@ -34,7 +34,7 @@ def test_two_producers_of_the_same_period_are_too_many() -> None:
 
 @pytest.mark.parametrize(("pause_s", "is_told"), [(0.69, True), (0.70, False), (1.0, False), (3.0, False)])
 def test_a_single_device_may_be_somewhat_quick(pause_s: float, is_told: bool) -> None:
-    """By a clock of its own, and by frames that waited for the bus."""
+    """Its own clock may be fast, and its frames may wait for the bus."""
     assert bool(told(check(1.0), [(pause_s * n, OPERATIONAL) for n in range(100)])) is is_told
 
 

@@ -16,7 +16,7 @@ from bridge.canopen.pdo import PdoEntry
 from tests.support.sdo_client import Client
 
 Exchange = tuple[str, str]
-"""What the manual has the client send, and what the drive answers."""
+"""Request of the client in the manual, and answer of the drive."""
 
 
 def play(client: Client, *exchanges: Exchange) -> None:

@@ -251,7 +251,7 @@ def test_a_selected_device_is_in_configuration_state() -> None:
 
 
 def requests(service: Service[T], answer: bytes | None = None) -> list[str]:
-    """What a service sends if this is the answer to everything."""
+    """Requests of a service if this is the answer to each of them."""
     sent: list[str] = []
     with suppress(StopIteration):
         exchange = next(service)

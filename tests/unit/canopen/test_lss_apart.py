@@ -1,4 +1,4 @@
-"""How a scan tells devices apart: which questions it asks, and what it says of answers that are lost."""
+"""Separation of devices by a scan: its questions, and its report of lost answers."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def lose(question: str, times: int) -> Callable[[int, bytes], bool]:
 
 
 FIRST_BIT_OF_ITS_OWN = "51 00 08 00 00 0A 03 03"
-"""Of serial number 900h beside 5: from bit 10 on it is the only one."""
+"""First question that only serial number 900h answers, beside 5: from bit 10 on it is the only one."""
 ITS_VENDOR = "51 39 00 00 00 00 00 01"
 
 

@@ -1,5 +1,5 @@
-"""How long the LSS master waits: for an answer as long as it takes, for silence the whole time. And what it
-says meanwhile."""
+"""Waits of the LSS master: for an answer as long as it takes, for silence the whole time; and its progress
+meanwhile."""
 
 from __future__ import annotations
 

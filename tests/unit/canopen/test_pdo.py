@@ -244,7 +244,7 @@ def test_a_tpdo_of_another_type_is_not_asked_for(bench: Bench) -> None:
 
 
 def stale_after(bench: Bench) -> float:
-    """How long after the last TPDO its values are stale, in seconds."""
+    """Time from the last TPDO until its values are stale, seconds."""
     bench.run(1.0)
     drive = bench.plant.drives["conveyor/fu1"]
     assert drive.quality is Quality.GOOD

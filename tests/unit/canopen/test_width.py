@@ -33,7 +33,7 @@ GARBAGE = bytes.fromhex("A55AC3A5")
 
 
 def heard(*answers: bytes) -> bytes:
-    """What the SDO client makes of the answers to reading 2001h."""
+    """Result of the SDO client from these answers to a read of 2001h."""
     client = Client()
     client.read(INDEX)
     for answer in answers:

@@ -1,4 +1,4 @@
-"""What is kept of an exchange until it is done: begun again with the same device and files it goes on."""
+"""State kept of an exchange until it is done: begun again with the same device and files it goes on."""
 
 from __future__ import annotations
 

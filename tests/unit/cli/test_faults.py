@@ -45,7 +45,8 @@ def test_a_number_is_found_as_the_display_shows_it(family: str, asked: str, firs
 
 @pytest.mark.parametrize("name", sorted(set(family_names()) - {"generic/device"}))
 def test_every_code_of_an_emergency_message_is_known(name: str) -> None:
-    """As the bus and the manual have it, also where the drive's own number says more (BU 2500 §8.3.3)."""
+    """Each code as the bus and the manual have it, also where the drive's own number says more (BU 2500
+    §8.3.3)."""
     family = load_family(name)
     codes = [code for code in family.emcy.codes if "xx" not in code and int(code, 16)]
     lost: list[str] = []

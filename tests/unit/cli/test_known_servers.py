@@ -1,4 +1,4 @@
-"""What the command line remembers of SDO servers from one call to the next."""
+"""Memory of the command line for SDO servers, from one call to the next."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def servers(channel: str = "can0") -> KnownServers:
 
 
 def read(known: KnownServers) -> list[str]:
-    """What one ``sdo read`` of a long object sends to a node that refuses blocks."""
+    """Requests of one ``sdo read`` of a long object to a node that refuses blocks."""
     task = SdoTask(5, INDEX, 0, None, 0.0, 0.5, known=known.known())
     sent: list[str] = []
     for answer in (f"41201F00{LENGTH}", "80201F0000000008", f"41201F00{LENGTH}"):

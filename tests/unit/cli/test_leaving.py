@@ -1,4 +1,4 @@
-"""How a process of ours ends, whatever its threads are doing."""
+"""End of a process of ours, whatever its threads are doing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ``drivebridge lss scan`` prints: what was found, who keeps answering, and why there may be more."""
+"""Output of ``drivebridge lss scan``: devices found, those that keep answering, and why there may be more."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ ENCODER = {**BASIC, "1000": var("device type", U32, "ro", "0x196")}
 
 
 def scanned(*nodes: SimulatedDevice) -> list[tuple[FoundNode, Match | None]]:
-    """What a scan of a bus with these nodes finds."""
+    """Nodes found by a scan of a bus with these nodes, each with its match."""
     now, scanner = 0.0, Scanner(0.0, 1_000_000, passive=False)
     for node in nodes:
         node.start(now)

@@ -1,4 +1,4 @@
-"""What the commands show on a terminal: no control characters of others, and that they go on."""
+"""Output of the commands on a terminal: no foreign control characters, and signs of progress."""
 
 from __future__ import annotations
 

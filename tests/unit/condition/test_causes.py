@@ -35,7 +35,7 @@ def top(plant: Watched, ms: float = 500.0) -> list[tuple[str, str]]:
 
 
 def below(plant: Watched) -> set[tuple[str, str]]:
-    """What the only trouble explains."""
+    """Kind and place of the troubles that the only one explains."""
     (one,) = plant.beat()
     return {(known["kind"], known["place"]) for known in one.get("explains", [])}
 

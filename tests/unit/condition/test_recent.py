@@ -1,4 +1,4 @@
-"""What was wrong and is over."""
+"""Troubles that are over."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong on a plant, by its points alone."""
+"""Troubles of a plant, by its points alone."""
 
 from __future__ import annotations
 

@@ -145,7 +145,7 @@ class TestWhatDoesNotGoTogether:
     def test_a_dead_owner_blocks_nobody_for_ever(
         self, tmp_path: Path, control: str, time: str, may_be_off: bool
     ):
-        """Of Modbus the end of a connection is known, and a lease ends by itself."""
+        """The end of a Modbus connection is known, and a lease ends by itself."""
         text = f'{SMALL}control = "{control}"\n{time}\nstop_by_anyone = {{}}\n[modbus]\n[opcua]\n[zenoh]\n'
         load(tmp_path, text.format("true"))
         if not may_be_off or control in ("modbus", "lease"):

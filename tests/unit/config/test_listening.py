@@ -1,4 +1,5 @@
-"""Who listens to a network lets in those who can prove who they are, or says that it does not."""
+"""Listening to a network: only clients that prove their identity are let in, or the site file says
+otherwise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a DBC file says of a bus: the site file wins over the mapping file, and nothing overlaps."""
+"""Content of a DBC file for a bus: the site file wins over the mapping file, and nothing overlaps."""
 
 from __future__ import annotations
 

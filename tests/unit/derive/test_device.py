@@ -1,4 +1,4 @@
-"""What ``family new`` makes of a device that is no drive."""
+"""Result of ``family new`` for a device that is no drive."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from tests.support.invented_eds import FIXED, SPIN, eds
 from tests.support.nightly import IS_NIGHTLY, examples
 
 _PART = 4
-"""By day each file is in every fourth dialect, the next file in the next ones."""
+"""Dialects of a file: by day every fourth one, for the next file the next ones."""
 
 FILES = {
     "spin.eds": eds(SPIN),

@@ -1,4 +1,4 @@
-"""What ``family new`` says of a device: who it is, and what its file leaves open."""
+"""Report of ``family new`` on a device: its identity, and what its file leaves open."""
 
 from __future__ import annotations
 

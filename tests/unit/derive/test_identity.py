@@ -1,4 +1,4 @@
-"""Who a device is by its file: what is demanded of a node, and which file is a node's."""
+"""Identity of a device by its file: the demands on a node, and the file that fits a node."""
 
 from __future__ import annotations
 

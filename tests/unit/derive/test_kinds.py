@@ -1,4 +1,4 @@
-"""What a device is by its profile and its words: a drive, a device, or one that is only read."""
+"""Kind of a device by its profile and its words: a drive, a device, or one that is only read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What PDOs of a derived drive carry beside its mode's words: sent with a right value, shown by its type."""
+"""Words in PDOs of a derived drive beside those of its mode: sent with a right value, shown by their type."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What canopen is given by a name: a family, a mapping file, a device description."""
+"""Object dictionary for canopen by a name: a family, a mapping file, a device description."""
 
 from __future__ import annotations
 

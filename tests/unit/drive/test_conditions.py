@@ -32,7 +32,7 @@ def lack(conditions: Conditions, family: Family, name: str = "in_position") -> L
 
 
 def told(conditions: Conditions, family: Family) -> tuple[Quality, str] | None:
-    """As ``lack``, in words."""
+    """Result of ``lack``, in words."""
     found = lack(conditions, family)
     return found and (found.quality, render(found.why))
 

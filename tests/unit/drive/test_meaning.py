@@ -1,4 +1,4 @@
-"""What a word means is read from the drive, in every parameter set: BU 2500 §6.5.4, P543 and P546."""
+"""Meanings of words, read from the drive in every parameter set: BU 2500 §6.5.4, P543 and P546."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def test_start_and_stop_stay_in_their_set(tmp_path: Path, in_set: int) -> None:
 
 
 CODES = st.lists(st.sampled_from([0, 1, 2, 3, 4, 5, 10, 15, 23, 24, 57]), min_size=12, max_size=12)
-"""Of three words in four sets."""
+"""Codes of three words in four sets."""
 UNREADABLE = st.sets(st.tuples(st.sampled_from([ACTUAL, SETPOINT]), st.integers(1, 3), st.integers(1, 4)))
 
 

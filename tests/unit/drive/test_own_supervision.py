@@ -1,4 +1,4 @@
-"""What a drive does by itself when the bridge falls silent: verdicts, sums and reasons, by its objects."""
+"""Own supervision of a drive when the bridge falls silent: verdicts, sums and reasons, by its objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a DCF makes the bridge write, and the files a site names for it."""
+"""Downloads from a DCF, and the files a site names for it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a description contradicts itself it says so, with the line; what is right is not complained of."""
+"""Contradictions within a description, reported with the line; right ones give no report."""
 
 from __future__ import annotations
 

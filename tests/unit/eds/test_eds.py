@@ -232,7 +232,7 @@ def test_both_spellings_of_commissioning_are_read(section: str) -> None:
 
 
 def test_a_type_that_the_file_itself_describes_is_looked_up() -> None:
-    """As CANFestival writes limited types."""
+    """CANFestival writes limited types like this."""
     description, findings = odd(entry("DataType=0xA0\nAccessType=rw") + "[A0]\n[A0sub1]\nDefaultValue=0x6\n")
     found = description.entry(0x2000)
     assert found

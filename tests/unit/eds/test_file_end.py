@@ -1,4 +1,4 @@
-"""How an EDS ends: whole without a last line end, or broken off."""
+"""End of an EDS: whole without a last line end, or broken off."""
 
 from __future__ import annotations
 

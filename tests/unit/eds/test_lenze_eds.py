@@ -72,7 +72,7 @@ def test_the_mapping_file_and_the_eds_agree_on_the_pdos(description: Description
 
 
 def test_the_mapping_file_and_the_eds_agree_on_the_codes(description: Description) -> None:
-    """Those that the manual tabulates (§12); the drive's own are not in it."""
+    """The codes are those that the manual tabulates (§12); the drive's own are not in it."""
     entries = {(entry.index, entry.sub): entry for one in description.objects for entry in one.entries}
     checked = 0
     for parameter in FAMILY.parameter:

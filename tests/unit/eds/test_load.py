@@ -1,4 +1,4 @@
-"""Whatever is in a file, it is read or refused: nothing but ``FileFaults`` ever comes out."""
+"""Files of any content, read or refused: nothing but ``FileFaults`` is ever raised."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def test_the_defaults_of_pdos_and_sdos_are_those_of_a_fresh_node(name: str, desc
 
 @pytest.mark.parametrize("mapping", MAPPINGS)
 def test_the_mapping_file_and_the_eds_agree_on_the_pdos(mapping: str):
-    """Where the mapping file has two layouts the EDS has the one of §6.7.5, the second."""
+    """The EDS has the second of two layouts in the mapping file, that of §6.7.5."""
     known = {(pdo.receives, pdo.number): pdo for pdo in pdos(read_device_file(path(MAPPINGS[mapping])), NODE)}
     for slot in load_family(mapping).slot:
         for receives, each in ((True, slot.rpdo), (False, slot.tpdo)):

@@ -14,7 +14,7 @@ from tests.support.eds_checks import compare_defaults, compare_types_and_access,
 FILE = mappings_dir() / "stoeber" / "5000.eds"
 NODE = 5
 SIMULATED = Stoeber5000(NODE, mapped=False)
-"""As delivered: no application has mapped anything yet."""
+"""Device as delivered: no application has mapped anything yet."""
 FIND = SIMULATED.slave._views[0].find
 
 

@@ -1,4 +1,4 @@
-"""What an XDD leaves to the parameters of its application process (CiA 311 §6.4.5)."""
+"""Properties that an XDD leaves to the parameters of its application process (CiA 311 §6.4.5)."""
 
 from __future__ import annotations
 

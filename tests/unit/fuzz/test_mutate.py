@@ -1,4 +1,4 @@
-"""What is thrown: repeatable, different, and changed where it matters."""
+"""Mutated inputs: repeatable, different, and changed where it matters."""
 
 from __future__ import annotations
 

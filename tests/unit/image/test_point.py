@@ -1,4 +1,4 @@
-"""What a point is called."""
+"""Names of points."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ CIA402 = "cia402/velocity"
 
 
 def told(folder: Path, bitrate: int, *segments: str, mappings: tuple[str, ...] = (NORD,)) -> list[str]:
-    """What is said of a cable, each with the number of its segment, without file and line."""
+    """Findings on a cable, each with the number of its segment, without file and line."""
     cable = "".join(f"\n[[bus.cable]]\n{segment}\n" for segment in segments)
     nodes = [
         sites.node(

@@ -33,7 +33,7 @@ REACTION = '{{ object = "5DAE:01", type = "uint8", value = {0} }}'
 
 
 def warnings(tmp_path, *configure: str) -> list[str]:
-    """What is said about the node's own reaction."""
+    """Warnings about the node's own reaction."""
     text = SITE.format(configure=", ".join(configure))
     path = tmp_path / "site.toml"
     path.write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What is said of outputs of a node that is no drive before it is asked, and what it says then."""
+"""Judgements on outputs of a node that is no drive, before it is asked and after."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ SYNCHRONOUS, NOT_SYNCHRONOUS = "transmission_type = 1", "transmission_type = 255
 def judge(
     folder: Path, mapping: str, kind: str, node: str = "", downloads: tuple[Download, ...] = ()
 ) -> dict[Severity, list[str]]:
-    """What is said of 1005h, by severity."""
+    """Findings on 1005h, by severity."""
     family = load_family(mapping)
     slot = family.slot[0]
     pdos = "\n".join(

@@ -1,4 +1,4 @@
-"""What the owner may make of its time-out: `check` repeats what is dangerous, and publishes the longest."""
+"""Range of the owner's time-out: `check` repeats dangerous ones, and publishes the longest."""
 
 from __future__ import annotations
 

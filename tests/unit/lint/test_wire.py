@@ -1,4 +1,4 @@
-"""What may be on the bus before a frame of ours, and the sum on the page."""
+"""Frames that may go before one of ours, and the sum in the documentation."""
 
 from __future__ import annotations
 

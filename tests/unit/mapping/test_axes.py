@@ -111,7 +111,7 @@ def test_the_one_axis_of_a_drive_is_as_it_was(tmp_path: Path) -> None:
     ],
 )
 def test_every_way_to_an_object_knows_what_it_does(tmp_path: Path, index: int, effect: Effect) -> None:
-    """By the names of its own axis and, as a gateway has it, by those of another."""
+    """The object is named by its own axis and, as a gateway has it, by another."""
     axes = family(tmp_path, slot(1), slot(2))
     names = [Names(axes.of_slot(one)) for one in axes.slot]
     for axis in (1, 2):

@@ -1,4 +1,4 @@
-"""What a mapping file says of the settings that decide what its values mean, and what `check` insists on."""
+"""Settings in a mapping file that decide the meaning of its values, and the demands of `check` on them."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ DEEDS = {
     "de": r"\b(?:abschalten|anschließen|einstellen|erwärmen|freimachen|lassen|lesen|machen|messen|nachsehen"
     r"|notieren|prüfen|senken|verlängern|vergleichen|wiederherstellen)\b",
 }
-"""What somebody at the machine can do, in the imperative."""
+"""Verbs of remedies at the machine, in the imperative or the infinitive."""
 DETAILS = {"en": " Details: ", "de": " Genaueres: "}
 
 

@@ -1,4 +1,4 @@
-"""Which mappings one is made of, the nearest first."""
+"""Lineage of a mapping: those that it is made of, the nearest first."""
 
 from __future__ import annotations
 

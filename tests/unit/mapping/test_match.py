@@ -1,4 +1,4 @@
-"""Which family fits a node that was found: by all of its rules, and by the most of them."""
+"""Match of a family with a node that was found: by all of its rules, and by the most of them."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def test_an_encoder_position_is_sent_by_a_mapping_of_its_own_only(name: str, num
 
 
 def watch(family: Family) -> tuple[str | None, float]:
-    """By which parameter the drive watches its process data, and its step in ms."""
+    """Parameter by which the drive watches its process data, and its step in ms."""
     (one,) = [one for one in family.own_supervision if one.watches == "process_data"]
     return one.parameter, one.unit_ms
 

@@ -1,4 +1,4 @@
-"""What a mapping file says of a drive's own supervision: defaults, and what it may not say."""
+"""Own supervision of a drive in its mapping file: defaults and refusals."""
 
 from __future__ import annotations
 

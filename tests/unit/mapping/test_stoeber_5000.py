@@ -163,7 +163,7 @@ unit = "mm"
 
 
 def test_other_words_are_a_small_file_beside_the_site_file(tmp_path: Path):
-    """What POSITool has set is told by a file of the site's own."""
+    """A file of the site's own describes the settings made by POSITool."""
     (tmp_path / "mappings").mkdir()
     (tmp_path / "mappings" / "lift.toml").write_text(OTHER_WORDS, encoding="utf-8")
     family = load_family("lift", mapping_folders(tmp_path / "site.toml"))

@@ -1,4 +1,4 @@
-"""Who is answered reads what the answer says: an outcome names the delta that shows what it has changed."""
+"""Reads after an outcome: it names the delta that shows the change."""
 
 from __future__ import annotations
 

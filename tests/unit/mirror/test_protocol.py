@@ -1,4 +1,4 @@
-"""What goes between the bus process and its fronts reads back as it was; what is wrong is named."""
+"""Messages between the bus process and its fronts: they read back as they were, faults are named."""
 
 from __future__ import annotations
 

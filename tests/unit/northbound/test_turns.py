@@ -1,4 +1,4 @@
-"""Who is served next: by address, then by connection, whoever was served longest ago."""
+"""Order of service: by address, then by connection, the one served longest ago first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a drive's parameters are read and written: the transfers that it takes, and what each answer means."""
+"""Reads and writes of a drive's parameters: the transfers, and the meaning of each answer."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Drive:
         self.data = value.to_bytes(2, "little", signed=True)
         self.accepts = accepts
         self.fails: dict[bool, TransferFailed] = {}
-        """By whether it is a write."""
+        """Failures of transfers, by whether they are writes."""
         self.loses_answer = False
         self.done: list[bytes | None] = []
         self.now = 100.0

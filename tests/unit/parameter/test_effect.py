@@ -1,4 +1,4 @@
-"""What a write of an object does, by the device profiles, and who writes it when."""
+"""Effects of writes to objects, by the device profiles, and who may write them when."""
 
 from __future__ import annotations
 

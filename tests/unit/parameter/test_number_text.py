@@ -28,7 +28,8 @@ def test_a_text_is_the_number_that_the_table_says(case: dict[str, Any], language
 
 
 def test_no_text_is_two_numbers() -> None:
-    """What both languages take at once is the same number in both, unless each may take it for its own."""
+    """A text that both languages take at once is the same number in both, unless each may take it for its
+    own."""
     for case in CASES:
         english, german = case["en"], case["de"]
         if isinstance(english, int | float) and isinstance(german, int | float):

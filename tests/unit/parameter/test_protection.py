@@ -140,7 +140,7 @@ def test_what_commands_watches_or_addresses_a_drive_is_an_engineers(mapping: str
 
 
 def protected(names: Names, mapping: str) -> Iterator[Entry]:
-    """What nobody writes: by the vendor's names, by the file's list, and as objects."""
+    """Entries that nobody writes: by the vendor's names, by the file's list, and as objects."""
     family = load_family(mapping)
     for alias in aliases(family):
         yield names.resolve(str(alias.ref))

@@ -27,7 +27,8 @@ NO_OBJECT, NO_SUB = 0x0602_0000, 0x0609_0011
 
 
 def saved(access: DriveParameters, abort_code: int | None) -> tuple[Transfer, str]:
-    """What is written, and what the guard says, from a node that answers so; None: it saves."""
+    """The write, and the reason of the guard, for a node that answers with this abort code; None: it
+    saves."""
     steps = access.save(0.0, GATE)
     transfer = next(steps)
     try:

@@ -45,7 +45,7 @@ class Seen:
 
 @dataclass
 class Scene:
-    """What a round left behind, up to ``time``."""
+    """Records of a round, up to ``time``."""
 
     told: Seen = field(default_factory=Seen)
     said: Seen = field(default_factory=Seen)

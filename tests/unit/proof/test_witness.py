@@ -1,4 +1,4 @@
-"""What the witness makes of the frames that it sees."""
+"""Records of the witness from the frames that it sees."""
 
 from __future__ import annotations
 

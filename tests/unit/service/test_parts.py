@@ -49,7 +49,7 @@ class Case:
         return self.plant.image.read("bridge/fronts_failing").value
 
     async def fails(self, part: Part) -> None:
-        """As ``keep`` does it once, without its pause."""
+        """One turn of ``keep``, without its pause."""
         how = await self.supervisor._run_once(part)
         self.supervisor._fails(part, how, 0.2)
 

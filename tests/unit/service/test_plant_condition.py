@@ -1,4 +1,4 @@
-"""How the plant is, as points and events of the bus process."""
+"""Condition of the plant, as points and events of the bus process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is looked at before a bus is opened: files and folders of the site."""
+"""Checks before a bus is opened: files and folders of the site."""
 
 from __future__ import annotations
 

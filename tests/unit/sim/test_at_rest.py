@@ -1,5 +1,5 @@
-"""What the demo's simulated nodes do while nothing happens, in counts: a node that is told the same again
-has nothing to look at."""
+"""Work of the demo's simulated nodes while nothing happens, in counts: a node that gets the same again has
+nothing to look at."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ async def say_the_same(seconds: float, send: Callable[[Frame], None]) -> None:
 
 
 async def at_rest(site: Path, counts: Counter[str]) -> Counter[int]:
-    """What the nodes send while the counts are taken."""
+    """Frames of the nodes while the counts are taken."""
     wire = VirtualWire()
     loop = asyncio.get_running_loop()
     end = wire.end("master")

@@ -20,7 +20,7 @@ NODES = (5, 6, 7, 8)
 PERIOD_S = 0.1
 HEARTBEAT_TIME = bytes.fromhex("2B17100064000000")
 ROUND_S = 0.033
-"""How often somebody looks at the bus."""
+"""Period of looks at the bus, seconds."""
 
 
 @pytest.fixture
@@ -31,7 +31,8 @@ def loop() -> Iterator[VirtualLoop]:
 
 
 async def longest_silence(loop: VirtualLoop, site: Path, seed: int) -> dict[int, float]:
-    """Of each node, as one who drains the bus finds it, right after pauses as well."""
+    """Longest silence of each node in ms, as a reader finds it who drains the bus, also right after
+    pauses."""
     pauses = random.Random(seed)
     wire = VirtualWire()
     end = wire.end("master")

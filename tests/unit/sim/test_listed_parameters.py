@@ -1,4 +1,4 @@
-"""What a mapping lists as a parameter, its simulator has: of the type that the mapping gives it."""
+"""Parameters of a mapping in its simulator: each is there, of the type that the mapping gives it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever comes over the wire, at whatever time, no simulated node raises, grows or spins."""
+"""Simulated nodes under any input at any time: none raises, grows or spins."""
 
 from __future__ import annotations
 
@@ -320,7 +320,7 @@ def test_random_frames_and_times_do_no_harm(name: str, data: st.DataObject) -> N
 
 @dataclass(frozen=True)
 class LongRun:
-    """What happens in each second, at its parts."""
+    """Course of each second, by its parts."""
 
     make: Callable[[], Any]
     second: Mapping[float, str | Frame | None] = field(default_factory=dict[float, "str | Frame | None"])

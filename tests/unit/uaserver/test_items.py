@@ -69,7 +69,7 @@ def make_item(
 
 
 def told(item: ValueItem) -> list[tuple[float, bool]]:
-    """What is in the queue, and which of it says that others were lost."""
+    """Values in the queue, each with whether it reports that others were lost."""
     found: list[tuple[float, bool]] = []
     while item.has_something:
         one = item.notification()

@@ -13,7 +13,7 @@ from bridge.uaserver.notices import tell
 
 
 class Log:
-    """What the service writes to standard error."""
+    """Output of the service on standard error."""
 
     def __init__(self) -> None:
         self.now = 0.0

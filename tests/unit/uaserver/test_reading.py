@@ -1,4 +1,4 @@
-"""Which part of a value a client gets, and which of its times; no server."""
+"""Part of a value that a client gets, and its times; no server."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class TestReadPassword:
 
     @pytest.mark.parametrize("sent", [b"", NONCE])
     def test_nothing_is_read_for_a_session_without_a_nonce(self, own: OwnCertificate, sent: bytes) -> None:
-        """What ends with nothing would fit any message that was ever heard."""
+        """A text that ends with an empty nonce would fit any recorded message."""
         with pytest.raises(ServiceError):
             read_password(self.encrypted(own, sent), b"", own.private_key, encrypted=False)
 

@@ -1,4 +1,4 @@
-"""What the server says of itself, in the standard's own address space."""
+"""Self-description of the server, in the standard's own address space."""
 
 from __future__ import annotations
 

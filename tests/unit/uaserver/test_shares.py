@@ -1,4 +1,4 @@
-"""What one address may have of the monitored items that all share; no server."""
+"""Share of one address in the monitored items; no server."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the witness knows of the outputs of a coupler with modules."""
+"""Outputs of a coupler with modules, as the witness knows them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the witness asks of the bridge, and what it makes of the answers, byte by byte."""
+"""Questions of the witness to the bridge, and readings from the answers, byte by byte."""
 
 from __future__ import annotations
 

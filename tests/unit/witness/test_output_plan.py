@@ -1,4 +1,4 @@
-"""What the witness knows of outputs by files, held against what the bridge knows: two hands wrote it."""
+"""Outputs as the witness knows them by files, compared with the bridge's: two hands wrote the two."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_any_bit_that_is_not_safe_is_active(tmp_path: Path, bit: int) -> None:
 
 
 def bridges(folder: Path, eds: str, outputs: str) -> OutputWords:
-    """What the bridge makes of the same."""
+    """Output words that the bridge makes of the same."""
     project = load_project(written(folder, io("", outputs), eds=eds))
     (node,) = project.site.bus[0].node
     return OutputWords("io", project.families[node.mapping].output, node.outputs.on_expiry)
@@ -390,7 +390,7 @@ def test_encodings_and_ends_of_lines_do_not_matter(tmp_path: Path, encoding: str
 
 
 def test_lines_in_utf_8_may_stand_among_others_in_windows_1252(tmp_path: Path) -> None:
-    """As of two files that were joined; the names are what the bridge calls the outputs."""
+    """The file is like two that were joined; the names are those of the bridge."""
     first, second = "ParameterName=Lüfter", "ParameterName=Größe"
     text = EDS.replace(DIGITAL_TITLE, first).replace("ParameterName=Digital outputs 9 to 16", second)
     content = text.encode().replace(second.encode(), second.encode("cp1252"))

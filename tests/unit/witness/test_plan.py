@@ -1,4 +1,4 @@
-"""What the witness knows of drives, held against what the bridge knows: two hands have written it."""
+"""Drives as the witness knows them, compared with the bridge's: two hands wrote the two."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How often something is sent."""
+"""Pace of sending."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PERIOD_S = 0.01
 
 
 class Turns:
-    """When they came, in ms."""
+    """Times of the turns, in ms."""
 
     def __init__(self, most_s: float = inf, *, waits: bool = False) -> None:
         self.at: list[int] = []

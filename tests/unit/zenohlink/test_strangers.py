@@ -1,4 +1,4 @@
-"""Which connections to zenoh's port are told as strangers'."""
+"""Connections to zenoh's port that are reported as strangers'."""
 
 from __future__ import annotations
 

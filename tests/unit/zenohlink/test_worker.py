@@ -1,4 +1,4 @@
-"""What comes by zenoh has its turn, whatever others send."""
+"""Turns of messages by zenoh, whatever others send."""
 
 from __future__ import annotations
 

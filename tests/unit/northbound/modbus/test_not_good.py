@@ -35,7 +35,7 @@ def words_of(mapping: str) -> list[str]:
 
 
 class Reader:
-    """What a PLC reads of unit 1."""
+    """Registers of unit 1 as a PLC reads them."""
 
     def __init__(self, plant: Plant, clock: list[float]) -> None:
         self._dispatcher = dispatcher_of(plant, lambda: clock[0])
@@ -121,7 +121,8 @@ class Model:
         return self.comes(0) and self.comes(self.home.get(word, 0))
 
     def words_of(self, value: ProcessValue) -> tuple[str, ...]:
-        """By the codes that the mapping file takes for its words; none where these do not carry the value."""
+        """Words of a value by the codes that the mapping file takes for them; none where these do not carry
+        the value."""
         if not value.code:
             return value.word_names
         runs = self.drive.family.meanings_of(self.drive.slot, value.group)

@@ -82,8 +82,8 @@ def rig() -> Rig:
 
 
 def waits(loop: Loop, crowd: list[Client], good: Client) -> list[int]:
-    """How many requests of the crowd are handled while one of the good client's waits, again and again. It
-    asks less often than its turn would come."""
+    """Numbers of the crowd's requests that are handled while one of the good client's waits, time after time.
+    It asks less often than its turn would come."""
     loop.turn(*crowd)
     found: list[int] = []
     every = 2 * len(crowd)

@@ -1,4 +1,4 @@
-"""What nodes of a kind have in common."""
+"""Shared parts of the nodes of a kind."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the server needs of the disk, looked at before a bus is opened."""
+"""Check of what the server needs of the disk, before a bus is opened."""
 
 from __future__ import annotations
 

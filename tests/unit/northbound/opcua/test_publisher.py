@@ -1,4 +1,4 @@
-"""Who watches a point is told of it without holding up anybody else; no server."""
+"""Publishing to clients that watch a point, without holding up others; no server."""
 
 from __future__ import annotations
 

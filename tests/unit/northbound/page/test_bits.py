@@ -1,5 +1,5 @@
-"""What the page calls a bit of a control or status word is what is so while the bit is 1: for every bit of
-every family, in both languages."""
+"""Names of bits in control and status words: each says what is so while the bit is 1, for every bit of every
+family, in both languages."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ def texts() -> dict[str, dict[str, str]]:
 
 
 def shown(name: str, language: str) -> str:
-    """As bits.js has it."""
+    """Name of a bit as bits.js has it."""
     return texts()[language].get(f"bit.{name}") or name.replace("_", " ")
 
 

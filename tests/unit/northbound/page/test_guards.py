@@ -37,7 +37,7 @@ async def asked(
 
 
 async def refusal(**more: Any) -> str:
-    """Why it is refused; empty where it is not."""
+    """Reason of the refusal; empty where there is none."""
     sent = await asked(**more)
     if sent[0]["type"] == "websocket.close":
         assert sent[0]["code"] == 1008

@@ -26,7 +26,7 @@ _BY_ITSELF: Final = re.compile(
 
 
 def read_by_page(texts: list[str]) -> dict[str, list[dict[str, Any]]]:
-    """How the page's script reads each of ``texts``, by language."""
+    """Readings of ``texts`` by the page's script, by language."""
     script = ["node", "--input-type=module", "--eval", _READ_ALL, json.dumps(texts)]
     run = subprocess.run(script, cwd=JS, capture_output=True, text=True, timeout=30, check=True)
     return json.loads(run.stdout)

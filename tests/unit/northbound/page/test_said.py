@@ -1,4 +1,4 @@
-"""What the bridge itself says, in German on the page: nobody adds a message without its phrase."""
+"""Sentences of the bridge itself, in German on the page: nobody adds a message without its phrase."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ UNSAID: Final[dict[str, tuple[str, ...]]] = {
     "bridge/parameter/names.py": ("parameter set",),
     "bridge/service/parts.py": ("7Xq; not served: Zq zq",),
 }
-"""What is no message on the page: keys, logs, and parts of messages that are tested as a whole."""
+"""Texts that are no message on the page: keys, logs, and parts of messages that are tested as a whole."""
 _COMMAND: Final = re.compile(r"(?:modprobe|ip link) .*")
 _ELSEWHERE: Final = re.compile(
     "attachment; filename=|.*(predicted load .* kbit/s|dead controller|dead bridge)"

@@ -29,7 +29,7 @@ def begun(folder: Path, credentials: dict[str, str] = ANN) -> tuple[Session, Pat
 
 
 def after(file: Path, credentials: dict[str, str] = ANN, now: float = 200.0) -> Sessions:
-    """Of the next front."""
+    """Sessions of the next front."""
     sessions = Sessions()
     sessions.restore(SessionFile(file, credentials).load(now))
     return sessions

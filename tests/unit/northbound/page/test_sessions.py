@@ -1,4 +1,4 @@
-"""Who is logged in to the page, and for how long; on a virtual clock."""
+"""Sessions of the page and their ends; on a virtual clock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who gets a tab and whose connection gives way, when there are more than there is room for."""
+"""Shares of tabs and connections, where there are more than there is room for."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def seat(user: str, role: Role = Role.OBSERVER, *, commands: bool = False, since
 
 
 def crowd(role: Role, users: int = 8, tabs: int = 8, *, commands: bool = False) -> list[Seat]:
-    """As many as there are places for those who are no engineers."""
+    """Tabs of these users, by default as many as there are places for users that are no engineers."""
     seats = [
         seat(f"{role.name} {user}", role, commands=commands) for user in range(users) for _ in range(tabs)
     ]

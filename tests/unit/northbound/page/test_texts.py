@@ -46,14 +46,14 @@ def test_what_german_has_beside_it_names_what_comes_from_the_bridge() -> None:
 
 
 def points_of(mapping: str) -> list[Point]:
-    """Those of the first drive of a family."""
+    """Points of the first drive of a family."""
     slot = load_family(mapping).slot[0].name
     text = sites.site(sites.bus(sites.node(sites.drive(slot, "lease", 1000, ""), mapping=mapping)))
     return list(sites.plant_of(text, mapping).image.points)
 
 
 def is_trendable(point: Point) -> bool:
-    """As ``trendable`` of trend.js has it."""
+    """True if ``trendable`` of trend.js takes the point."""
     is_word = point.data_type in (DataType.STRING, DataType.BOOL) or point.states or point.bits
     return not is_word and point.path[-2] in ("actual", "command", "supervision")
 
@@ -110,7 +110,7 @@ def test_no_script_of_ours_is_longer_than_one_sitting_or_writes_html() -> None:
 
 
 def _imports(script: Path) -> list[Path]:
-    """What it imports as soon as it is loaded."""
+    """Modules that a script imports as soon as it is loaded."""
     found = re.findall(
         r'\b(?:import|export)\b[^;]*?\bfrom *"([^"]+)"|^import "([^"]+)"', script.read_text("utf-8"), re.M
     )

@@ -1,4 +1,4 @@
-"""How often passwords may be guessed: pauses by user and by address, and what is forgotten."""
+"""Limit of password guesses: pauses by user and by address, and the end of counting."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ HERE = "1.2.3.4"
 
 
 def fail(throttle: Throttle, user: str, times: int, now: float = 0.0) -> int:
-    """How many of ``times`` logins were looked at."""
+    """Number of ``times`` logins that were checked."""
     return sum(throttle.begin(HERE, user, now) == 0 for _ in range(times))
 
 

@@ -1,4 +1,4 @@
-"""What tabs are shown of a bus's traffic."""
+"""Traffic of a bus as tabs are shown it."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Bench:
     def beat(
         self, *filters: TrafficFilter, after_s: float = 0.1, counts: bool = False
     ) -> list[list[dict[str, Any]]]:
-        """What each of ``filters`` was shown in this beat."""
+        """Messages to each of ``filters`` in this beat."""
         self.now += after_s
         shown: list[list[dict[str, Any]]] = [[] for _ in filters]
         pairs = [

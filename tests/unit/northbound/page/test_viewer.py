@@ -1,4 +1,4 @@
-"""What a tab may say, and what comes of it."""
+"""Messages of a tab, and their effects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whose commands have waited, where only their arrival at zenoh's door is seen."""
+"""Clients whose commands have waited, where only their arrival at zenoh is seen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which query is which request, and what is said to those that are none."""
+"""Requests made of queries, and replies to queries that are none."""
 
 from __future__ import annotations
 

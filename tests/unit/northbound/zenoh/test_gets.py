@@ -43,7 +43,7 @@ class Get:
 
 
 async def turns() -> None:
-    """What is under way comes as far as it can without waiting for anybody."""
+    """Let running tasks go on as far as they can without waiting for anybody."""
     for _ in range(5):
         await asyncio.sleep(0)
 

@@ -1,4 +1,4 @@
-"""Who a zenoh client is, and what its link may do."""
+"""Identity of a zenoh client, and the rights of its link."""
 
 from __future__ import annotations
 

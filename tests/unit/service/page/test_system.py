@@ -1,4 +1,4 @@
-"""What the page says of the service: no secret of the site file, and no failure for want of a file."""
+"""Facts of the service for the page: no secret of the site file, and no failure for want of a file."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ class Pair:
         self.compare("the start")
 
     def serve(self, until: float) -> None:
-        """As a shell does: each node exactly when it asks for it."""
+        """Serve each node exactly when it asks for it, as a shell does."""
         while (due := self.quick.next_deadline()) is not None and due <= until:
             self.now = max(self.now, due)
             self.on_time()
@@ -167,7 +167,7 @@ class Pair:
 
 
 class Traffic:
-    """What a master says again and again, and what comes in between."""
+    """Frames that a master repeats, and others in between."""
 
     def __init__(self, family: Family, random: Random) -> None:
         self._family = family

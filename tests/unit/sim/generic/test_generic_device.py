@@ -42,7 +42,7 @@ def described(folder: Path, file: str) -> GenericNode:
 
 
 def sent(node: SimulatedDevice, cob_id: int, begin_s: float, end_s: float) -> list[bytes]:
-    """What the node sends with this identifier within that time."""
+    """Data that the node sends with this identifier within that time."""
     found: list[bytes] = []
     now = begin_s
     while now < end_s:

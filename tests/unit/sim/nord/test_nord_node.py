@@ -1,4 +1,4 @@
-"""What every NORD node has in common, whatever stands behind it."""
+"""Behaviour that all NORD nodes have in common, whatever stands behind them."""
 
 from __future__ import annotations
 

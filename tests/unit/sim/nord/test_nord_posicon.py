@@ -59,7 +59,7 @@ def test_it_goes_to_the_position_and_stops_there(axis: Axis):
 
 
 def test_the_position_gives_the_direction(axis: Axis):
-    """Whatever bit 11 and bit 12 say."""
+    """Bit 11 and bit 12 do not matter."""
     axis.send(0x0C7F, -12.345)
     axis.wait(0.5)
     assert axis.drive.status_word & TURNS_LEFT

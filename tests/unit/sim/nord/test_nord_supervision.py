@@ -1,4 +1,4 @@
-"""What a NORD node supervises and reports (BU 2500 §7.1.1, §8.1, §8.2)."""
+"""Supervision and reports of a NORD node (BU 2500 §7.1.1, §8.1, §8.2)."""
 
 from __future__ import annotations
 

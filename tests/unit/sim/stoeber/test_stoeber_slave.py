@@ -1,4 +1,4 @@
-"""Where the slave of CAN 5000 deviates from CiA 301 (ID 441684.06 §7 … §9)."""
+"""Deviations of CAN 5000's slave from CiA 301 (ID 441684.06 §7 … §9)."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ import typer
 
 from bridge import __version__
 from bridge.base.errors import Unavailable
+from bridge.catalogue import Catalogue
 from bridge.cli.bus import AsJson, BusName, CliBus, carry_out, print_table, tell
 from bridge.cli.terminal import progress
 from bridge.command import Plant
@@ -98,7 +99,7 @@ def audit_drives(
     each bus that cannot be opened."""
     verdict = lint(project.site, project.families, project.path, project.downloads)
     cases = {case.drive: case for case in verdict.worst_cases}
-    plant = Plant(project.site, project.families, __version__)
+    plant = Plant(Catalogue.of(project.site, project.families), __version__)
     for table in project.site.bus:
         if only not in (None, table.name):
             continue

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import msgspec
 
+from bridge.catalogue.codes import CONDITIONS
 from bridge.condition.causes import Known, Shown
 from bridge.condition.findings import Rank, Trouble
 from bridge.condition.recent import Ended
@@ -14,8 +15,6 @@ from bridge.text import Text, as_json, in_english
 
 MOST: Final = 100
 """Troubles in one text; each explains at most as many. The worst come first."""
-CONDITIONS: Final = ((0, "ok"), (1, "warning"), (2, "alarm"), (3, "danger"))
-"""How bad it is at a place, as points number it."""
 _encode = msgspec.json.Encoder().encode
 
 

@@ -12,6 +12,7 @@ from typing import Final
 
 import pytest
 
+from bridge.catalogue import rights_of
 from bridge.command import (
     Action,
     Code,
@@ -27,7 +28,6 @@ from bridge.command import (
     WriteParameter,
 )
 from bridge.command.leg.state import Timer
-from bridge.command.rights import rights_of
 from bridge.config import load_site
 from bridge.image import Point, Quality
 from bridge.mapping import family_names
@@ -129,7 +129,7 @@ class Client:
 def test_a_register_is_exported_as_writable_where_it_can_be_written(tmp_path: Path, kind: Kind) -> None:
     bench = kind.bench(tmp_path)
     client = Client(bench)
-    for drive_map in drive_maps(bench.plant):
+    for drive_map in drive_maps(bench.plant.catalogue):
         image, name = bench.plant.image, drive_map.drive_name
         unserved = {
             point.name.removeprefix(f"{name}/")
@@ -194,13 +194,15 @@ def test_a_point_is_exported_as_writable_where_it_can_be_written(
 ) -> None:
     bench = kind.bench(tmp_path)
     plant = bench.plant
-    asker, rights = Asker(bench, source), rights_of(plant, source)
+    asker, rights = Asker(bench, source), rights_of(plant.catalogue, source)
     for point in plant.image.points:
         if point.writable:
             outcome = asker.write(point)
             if outcome.code is Code.NOT_CONFIGURED and "/command/" in point.name:
                 continue  # as above
-            assert rights.may_write(plant, point) == (outcome.code not in NEVER), f"{point.name}: {outcome}"
+            assert rights.may_write(plant.catalogue, point) == (outcome.code not in NEVER), (
+                f"{point.name}: {outcome}"
+            )
 
 
 @pytest.mark.parametrize("mapping", family_names())
@@ -210,7 +212,11 @@ def test_every_row_says_what_it_is(mapping: str) -> None:
         sites.bus(sites.node(sites.drive(family.slot[0].name, "modbus", 0, ""), mapping=mapping))
     )
     plant: Plant = sites.plant_of(text, mapping)
-    rows = list(itertools.chain(units_of(plant).bridge_rows, *(one.rows for one in drive_maps(plant))))
+    rows = list(
+        itertools.chain(
+            units_of(plant.catalogue).bridge_rows, *(one.rows for one in drive_maps(plant.catalogue))
+        )
+    )
     assert [row.name for row in rows if not row.description] == []
     assert [point.name for point in plant.image.points if not point.description] == []
     bits = [row for row in rows if row.type == "bool"]

@@ -22,6 +22,7 @@ from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
 
 from bridge.base.sources import source_of
+from bridge.catalogue import Catalogue
 from bridge.command import Role
 from bridge.condition.layout import layout_of
 from bridge.config import PageTable, Site, UserTable
@@ -147,7 +148,7 @@ class Page:
             Route("/api/logout", self._logout, methods=["POST"]),
             *Integration(site, backstage.exports, self._is_inside).routes,
             *Parameters(
-                holders_of(site, families),
+                holders_of(Catalogue.of(site, families)),
                 backstage.counts,
                 backstage.dictionaries,
                 body_of,

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.canopen.frame import Frame
+from bridge.catalogue import Catalogue
 from bridge.cli.app import make_app
 from bridge.command import Plant
 from bridge.drive import OwnVerdict
@@ -116,7 +117,7 @@ def test_audit_has_them_beside_the_drives(tmp_path: Path) -> None:
 )
 def test_the_node_is_asked(tmp_path: Path, watch_ms: int, mode: int, verdict: OwnVerdict) -> None:
     project = project_of(tmp_path, OWNED)
-    plant = Plant(project.site, project.families, "0")
+    plant = Plant(Catalogue.of(project.site, project.families), "0")
     simulated = simulate_description(description_of("io16.eds"), 21)
     simulated.start(0.0)
     word = (127 << 16 | watch_ms).to_bytes(4, "little")

@@ -91,7 +91,7 @@ def test_an_event_without_a_known_cause_names_none(box: Box) -> None:
 
 
 def test_an_unproven_stop_is_in_every_summary(box: Box) -> None:
-    unit = BridgeUnit(units_of(box.plant), view_of(box.plant))
+    unit = BridgeUnit(units_of(box.plant.catalogue), view_of(box.plant))
     (before,) = unit.read_words(Table.INPUT_REGISTER, 0, 1, PLC)
     assert before >> 8 == 0
     name = "press/fu1/supervision/worst_case_bridge_ms"

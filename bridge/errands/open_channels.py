@@ -6,7 +6,7 @@ from bridge.canopen import nmt
 from bridge.canopen.dialogue import Dialogue, Read, Write, ask
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoError
-from bridge.command.node import Node
+from bridge.catalogue import NodeSpec
 from bridge.errands.errand import SdoErrands
 from bridge.node.boot import Action, BootError, BootResult, Nmt
 from bridge.node.boot.sdo_servers import open_sdo_servers
@@ -19,7 +19,7 @@ _Failure = SdoError | BootError
 class OpenChannels(SdoErrands):
     """``notes`` says what was opened, ``failure`` why something could not be."""
 
-    def __init__(self, node: Node, now: float) -> None:
+    def __init__(self, node: NodeSpec, now: float) -> None:
         self._sdo = SdoChannels(node)
         super().__init__(self._sdo, now)
         self.failure = ""

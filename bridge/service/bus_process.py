@@ -92,7 +92,7 @@ class Service:
         self._networks = [network for _, network in networks]
         self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm, clock.suspended_s)
         self.view = PlantView(self.plant, clock.now, clock.epoch_ns, self.master.carry_out, self.master.wake)
-        self.condition = PlantCondition(self.plant, project.families, clock.now, clock.epoch_ns)
+        self.condition = PlantCondition(self.plant, clock.now, clock.epoch_ns)
         self.modbus = None
         if site.modbus:
             self.modbus = ModbusServer(self.view, units_of(catalogue), site.modbus, clock.now)

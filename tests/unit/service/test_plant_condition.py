@@ -17,7 +17,6 @@ from bridge.northbound.zenoh.keys import event_json
 from bridge.service.event_log import log_event
 from bridge.service.plant_condition import PlantCondition
 from tests.support import sites
-from tests.support.condition import families_of
 from tests.support.views import view_of
 
 PLC = Identity(Source.MODBUS, "plc")
@@ -32,8 +31,7 @@ class Box:
         self.now = 100.0
         self.events: list[Event] = []
         self.plant.on_event(self.events.append)
-        families = families_of(self.plant)
-        self.condition = PlantCondition(self.plant, families, lambda: self.now, lambda at: round(at * 1e9))
+        self.condition = PlantCondition(self.plant, lambda: self.now, lambda at: round(at * 1e9))
         self.plant.set("bus/can0/state", 0, self.now)
         for node in self.plant.nodes.values():
             self.plant.on_node(node, NodeState.OPERATIONAL, self.now, tell=False)

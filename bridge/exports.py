@@ -10,12 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from bridge import __version__
 from bridge.base.errors import OperationFailed
-from bridge.command import Plant, Source
-from bridge.command.rights import rights_of
+from bridge.catalogue import Catalogue, Source, rights_of
 from bridge.dbc import BusDescription, describe
-from bridge.image import Point
+from bridge.image.point import Point
 from bridge.lint import family_dictionaries
 from bridge.lint.bus import view_bus
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row
@@ -53,28 +51,28 @@ class Table:
 
 def modbus_table(project: Project) -> Table:
     """Every register: unit, table, 0-based address, 1-based reference, name, type, access, unit."""
-    plant = _plant(project)
+    catalogue = _catalogue(project)
     rows = [
         (drive_map.unit_id, drive_map.drive_name, *_register(row))
-        for drive_map in drive_maps(plant)
+        for drive_map in drive_maps(catalogue)
         for row in drive_map.rows
     ]
     rows += [
         (device.unit_id, device.device_name, *_register(row))
-        for device in device_maps(plant)
+        for device in device_maps(catalogue)
         for row in device.rows
     ]
-    rows += [(BRIDGE_UNITS[0], "bridge", *_register(row)) for row in units_of(plant).bridge_rows]
+    rows += [(BRIDGE_UNITS[0], "bridge", *_register(row)) for row in units_of(catalogue).bridge_rows]
     return Table(_MODBUS, list(rows))
 
 
 def opcua_table(project: Project) -> Table:
     """Every variable: NodeId, data type, unit, access, description."""
-    plant = _plant(project)
-    rights = rights_of(plant, Source.OPCUA)
+    catalogue = _catalogue(project)
+    rights = rights_of(catalogue, Source.OPCUA)
     rows = [
-        (f"nsu={_NAMESPACE};s={point.name}", *_point(point, is_writable=rights.may_write(plant, point)))
-        for point in plant.image.points
+        (f"nsu={_NAMESPACE};s={point.name}", *_point(point, is_writable=rights.may_write(catalogue, point)))
+        for point in catalogue.points
     ]
     return Table(("node_id", *_POINT), list(rows))
 
@@ -83,12 +81,12 @@ def zenoh_table(project: Project) -> Table:
     """Every key: data type, unit, access, description. Raises ``OperationFailed`` without zenoh."""
     if project.site.zenoh is None:
         raise OperationFailed(f"{project.path} has no [zenoh] table")
-    plant = _plant(project)
-    points = plant.image.points
+    catalogue = _catalogue(project)
+    points = catalogue.points
     space = KeySpace(project.site.zenoh.prefix, project.site.site.name, points)
-    rights = rights_of(plant, Source.ZENOH)
+    rights = rights_of(catalogue, Source.ZENOH)
     rows = [
-        (key, *_point(point, is_writable=rights.may_write(plant, point)))
+        (key, *_point(point, is_writable=rights.may_write(catalogue, point)))
         for key, point in zip(space.keys, points, strict=True)
     ]
     return Table(("key", *_POINT), list(rows))
@@ -113,8 +111,8 @@ def _point(point: Point, *, is_writable: bool) -> tuple[object, ...]:
     return (point.data_type.value, point.unit, "rw" if is_writable else "r", point.description)
 
 
-def _plant(project: Project) -> Plant:
-    return Plant(project.site, project.families, __version__)
+def _catalogue(project: Project) -> Catalogue:
+    return Catalogue.of(project.site, project.families)
 
 
 def _dbc_writer() -> Callable[[BusDescription], str]:

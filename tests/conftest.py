@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-import bridge.command.plant
+import bridge.catalogue.site
 import bridge.mapping
 import bridge.mapping.site
 from bridge.mapping import Family
 from bridge.mapping.loader import load_family, mappings_dir
-from bridge.parameter.names import Names
+from bridge.parameter import AxisNames
 from tests.support.leaks import leaves_nothing, module_leaves_nothing
 from tests.support.nightly import pytest_collection_modifyitems, pytest_configure
 
@@ -30,18 +30,18 @@ def _load_family(name: str, folders: Sequence[Path] = ()) -> Family:
 
 bridge.mapping.load_family = bridge.mapping.site.load_family = _load_family
 
-_names: dict[int, tuple[Family, Names]] = {}
+_names: dict[int, tuple[Family, AxisNames]] = {}
 
 
-def _names_of(family: Family) -> Names:
-    """Nothing changes them either: one for each family, however many plants have it."""
+def _names_of(family: Family) -> AxisNames:
+    """Nothing changes them either: one for each family, however many catalogues have it."""
     kept = _names.get(id(family))
     if kept is None or kept[0] is not family:
-        kept = _names[id(family)] = family, Names(family)
+        kept = _names[id(family)] = family, AxisNames(family)
     return kept[1]
 
 
-bridge.command.plant.Names = _names_of
+bridge.catalogue.site.AxisNames = _names_of
 
 
 def pytest_collection() -> None:

@@ -7,7 +7,7 @@ from bridge.canopen import nmt
 from bridge.canopen.dialogue import Dialogue, Read, Write, ask
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoError
-from bridge.command.node import Node
+from bridge.catalogue import NodeSpec
 from bridge.node.boot import Action, BootError, BootResult, Nmt
 from bridge.node.boot.sdo_servers import open_sdo_servers
 from bridge.node.places.sdo_channels import FIRST, SdoChannels
@@ -20,7 +20,7 @@ class OpenChannels(SdoTasks):
     """Task that opens them. ``notes`` lists those that were opened, ``failure`` is the reason why one could
     not be."""
 
-    def __init__(self, node: Node, now: float) -> None:
+    def __init__(self, node: NodeSpec, now: float) -> None:
         self._sdo = SdoChannels(node)
         super().__init__(self._sdo, now)
         self.failure = ""

@@ -19,6 +19,7 @@ from bridge.base.errors import OperationFailed
 from bridge.bustools.bystander import command_ids
 from bridge.bustools.drop_test import DropTest, ForeignMaster, Phase
 from bridge.bustools.muted_bus import MutableBus
+from bridge.catalogue import Catalogue
 from bridge.cli import drop_report
 from bridge.cli.bus import AsJson, CliBus, carry_out, not_virtual, tell
 from bridge.cli.stopping import until_stopped
@@ -144,7 +145,7 @@ def alone(site: Site, bus: BusTable, node: NodeTable) -> Site:
 def perform(project: Project, bus: BusTable, node: NodeTable) -> tuple[Plant, DropTest]:
     """The test on the drives of ``node``. Raises ``OperationFailed`` if it was interrupted."""
     site, families = alone(project.site, bus, node), project.families
-    plant = Plant(site, families, __version__, clock.now())
+    plant = Plant(Catalogue.of(site, families), __version__, clock.now())
     file = LedgerFile(Path(site.site.state_dir))
     _count(file, plant)
     try:

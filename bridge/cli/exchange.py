@@ -13,9 +13,9 @@ from typing import Annotated, Any
 
 import typer
 
-from bridge import __version__
 from bridge.base.errors import OperationFailed
 from bridge.bustools.open_channels import OpenChannels
+from bridge.catalogue import Catalogue
 from bridge.cli import drop_report, drop_test, exchange_report
 from bridge.cli.bus import AsJson, CliBus, carry_out, tell
 from bridge.cli.exchange_report import Exchange
@@ -30,7 +30,6 @@ from bridge.cli.parameter_backup import (
 )
 from bridge.cli.parameter_drive import SiteArgument, Target, find
 from bridge.cli.parameter_sets import write_all
-from bridge.command import Plant
 from bridge.config import BusTable, NodeTable
 from bridge.parameter import backups
 from bridge.parameter.backup_file import BackupFile
@@ -224,7 +223,7 @@ def _judge(
 
 def _open_channels(project: Project, bus: BusTable, name: str) -> None:
     """A new interface may have only its first SDO channel open, which does not reach all of its drives."""
-    node = Plant(project.site, project.families, __version__).nodes[name]
+    node = Catalogue.of(project.site, project.families).nodes[name]
     task = carry_out(CliBus(bus, project.families, is_of_site=True), lambda now: OpenChannels(node, now))
     for note in task.notes:
         tell(f"{name}: {note}")

@@ -10,13 +10,11 @@ from typing import Annotated, Any
 
 import typer
 
-from bridge import __version__
 from bridge.base.errors import Unavailable
 from bridge.bustools.own_check import OwnCheck
+from bridge.catalogue import Catalogue, DeviceSpec, DriveSpec, NodeSpec
 from bridge.cli.bus import AsJson, BusName, CliBus, carry_out, print_table, tell
 from bridge.cli.terminal import progress
-from bridge.command import Plant
-from bridge.command.node import Node
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.lint import WorstCase, lint
 from bridge.mapping.own_places import OwnWant, channels_needed, suggested, suggested_ms
@@ -39,7 +37,7 @@ _Answers = tuple[dict[str, OwnJudgement], dict[str, str]]
 class Audited:
     """One drive. ``failure``: why its node could not be asked."""
 
-    node: Node
+    node: NodeSpec
     case: WorstCase
     was_read: bool
     failure: str = ""
@@ -98,11 +96,11 @@ def audit_drives(
     each bus that cannot be opened."""
     verdict = lint(project.site, project.families, project.path, project.downloads)
     cases = {case.drive: case for case in verdict.worst_cases}
-    plant = Plant(project.site, project.families, __version__)
+    catalogue = Catalogue.of(project.site, project.families)
     for table in project.site.bus:
         if only not in (None, table.name):
             continue
-        nodes = [one for one in plant.nodes.values() if one.bus is table and one.table.enabled]
+        nodes = [one for one in catalogue.nodes.values() if one.bus is table and one.table.enabled]
         nodes = [one for one in nodes if of_node in ("", one.name)]
         answers: _Answers | None = None
         if not offline and table.interface == "virtual":
@@ -110,7 +108,7 @@ def audit_drives(
         elif not offline:
             answers = _ask(CliBus(table, project.families, is_of_site=True), nodes, unavailable)
         for node in nodes:
-            for drive in node.commanded:
+            for drive in _commanded(node):
                 case = cases.get(drive.name)
                 if case is None:  # nobody commands it
                     continue
@@ -125,7 +123,14 @@ def audit_drives(
                 yield Audited(node, found, own is not None, failure)
 
 
-def _ask(line: CliBus, nodes: Sequence[Node], unavailable: list[str]) -> _Answers:
+def _commanded(node: NodeSpec) -> Sequence[DriveSpec | DeviceSpec]:
+    """Its drives, or the device that it is instead where that has outputs."""
+    if node.device:
+        return [node.device] if node.device.is_commanded else []
+    return node.drives
+
+
+def _ask(line: CliBus, nodes: Sequence[NodeSpec], unavailable: list[str]) -> _Answers:
     try:
         with progress(f"bus {line.table.name}"):
             task = carry_out(line, lambda now: OwnCheck(nodes, now))

@@ -11,9 +11,10 @@ from typing import Annotated, Any
 import typer
 
 from bridge.base.errors import Fault, FileFaults
+from bridge.catalogue import Catalogue
 from bridge.cli.terminal import printable
 from bridge.lint import Severity, Verdict, lint
-from bridge.project import Project, count, load_project
+from bridge.project import count, load_project
 
 
 def check(
@@ -23,6 +24,7 @@ def check(
     """Check SITE and the mappings it uses, and predict its bus load; every fault in one run."""
     try:
         project = load_project(site)
+        catalogue = Catalogue.of(project.site, project.families)
     except FileFaults as error:
         if as_json:
             faults = [_fault(fault, Severity.ERROR) for fault in error.faults]
@@ -32,7 +34,7 @@ def check(
     verdict = lint(project.site, project.families, project.path, project.downloads)
     errors = verdict.of(Severity.ERROR)
     if as_json:
-        print(json.dumps(_as_json(project, verdict), indent=2))
+        print(json.dumps(_as_json(catalogue, verdict), indent=2))
         if errors:
             raise typer.Exit(FileFaults.exit_code)
         return
@@ -48,43 +50,24 @@ def check(
         print(exposure)
     if errors:
         raise FileFaults([finding.fault for finding in errors])
-    print(f"{site}: {_served(project)} on {count(len(project.site.bus), 'bus')}, no faults")
+    print(f"{site}: {_served(catalogue)} on {count(len(project.site.bus), 'bus')}, no faults")
 
 
-def _served(project: Project) -> str:
-    drives, devices = _drives(project), _devices(project)
+def _served(catalogue: Catalogue) -> str:
+    drives, devices = catalogue.drives, catalogue.devices
     parts = [count(len(drives), "drive")] if drives or not devices else []
     return " and ".join([*parts, *([count(len(devices), "device")] if devices else [])])
 
 
-def _devices(project: Project) -> list[str]:
-    """The nodes that are no drives."""
-    return [
-        node.name
-        for bus in project.site.bus
-        for node in bus.node
-        if project.families[node.mapping_key].is_device
-    ]
-
-
-def _drives(project: Project) -> list[str]:
-    return [
-        f"{node.name}/{project.families[node.mapping_key].leaf_of(drive)}"
-        for bus in project.site.bus
-        for node in bus.node
-        for drive in node.drive
-    ]
-
-
-def _as_json(project: Project, verdict: Verdict) -> dict[str, Any]:
+def _as_json(catalogue: Catalogue, verdict: Verdict) -> dict[str, Any]:
     found = {
         severity: [_fault(finding.fault, severity) for finding in verdict.of(severity)]
         for severity in Severity
     }
     return {
         "ok": not found[Severity.ERROR],
-        "drives": _drives(project),
-        "devices": _devices(project),
+        "drives": list(catalogue.drives),
+        "devices": list(catalogue.devices),
         "buses": [asdict(load) for load in verdict.loads],
         "intruders": [asdict(exposure) for exposure in verdict.exposures],
         "worst_cases": [

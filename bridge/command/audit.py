@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
 from bridge.base.ratelimit import RateLimit
-from bridge.command.messages.life_sign import LEAF as LIFE_SIGN
+from bridge.catalogue.points import LIFE_SIGN
 from bridge.command.messages.request import (
     Action,
     Code,

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from bridge.catalogue.codes import WatchdogState
 from bridge.command.leg import event, owners
 from bridge.command.leg.effect import (
     Answer,
@@ -26,7 +27,7 @@ from bridge.command.leg.effect import (
 )
 from bridge.command.leg.outlook import next_deadline, output_then, until, watchdog_state
 from bridge.command.leg.settings import LegSettings
-from bridge.command.leg.state import WANTS_STOP_WORD, LegState, Output, WatchdogState, Way
+from bridge.command.leg.state import WANTS_STOP_WORD, LegState, Output, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.link import Link, NodeState
 from bridge.command.messages.event import Event, Kind

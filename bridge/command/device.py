@@ -6,15 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from bridge.catalogue import DeviceSpec
 from bridge.command.drive import Identification
 from bridge.command.link import REASONS, Link, NodeState
 from bridge.command.messages.request import Identity, Role
 from bridge.command.outputs import Outputs, Telling
-from bridge.config import NodeTable
 from bridge.image import Image, Quality, Value
 from bridge.mapping.device import Signal
 from bridge.mapping.fields import ObjectRef
-from bridge.mapping.model import Family
 from bridge.text import Text
 
 
@@ -50,9 +49,9 @@ class _InputTpdo:
 class Device:
     """One node: its inputs, and its outputs where it has some. Times are monotonic seconds."""
 
-    def __init__(self, node: NodeTable, family: Family, unit_id: int, image: Image) -> None:
+    def __init__(self, spec: DeviceSpec, image: Image) -> None:
+        node, family = spec.node, spec.family
         self.name = node.name
-        self.unit_id = unit_id
         self.family = family
         self._hold_ms = node.hold_ms
         self._image = image
@@ -178,15 +177,6 @@ class Device:
         if identity.role < Role.OPERATOR:
             return Text.of("request.may_only_read", who=str(identity))
         return None
-
-    @property
-    def control(self) -> str:
-        """Who may command its outputs."""
-        return self.outputs.table.control if self.outputs else "none"
-
-    @property
-    def stop_by_anyone(self) -> bool:
-        return self.outputs is not None and self.outputs.table.stop_by_anyone
 
     @property
     def refused_writes(self) -> int:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from bridge.catalogue import DriveSpec
+from bridge.catalogue.points import LIFE_SIGN
 from bridge.command.actual import ActualData
 from bridge.command.commanded import WordTiming
 from bridge.command.deadlines import NOW
@@ -13,18 +15,16 @@ from bridge.command.drive_channel import DriveChannel
 from bridge.command.link import FurtherTpdo
 from bridge.command.meaning_news import MeaningNews
 from bridge.command.messages.event import Event
-from bridge.command.messages.life_sign import LEAF as LIFE_SIGN
 from bridge.command.messages.request import Identity
 from bridge.command.setpoint_doubts import InForce, in_force
 from bridge.command.stop_check.drive import DriveStopCheck
 from bridge.command.stop_check.state import Verdict
 from bridge.command.stop_check.words import drive_says, ignored_by_drive
 from bridge.command.worst_case import StopTime, Wire, stop_time
-from bridge.config import BusTable, DriveTable, NodeTable
 from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
 from bridge.drive.own_supervision import why_silence_does_not_stop
-from bridge.image import Image, Point, Quality, Value
-from bridge.mapping.model import Family, Meaning, Slot
+from bridge.image import Image, Quality, Value
+from bridge.mapping.model import Meaning
 from bridge.text import Text
 
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
@@ -71,30 +71,23 @@ class Drive(WordTiming):
 
     def __init__(
         self,
-        node: NodeTable,
-        bus: BusTable,
-        table: DriveTable,
-        family: Family,
-        unit_id: int,
+        spec: DriveSpec,
         image: Image,
-        points: Mapping[str, list[Point]],
         report: Callable[[Event], None],
         settled: Callable[[Drive, float], None],
         tripped: Callable[[float], None],
         due: Callable[[float], None],
     ) -> None:
-        super().__init__(bus)
-        self.name = f"{node.name}/{family.leaf_of(table)}"
-        self.node_name = node.name
-        self._node = node
-        self.unit_id = unit_id
-        self.slot: Slot = family.slot_named(table.slot)
-        family = self.family = family.of_slot(self.slot)
+        super().__init__(spec.bus)
+        self.spec = spec
+        self.name, self.node_name = spec.name, spec.node.name
+        self.slot = spec.slot
+        family, table = self.family, self.table = spec.family, spec.table
         self.channel = DriveChannel(
             self.name,
             family,
             table,
-            node.hold_ms,
+            spec.node.hold_ms,
             report,
             settled=lambda now: settled(self, now),
             tripped=tripped,
@@ -105,8 +98,7 @@ class Drive(WordTiming):
         self.own: OwnJudgement | None = None
         """What it does by itself when the bridge falls silent; None until the boot-up has read it, and empty
         where that is not true any more."""
-        self.sync_period_ms = bus.sync_period_ms
-        self.table = table
+        self.sync_period_ms = spec.bus.sync_period_ms
         self.given_parameters = table.parameters
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
@@ -116,7 +108,6 @@ class Drive(WordTiming):
         self.on_unchanged_data = self._actual.on_unchanged_data
         self.on_further_data = self._actual.on_further_data
         self._image = image
-        self.points = points[self.name]
         self._find_points()
         self.news = MeaningNews(self, report)
 
@@ -241,7 +232,7 @@ class Drive(WordTiming):
     def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
         """What the drive does by itself when the bridge falls silent, as the boot-up has read it."""
         self.own = own
-        self.channel.on_own_watch(why_silence_does_not_stop(self.family, own, self._node), now)
+        self.channel.on_own_watch(why_silence_does_not_stop(self.family, own, self.spec.node), now)
         self._refresh_supervision(now)
         if own.verdict is OwnVerdict.STOPS or own.accepted:
             self._image.set(self._bridge_ms, own.bridge_ms, now, Quality.GOOD, own.accepted)

@@ -7,25 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 from typing import Final
 
+from bridge.catalogue.codes import NodeState as NodeState
 from bridge.config import IGNORE_ALL_S
 from bridge.image import Quality
 from bridge.text import Text
-
-
-class NodeState(Enum):
-    """What the master knows of the node behind a drive."""
-
-    ABSENT = "not seen yet"
-    BOOTING = "booting"
-    OPERATIONAL = "operational"
-    LOST = "lost"
-    STOPPED = "stopped by command"
-    DISABLED = "disabled"
-    CONFIG_ERROR = "configuration error"
-
 
 REASONS: Final = {
     state: Text.of("quality.node", state=Text.word("node_state", state.value)) for state in NodeState

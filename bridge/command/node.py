@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
+from bridge.catalogue import NodeSpec
 from bridge.command.commanded import Commanded
 from bridge.command.device import Device
 from bridge.command.drive import Drive
 from bridge.command.link import NodeState
 from bridge.command.messages.event import EventQueue
 from bridge.command.messages.request import Action, Identity
-from bridge.config import BusTable, NodeTable
 from bridge.image import Image
 from bridge.mapping.axes import profile_of
-from bridge.mapping.model import Family, ObjectRef
-from bridge.parameter import AxisNames, Ledger, Names
+from bridge.mapping.model import ObjectRef
+from bridge.parameter import Ledger, Names
 from bridge.text import Text
 
 Enforce = Callable[[str, Action, str, float], None]
@@ -50,29 +50,24 @@ class HasParameters(Protocol):
         ...
 
 
-@dataclass(slots=True)
 class Node:
     """A configured node and its drives, or the device that it is instead."""
 
-    bus: BusTable
-    table: NodeTable
-    family: Family
-    axis_names: AxisNames
-    drives: list[Drive] = field(default_factory=list[Drive])
-    device: Device | None = None
-
-    @property
-    def name(self) -> str:
-        return self.table.name
+    def __init__(self, spec: NodeSpec) -> None:
+        self.spec = spec
+        self.name = spec.name
+        self.bus, self.table, self.family = spec.bus, spec.table, spec.family
+        self.drives: list[Drive] = []
+        self.device: Device | None = None
 
     @property
     def names(self) -> Names:
         """The parameters of the node, or of its first axis."""
-        return self.axis_names.of()
+        return self.spec.axis_names.of()
 
     def names_of(self, who: HasParameters) -> Names:
         """The parameters of one of those that the node has."""
-        return self.axis_names.of(who.slot.axis) if isinstance(who, Drive) else self.names
+        return who.spec.names if isinstance(who, Drive) else self.names
 
     def is_of(self, who: HasParameters, ref: ObjectRef) -> bool:
         """An object is that of one who has parameters, and no other drive's of the node: of a node with

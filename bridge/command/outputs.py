@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
+from bridge.catalogue import DeviceSpec
 from bridge.command.channel import Channel
 from bridge.command.commanded import WordTiming
 from bridge.command.deadlines import NOW
@@ -24,11 +25,11 @@ from bridge.command.stop_check.outputs import Answer, OutputStopCheck, Question,
 from bridge.command.stop_check.state import Verdict
 from bridge.command.stop_check.words import ignored_by_outputs
 from bridge.command.worst_case import StopTime, Wire, output_stop_time
-from bridge.config import BusTable, NodeTable, OutputsTable
+from bridge.config import OutputsTable
 from bridge.drive import ControlWords, OwnJudgement
 from bridge.image import Image, Quality, Value
 from bridge.mapping.fields import ObjectRef
-from bridge.mapping.model import ControlWord, Family
+from bridge.mapping.model import ControlWord
 from bridge.text import Text
 
 _SAFE: Final = {"mask": ACTIVE, "value": 0}
@@ -136,19 +137,18 @@ class Outputs(WordTiming):
 
     def __init__(
         self,
-        node: NodeTable,
-        bus: BusTable,
-        family: Family,
+        spec: DeviceSpec,
         image: Image,
         report: Callable[[Event], None],
         settled: Callable[[Outputs, float], None],
         tripped: Callable[[float], None],
         due: Callable[[float], None],
     ) -> None:
-        super().__init__(bus)
+        super().__init__(spec.bus)
+        node = spec.node
         self.name = self.node_name = node.name
         self.table = node.outputs
-        self.words = OutputWords(node.name, family.output, node.outputs.on_expiry)
+        self.words = OutputWords(node.name, spec.family.output, node.outputs.on_expiry)
         self.channel = OutputChannel(
             node.name,
             self.words,

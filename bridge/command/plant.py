@@ -9,19 +9,19 @@ from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain
 from typing import Final
 
-from bridge.base.errors import Fault, FileFaults
 from bridge.base.guard import Guard
 from bridge.base.ratelimit import RateLimit
+from bridge.catalogue import Catalogue, NodeSpec
+from bridge.catalogue.codes import NODE_CODES, NodeState
+from bridge.catalogue.points import CONNECTION_COUNTS
 from bridge.command.audit import AuditTrail, Rejection
 from bridge.command.commanded import Commanded
 from bridge.command.deadlines import Deadlines
 from bridge.command.device import Device
 from bridge.command.drive import Drive
 from bridge.command.ignored_stop import concluded
-from bridge.command.link import NodeState
 from bridge.command.messages.event import Event, EventGate, EventQueue, Kind
 from bridge.command.messages.request import (
     NODE_ACTIONS,
@@ -36,12 +36,10 @@ from bridge.command.messages.request import (
 )
 from bridge.command.node import BusSide, Enforce, Node
 from bridge.command.outputs import Outputs
-from bridge.command.points import CONNECTION_COUNTS, NODE_CODES, site_points
 from bridge.command.stop_check.state import Verdict
 from bridge.config import BusTable, Site
 from bridge.image import Image, Quality, Value
-from bridge.mapping.model import Family
-from bridge.parameter import AxisNames, Ledger
+from bridge.parameter import Ledger
 from bridge.text import Text
 
 CarryOut = Callable[[Request, float, Reply], bool]
@@ -53,8 +51,6 @@ def on_no_bus(request: Request, now: float, reply: Reply) -> bool:
     return False
 
 
-_DEVICE: Final = -1
-"""In place of a drive's number among those of its node."""
 _LONGEST_NAME: Final = 80
 """Clients may call anything a drive."""
 _SEVERITY_MISSED, _MISSED_EVENTS, _MISSED_EVERY_S = 700, 3, 60.0
@@ -68,65 +64,64 @@ class Plant:
     callbacks get the events.
     """
 
-    def __init__(self, site: Site, families: dict[str, Family], version: str, began: float = 0.0) -> None:
-        self.site = site
-        self.began = began
-        self.nodes: dict[str, Node] = {}
-        self.drives: dict[str, Drive] = {}
-        self.devices: dict[str, Device] = {}
-        """Nodes that are no drives, by their names."""
-        self._commanded: dict[str, Commanded] = {}
-        """All drives, and the outputs of devices by their nodes."""
-        self.by_unit: dict[int, Drive] = {}
+    def __init__(self, catalogue: Catalogue, version: str, began: float = 0.0) -> None:
+        self.catalogue, self.began = catalogue, began
+        self.image = Image(catalogue.points)
+        self.audit = AuditTrail(self.image)
         self.eeprom_writes = Ledger()
         """How often parameters were written; whoever keeps it across restarts fills it first."""
         self.events = EventQueue()
         """Events of nodes and buses that nobody has been told of yet."""
-        self._stop_due: float | None = None
-        self._changed: dict[str, set[str]] = {bus.name: set() for bus in site.bus}
         self.unsent_stops: set[Commanded] = set()
         """Drives and outputs with a stop that has not been handed to the bus yet."""
+        self.because: Callable[[Event], Text | str] = lambda event: ""
+        """Finds what has caused an event."""
+        self._stop_due: float | None = None
+        self._changed: dict[str, set[str]] = {bus.name: set() for bus in catalogue.site.bus}
         self._deadlines = Deadlines[Commanded]()
         self._missed_limit = RateLimit(_MISSED_EVENTS, _MISSED_EVERY_S)
         self._listeners: list[Callable[[Event], None]] = []
         self._outcomes: deque[tuple[Reply, Outcome]] = deque()
-        self._gate = EventGate()
-        self._guard = Guard("event")
-        self.because: Callable[[Event], Text | str] = lambda event: ""
-        """Finds what has caused an event."""
+        self._gate, self._guard = EventGate(), Guard("event")
         self._refused_by_others = 0
         self._is_closing = False
-        self._buses = frozenset(f"bus/{bus.name}" for bus in site.bus)
-        names = {mapping: AxisNames(family) for mapping, family in families.items()}
-        points = site_points(site, families, {mapping: one.of() for mapping, one in names.items()})
-        self.image = Image(chain.from_iterable(points.values()))
-        self.audit = AuditTrail(self.image)
-        units = _unit_ids(site)
-        for bus in site.bus:
-            for table in bus.node:
-                family = families[table.mapping_key]
-                node = self.nodes[table.name] = Node(bus, table, family, names[table.mapping_key])
-                settled = partial(self._on_settled, node)
-                if family.is_device:
-                    node.device = Device(table, family, units[table.name, _DEVICE], self.image)
-                    self.devices[table.name] = node.device
-                    if family.output:
-                        told = self.report, partial(self._outputs_settled, node), self._tripped, self._due()
-                        node.device.outputs = Outputs(table, bus, family, self.image, *told)
-                        self._add(node.device.outputs)
-                for position, drive_table in enumerate(table.drive):
-                    unit_id = units[table.name, position]
-                    told = self.report, settled, self._tripped, self._due()
-                    drive = Drive(table, bus, drive_table, family, unit_id, self.image, points, *told)
-                    self._add(drive)
-                    node.drives.append(drive)
-                    self.drives[drive.name] = drive
-                    self.by_unit[unit_id] = drive
+        self._commanded: dict[str, Commanded] = {}
+        """All drives, and the outputs of devices by their nodes."""
+        self.nodes = {name: self._node(spec) for name, spec in catalogue.nodes.items()}
+        self.drives = {drive.name: drive for node in self.nodes.values() for drive in node.drives}
+        self.devices = {name: node.device for name, node in self.nodes.items() if node.device}
+        """Nodes that are no drives, by their names."""
+        self._node_points = {name: self._places_of_node(name) for name in self.nodes}
+        self._begin(version)
+
+    def _node(self, spec: NodeSpec) -> Node:
+        """A node with what it commands."""
+        node = Node(spec)
+        if spec.device:
+            node.device = Device(spec.device, self.image)
+            if spec.device.is_commanded:
+                told = self.report, partial(self._outputs_settled, node), self._tripped, self._due()
+                node.device.outputs = Outputs(spec.device, self.image, *told)
+                self._add(node.device.outputs)
+        for one in spec.drives:
+            told = self.report, partial(self._on_settled, node), self._tripped, self._due()
+            drive = Drive(one, self.image, *told)
+            self._add(drive)
+            node.drives.append(drive)
+        return node
+
+    def _places_of_node(self, name: str) -> tuple[int, int, int]:
+        """Places in the image of the state of a node, its present fault and its last one."""
         index = self.image.index
-        self._node_points = {
-            name: [index[f"{name}/node/{leaf}"] for leaf in ("state", "current_fault", "last_fault")]
-            for name in self.nodes
-        }
+        return (
+            index[f"{name}/node/state"],
+            index[f"{name}/node/current_fault"],
+            index[f"{name}/node/last_fault"],
+        )
+
+    def _begin(self, version: str) -> None:
+        """Show what is known from the start."""
+        began = self.began
         for node in self.nodes.values():
             state, current, last = self._node_points[node.name]
             self.image.set(state, NODE_CODES[NodeState.ABSENT], began)
@@ -143,6 +138,10 @@ class Plant:
         self.set("bridge/drives_configured", len(self.drives), began)
         for leaf in CONNECTION_COUNTS:
             self.count(leaf, began, 0)
+
+    @property
+    def site(self) -> Site:
+        return self.catalogue.site
 
     def _due(self) -> Callable[[float], None]:
         """Callback for the deadlines of the next object that is added."""
@@ -289,7 +288,8 @@ class Plant:
     def _report_refusal(
         self, what: str, identity: Identity, target: str, why: Text | str, now: float, count: int = 1
     ) -> None:
-        is_known = target in self.drives or target in self.nodes or target in self._buses
+        is_bus = target.removeprefix("bus/") in self._changed and target.startswith("bus/")
+        is_known = is_bus or target in self.drives or target in self.nodes
         source = target.removeprefix("bus/") if is_known else "bridge"
         unknown = "" if is_known else target[:_LONGEST_NAME]
         who = str(identity) if identity.user else identity.source.label
@@ -461,20 +461,3 @@ def _refused(what: str, target: str, who: str, why: Text | str) -> Text:
     if why:
         return Text.of("request.refused", action=action, who=who, why=reason)
     return Text.of("request.refused_unsaid", action=action, who=who)
-
-
-def _unit_ids(site: Site) -> dict[tuple[str, int], int]:
-    """Modbus unit ids: as given, the others in order from 1. Of a node's drives by their places, of a device
-    at ``_DEVICE``."""
-    nodes = [node for bus in site.bus for node in bus.node]
-    given = {drive.unit_id for node in nodes for drive in node.drive} | {node.unit_id for node in nodes}
-    free = (unit for unit in range(1, 248) if unit not in given)
-    units: dict[tuple[str, int], int] = {}
-    for node in nodes:
-        owners = [(place, drive.unit_id) for place, drive in enumerate(node.drive)]
-        for position, own in owners or [(_DEVICE, node.unit_id)]:
-            unit = own or next(free, 0)
-            if not unit:
-                raise FileFaults([Fault("", 0, "unit_id", "more than 247 drives have no Modbus unit id")])
-            units[node.name, position] = unit
-    return units

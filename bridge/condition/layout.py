@@ -6,10 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from bridge.catalogue import Catalogue
 from bridge.condition.findings import OwnFault
-from bridge.config import Site
 from bridge.image import Point
-from bridge.mapping import Family
 
 MOVES_BY: Final = ("velocity", "frequency", "speed", "position", "torque")
 """Values by which a drive is moved, the most telling first."""
@@ -38,19 +37,14 @@ class Layout:
         return (place,)
 
 
-def layout_of(points: Sequence[Point], site: Site, families: Mapping[str, Family]) -> Layout:
-    """Layout of the site, with the main value of each drive."""
+def layout_of(points: Sequence[Point], catalogue: Catalogue) -> Layout:
+    """Layout of a site, with the main value of each drive by the ``points`` that are served."""
     units = {point.name: point.unit for point in points}
-    nodes = [(bus.name, node) for bus in site.bus for node in bus.node]
-    drives = {
-        f"{node.name}/{families[node.mapping_key].leaf_of(drive)}": node.name
-        for _, node in nodes
-        for drive in node.drive
-    }
+    drives = {drive.name: drive.node.name for drive in catalogue.drives.values()}
     return Layout(
         drives=drives,
-        nodes={node.name: bus for bus, node in nodes},
-        buses=tuple(bus.name for bus in site.bus),
+        nodes={node.name: node.bus.name for node in catalogue.nodes.values()},
+        buses=tuple(bus.name for bus in catalogue.site.bus),
         mains=_mains(drives, units),
     )
 

@@ -3,36 +3,26 @@ trip, and those with which it answers a silent bus. Sans-IO."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TypeVar
 
+from bridge.catalogue import Catalogue
 from bridge.condition.findings import OwnFault
 from bridge.condition.layout import Layout
-from bridge.config import Site
 from bridge.drive import FAULTED, Explained, FaultWords, StatusWords
 from bridge.mapping import Family
 
-_Of = TypeVar("_Of")
 
-
-def with_faults(layout: Layout, site: Site, families: Mapping[str, Family]) -> Layout:
+def with_faults(layout: Layout, catalogue: Catalogue) -> Layout:
     """``layout`` with what its drives say of their faults."""
-    drives = {name: family for name, family in families.items() if not family.is_device}
+    drives = catalogue.drives.values()
+    families = {node.table.mapping_key: node.family for node in catalogue.nodes.values() if node.drives}
+    own = {name: _own_fault(family) for name, family in families.items()}
+    of_bus = {name: _bus_faults(family) for name, family in families.items()}
     return replace(
         layout,
-        own_faults=_by_drive(site, families, {name: _own_fault(family) for name, family in drives.items()}),
-        bus_faults=_by_drive(site, families, {name: _bus_faults(family) for name, family in drives.items()}),
+        own_faults={drive.name: own[drive.node.mapping_key] for drive in drives},
+        bus_faults={drive.name: of_bus[drive.node.mapping_key] for drive in drives},
     )
-
-
-def _by_drive(site: Site, families: Mapping[str, Family], of_family: Mapping[str, _Of]) -> dict[str, _Of]:
-    return {
-        f"{node.name}/{families[node.mapping_key].leaf_of(drive)}": of_family[node.mapping_key]
-        for bus in site.bus
-        for node in bus.node
-        for drive in node.drive
-    }
 
 
 def _own_fault(family: Family) -> OwnFault:

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import msgspec
 
+from bridge.catalogue.codes import CONDITIONS
 from bridge.condition.causes import Known, Shown
 from bridge.condition.findings import Rank, Trouble
 from bridge.condition.recent import Ended
@@ -15,8 +16,6 @@ from bridge.text import Text, as_json, in_english
 
 MOST: Final = 100
 """Troubles in one text; each explains at most as many. The worst come first."""
-CONDITIONS: Final = ((0, "ok"), (1, "warning"), (2, "alarm"), (3, "danger"))
-"""Conditions of a place, as points number them."""
 _encode = msgspec.json.Encoder().encode
 
 

@@ -11,9 +11,9 @@ from typing import Any, Final, TypeVar, cast
 
 import msgspec
 
+from bridge.catalogue.points import CONNECTION_COUNTS
 from bridge.command import Action, Do, Event, Identity, Outcome, Rejection, Request
 from bridge.command.messages.request import COMMANDS
-from bridge.command.points import CONNECTION_COUNTS
 from bridge.image import Point, Quality, Value
 from bridge.text import Text
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bridge.canopen.nmt import NmtState
+from bridge.catalogue.codes import NODE_CODES
 from bridge.command import BusSide, Event, Identification, Kind
 from bridge.command.link import NodeState
 from bridge.command.node import Node
-from bridge.command.points import NODE_CODES
 from bridge.node.backoff import BackOff
 from bridge.node.boot import BootError
 from bridge.node.bootloop import BootLoop

@@ -18,6 +18,7 @@ from bridge.base.notify import Notifier
 from bridge.can import Bus, open_bus
 from bridge.can.softbus import SoftBus
 from bridge.can.wiretap import Wiretap
+from bridge.catalogue import Catalogue
 from bridge.command import Plant, PlantView
 from bridge.config import BusTable
 from bridge.lint import Severity, lint
@@ -79,7 +80,8 @@ class Service:
     ) -> None:
         self.project = project
         site = project.site
-        self.plant = Plant(site, project.families, __version__, clock.now())
+        catalogue = Catalogue.of(site, project.families)
+        self.plant = Plant(catalogue, __version__, clock.now())
         self.plant.on_event(log_event)
         self.wear = WearKeeper(self.plant.eeprom_writes, Path(site.site.state_dir))
         self.audit = AuditLog(self.plant, site, clock.now, clock.epoch_ns)
@@ -91,10 +93,10 @@ class Service:
         self._networks = [network for _, network in networks]
         self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm, clock.suspended_s)
         self.view = PlantView(self.plant, clock.now, clock.epoch_ns, self.master.carry_out, self.master.wake)
-        self.condition = PlantCondition(self.plant, project.families, clock.now, clock.epoch_ns)
-        self.modbus = (
-            ModbusServer(self.view, units_of(self.plant), site.modbus, clock.now) if site.modbus else None
-        )
+        self.condition = PlantCondition(self.plant, clock.now, clock.epoch_ns)
+        self.modbus = None
+        if site.modbus:
+            self.modbus = ModbusServer(self.view, units_of(catalogue), site.modbus, clock.now)
         endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
         period_ms = site.zenoh.period_ms if site.zenoh else _NOBODY_HURRIES_MS
         self.mirror = MirrorPublisher(self.view, endpoint, clock.now, period_ms / 1000)
@@ -130,7 +132,7 @@ class Service:
         return {
             table.name: GatewayServer(
                 self.view,
-                net_of(table, number, self.plant.nodes.values(), taps[table.name]),
+                net_of(table, number, self.plant.catalogue.nodes.values(), taps[table.name]),
                 folder / f"{site.site.name}-{table.name}.gateway",
                 None if table.gateway == "socket" else table.gateway,
                 clock.now,

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
+from bridge.catalogue import Catalogue
 from bridge.config import Site
 from bridge.drive import FaultWords
 from bridge.drive.fault_words import listed_faults
@@ -96,7 +97,8 @@ async def run_page(project: Project, signs: int | None = None, listening: int | 
         table = site.page
         key = "page.listen"
         bound = listen(table.listen, key) if listening is None else ListeningSocket(listening, key)
-        page = Page(mirror, site, project.families, sources_of(project), clock.now, _kept_sessions(site))
+        catalogue = Catalogue.of(site, project.families)
+        page = Page(mirror, catalogue, sources_of(project), clock.now, _kept_sessions(site))
         server = PageServer(page, bound, table.certificate, table.private_key)
         await server.start()
         stack.push_async_callback(server.close)

@@ -13,7 +13,6 @@ from bridge.condition.layout import layout_of
 from bridge.condition.own_faults import with_faults
 from bridge.condition.told import condition, recent_json, troubles_json
 from bridge.condition.troubles import Troubles
-from bridge.mapping import Family
 from bridge.text import Text
 
 LOOK_EVERY_S: Final = 0.5
@@ -38,14 +37,13 @@ class PlantCondition:
     def __init__(
         self,
         plant: Plant,
-        families: dict[str, Family],
         clock: Callable[[], float],
         epoch_ns: Callable[[float], int],
     ) -> None:
         self._plant = plant
         self._clock = clock
         self._epoch_ns = epoch_ns
-        layout = with_faults(layout_of(plant.image.points, plant.site, families), plant.site, families)
+        layout = with_faults(layout_of(plant.image.points, plant.catalogue), plant.catalogue)
         self.troubles = Troubles(plant.image, layout, clock() * 1000)
         self._conditions = {"bridge/condition": ""}
         self._conditions |= {f"bus/{bus}/condition": f"bus/{bus}" for bus in layout.buses}

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.frame import Frame
+from bridge.catalogue import Catalogue
 from bridge.command import Event, Kind, Plant
 from bridge.command.link import NodeState
 from bridge.master.master import Master
@@ -75,7 +76,7 @@ async def crowd(
     """Boot ``nodes`` nodes at the other end of ``bus``, which is ``channel`` (one of ``files``, or an
     interface). ``keys`` are further ones of the site's bus."""
     site = quick_site(folder, nodes, bus=keys, common=NODE)
-    plant = Plant(site, {MAPPING: NORD}, "0", time.monotonic())
+    plant = Plant(Catalogue.of(site, {MAPPING: NORD}), "0", time.monotonic())
     events: list[Event] = []
     plant.on_event(events.append)
     network = Hearing(site.bus[0], plant.side_of(site.bus[0]))

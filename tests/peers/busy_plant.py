@@ -59,7 +59,7 @@ async def main(path: Path) -> None:
     service = Service(project, lambda table: VirtualWire().end(table.name))
     plant = service.plant
     points = plant.image.points
-    layout = layout_of(plant.image, project.site, project.families)
+    layout = layout_of(plant.image.points, plant.catalogue)
     shown = [points[place] for place in topics_of(points, layout)["plant"]]
     first = next(iter(layout.drives))
     own = [one.name for one in points if one.name.startswith(f"{first}/") and one.data_type is DataType.FLOAT]

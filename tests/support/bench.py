@@ -13,6 +13,7 @@ from bridge.can.burstend import Burst
 from bridge.can.interface import BusStatus, ControllerState
 from bridge.can.softbursts import SoftBursts
 from bridge.canopen.frame import Frame
+from bridge.catalogue import Catalogue
 from bridge.command import Action, Event, Identity, Outcome, Plant, PlantView, Request, Source, command_of
 from bridge.config import Site, load_site
 from bridge.mapping import Family, load_family
@@ -130,7 +131,7 @@ class Bench:
         self.events: list[Event] = []
         self.cut = False
         self.deaf_to: frozenset[int] = frozenset()
-        self.plant = Plant(site, {mapping: family}, "0")
+        self.plant = Plant(Catalogue.of(site, {mapping: family}), "0")
         self.plant.on_event(self.events.append)
         self.bus = self.make_bus()
         # Most tests begin where the bridge has listened already.

@@ -5,20 +5,14 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from bridge.command import Plant
 from bridge.condition.layout import layout_of
 from bridge.condition.own_faults import with_faults
 from bridge.condition.told import recent_json, troubles_json
 from bridge.condition.troubles import Troubles
 from bridge.image import Image, Quality, Value
-from bridge.mapping import Family, load_family
 from tests.support import sites
 
 LOOK_EVERY_MS = 500.0
-
-
-def families_of(plant: Plant) -> dict[str, Family]:
-    return {node.mapping: load_family(node.mapping) for bus in plant.site.bus for node in bus.node}
 
 
 class Watched:
@@ -28,9 +22,8 @@ class Watched:
         self.plant = sites.plant_of(site, mapping)
         self.image: Image = self.plant.image
         self.now_ms = 1_000_000.0
-        families = families_of(self.plant)
-        layout = layout_of(self.image.points, self.plant.site, families)
-        self.layout = with_faults(layout, self.plant.site, families)
+        catalogue = self.plant.catalogue
+        self.layout = with_faults(layout_of(self.image.points, catalogue), catalogue)
         self.begin()
         for bus in self.layout.buses:
             self.set(f"bus/{bus}/state", 0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.catalogue import Catalogue
 from bridge.command import Plant
 from bridge.command.node import Node
 from bridge.mapping.site import load_site_and_families
@@ -26,4 +27,4 @@ def device_plant(folder: Path, mapping: str, more: str = "") -> Plant:
     path = folder / "site.toml"
     path.write_text(SITE.format(node=more), encoding="utf-8")
     site, families = load_site_and_families(path)
-    return Plant(site, families, "1.2.3")
+    return Plant(Catalogue.of(site, families), "1.2.3")

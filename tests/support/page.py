@@ -18,8 +18,6 @@ from websockets.frames import Frame, Opcode
 
 from bridge.command import Event, Outcome, Plant, Reply, Request
 from bridge.command.messages.request import DONE
-from bridge.config import Site
-from bridge.mapping import Family
 from bridge.northbound.listening import listen
 from bridge.northbound.page.server import PageServer
 from bridge.northbound.page.web import Page, PageSources
@@ -126,10 +124,8 @@ class Served:
         self.later_s = 0.0
         self.view = PlantView(plant)
         self.system = system or NoSystem()
-        families: dict[str, Family] = {sites.FAMILY: sites.family(sites.FAMILY)}
-        site: Site = plant.site
         sources = PageSources({}, {}, [], {"can0": {}}, capture, dict, {}, self.system)
-        self.page = Page(self.view, site, families, sources, lambda: time.monotonic() + self.later_s, kept)
+        self.page = Page(self.view, plant.catalogue, sources, lambda: time.monotonic() + self.later_s, kept)
         self.bound = listen("127.0.0.1:0", "page.listen")
         self.port = self.bound.getsockname()[1]
         self.origin = f"http://127.0.0.1:{self.port}"

@@ -10,6 +10,7 @@ from pathlib import Path
 from bridge.can.interface import BusStatus
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
+from bridge.catalogue import Catalogue
 from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Role, Source, command_of
 from bridge.config import Site, load_site
 from bridge.mapping import load_family
@@ -137,7 +138,7 @@ class Quick:
         self.log: list[Frame] = []
         self.events: list[Event] = []
         # The manual's family leaves node ids above 63 out; a bus has 127.
-        self.plant = Plant(site, {MAPPING: NORD}, "0", self.now)
+        self.plant = Plant(Catalogue.of(site, {MAPPING: NORD}), "0", self.now)
         self.plant.on_event(self.events.append)
         # These tests begin where the bridge has listened already.
         self.network = Network(site.bus[0], self.plant.side_of(site.bus[0]), listening=Listening(0.0))

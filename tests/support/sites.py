@@ -10,6 +10,7 @@ import tomllib
 from functools import cache
 from pathlib import Path
 
+from bridge.catalogue import Catalogue
 from bridge.command import Plant
 from bridge.config import Site
 from bridge.mapping import load_family
@@ -96,9 +97,14 @@ def write(folder: Path, *tables: str, name: str = "hall") -> Path:
     return path
 
 
+def catalogue_of(text: str, mapping: str = FAMILY) -> Catalogue:
+    """The catalogue of a site's text, all of whose nodes have this mapping."""
+    return Catalogue.of(Site.model_validate(parsed(text)), {mapping: family(mapping)})
+
+
 def plant_of(text: str, mapping: str = FAMILY) -> Plant:
     """The plant of a site's text, all of whose nodes have this mapping, without a bus."""
-    plant = Plant(Site.model_validate(parsed(text)), {mapping: family(mapping)}, "1.2.3")
+    plant = Plant(catalogue_of(text, mapping), "1.2.3")
     has_default_meanings(plant)
     return plant
 

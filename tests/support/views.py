@@ -26,4 +26,4 @@ def dispatcher_of(
     word_order: WordOrder = "ABCD",
     view: PlantView | None = None,
 ) -> Dispatcher:
-    return Dispatcher(view or view_of(plant, clock), units_of(plant), word_order, clock)
+    return Dispatcher(view or view_of(plant, clock), units_of(plant.catalogue), word_order, clock)

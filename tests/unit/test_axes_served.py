@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from bridge.catalogue import Catalogue
 from bridge.cli.simulation import simulated_nodes
 from bridge.drive import OwnVerdict
 from bridge.exports import modbus_table
@@ -127,7 +128,7 @@ def test_points_and_registers_are_alike_for_both(tmp_path: Path) -> None:
 
 def test_the_page_knows_the_objects_of_each(tmp_path: Path) -> None:
     project = site(tmp_path)
-    holders = holders_of(project.site, project.families)
+    holders = holders_of(Catalogue.of(project.site, project.families))
     found = [str(holders[drive].names.resolve("6083").address) for drive in (FIRST, SECOND)]
     assert found == ["6083:00", "6883:00"]
 

@@ -12,6 +12,8 @@ from typing import Final
 
 import pytest
 
+from bridge.catalogue import Catalogue, rights_of
+from bridge.cli.own_check import audit_drives
 from bridge.command import (
     Action,
     Code,
@@ -26,15 +28,20 @@ from bridge.command import (
     Write,
     WriteParameter,
 )
+from bridge.command.channel import Channel
+from bridge.command.commanded import Commanded
 from bridge.command.leg.state import Timer
-from bridge.command.rights import rights_of
 from bridge.config import load_site
-from bridge.image import Point, Quality
+from bridge.exports import dbc_file, modbus_table, opcua_table, zenoh_table
+from bridge.image import Image, Point, Quality
+from bridge.lint import lint
 from bridge.mapping import family_names
 from bridge.northbound.modbus.registers import STOP, Row, Table
 from bridge.northbound.modbus.units import drive_maps, units_of
+from bridge.project import load_project
 from tests.support import sites
 from tests.support.bench import Bench
+from tests.support.process import REPOSITORY
 from tests.support.rig import ENABLE, SHUT_DOWN
 from tests.support.views import dispatcher_of
 
@@ -129,7 +136,7 @@ class Client:
 def test_a_register_is_exported_as_writable_where_it_can_be_written(tmp_path: Path, kind: Kind) -> None:
     bench = kind.bench(tmp_path)
     client = Client(bench)
-    for drive_map in drive_maps(bench.plant):
+    for drive_map in drive_maps(bench.plant.catalogue):
         image, name = bench.plant.image, drive_map.drive_name
         unserved = {
             point.name.removeprefix(f"{name}/")
@@ -194,13 +201,15 @@ def test_a_point_is_exported_as_writable_where_it_can_be_written(
 ) -> None:
     bench = kind.bench(tmp_path)
     plant = bench.plant
-    asker, rights = Asker(bench, source), rights_of(plant, source)
+    asker, rights = Asker(bench, source), rights_of(plant.catalogue, source)
     for point in plant.image.points:
         if point.writable:
             outcome = asker.write(point)
             if outcome.code is Code.NOT_CONFIGURED and "/command/" in point.name:
                 continue  # as above
-            assert rights.may_write(plant, point) == (outcome.code not in NEVER), f"{point.name}: {outcome}"
+            assert rights.may_write(plant.catalogue, point) == (outcome.code not in NEVER), (
+                f"{point.name}: {outcome}"
+            )
 
 
 @pytest.mark.parametrize("mapping", family_names())
@@ -210,7 +219,11 @@ def test_every_row_says_what_it_is(mapping: str) -> None:
         sites.bus(sites.node(sites.drive(family.slot[0].name, "modbus", 0, ""), mapping=mapping))
     )
     plant: Plant = sites.plant_of(text, mapping)
-    rows = list(itertools.chain(units_of(plant).bridge_rows, *(one.rows for one in drive_maps(plant))))
+    rows = list(
+        itertools.chain(
+            units_of(plant.catalogue).bridge_rows, *(one.rows for one in drive_maps(plant.catalogue))
+        )
+    )
     assert [row.name for row in rows if not row.description] == []
     assert [point.name for point in plant.image.points if not point.description] == []
     bits = [row for row in rows if row.type == "bool"]
@@ -305,3 +318,34 @@ def test_holding_register_9_reads_0_and_takes_0_within_a_longer_write(tmp_path: 
     assert client.write(1, 0, SHUT_DOWN, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1) == 0x03
     assert client.write(1, 9, 0) == 0x02
     assert client.read(1, 3, 9, 1) == [0]
+
+
+# no run time
+
+
+class RunTime(Exception):
+    """Somebody has made one."""
+
+
+def refused(*_: object, **__: object) -> None:
+    raise RunTime
+
+
+@pytest.fixture
+def no_run_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    for one in (Plant, Image, Commanded, Channel):
+        monkeypatch.setattr(one, "__init__", refused)
+
+
+@pytest.mark.usefixtures("no_run_time")
+def test_nothing_that_is_told_of_a_site_builds_its_run_time() -> None:
+    project = load_project(REPOSITORY / "bridge" / "demo" / "site.toml")
+    with pytest.raises(RunTime):
+        Plant(Catalogue.of(project.site, project.families), "0")
+    for table in (modbus_table, opcua_table, zenoh_table):
+        assert len(table(project).rows) > 100
+    assert "BO_ " in dbc_file(project, 0)
+    verdict = lint(project.site, project.families, project.path, project.downloads)
+    assert verdict.worst_cases
+    audited = list(audit_drives(project, None, [], offline=True))
+    assert len(audited) == len(verdict.worst_cases)

@@ -311,7 +311,7 @@ class _Visitor:
 async def test_connections_that_come_and_go(log: QuietLog, stranger: str, guest: str) -> None:
     plant = sites.plant_of(SITE)
     table = ModbusTable.model_validate({"allow": ["10.0.0.0/8", "fd00::/8"], "max_connections": 2})
-    server = ModbusServer(view_of(plant, lambda: log.now), units_of(plant), table, lambda: log.now)
+    server = ModbusServer(view_of(plant, lambda: log.now), units_of(plant.catalogue), table, lambda: log.now)
     for number in range(TIMES):
         host = guest.format(number)
         visitor = cast(Session, _Visitor(source=source_of(host)))

@@ -12,6 +12,7 @@ import pytest
 
 from bridge.can.virtual import VirtualWire
 from bridge.canopen.frame import Frame
+from bridge.catalogue import Catalogue
 from bridge.cli.simulation import simulation
 from bridge.command import Plant
 from bridge.config import load_site
@@ -57,7 +58,7 @@ def calls_of(work: Callable[[], object]) -> int:
 
 def loaded(path: Path) -> None:
     project = load_project(path)
-    plant = Plant(project.site, project.families, "0", 0.0)
+    plant = Plant(Catalogue.of(project.site, project.families), "0", 0.0)
     for table in project.site.bus:
         Network(table, plant.side_of(table))
 

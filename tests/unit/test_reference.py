@@ -11,12 +11,13 @@ import typer.main
 from asyncua.ua.status_codes import get_name_and_doc
 
 from bridge import __version__
+from bridge.catalogue import Catalogue
+from bridge.catalogue.codes import CONTROLLER_STATES, NMT_STATES, NODE_STATES, WATCHDOG_STATES
 from bridge.cli.app import make_app
 from bridge.command import Kind, Plant
-from bridge.command.leg.state import WATCHDOG_STATES, Stage
+from bridge.command.leg.state import Stage
 from bridge.command.leg.table import TABLE
 from bridge.command.messages.request import Code
-from bridge.command.points import CONTROLLER_STATES, NMT_STATES, NODE_STATES
 from bridge.config import Reaction, Site
 from bridge.drive import DRIVE_STATES
 from bridge.image import Point, Quality
@@ -87,7 +88,7 @@ def plant() -> Plant:
     project = load_project(DEMO_SITE)
     drives = project.site.bus[0].node[0].drive
     drives[0] = drives[0].model_copy(update={"life_sign": True})
-    return Plant(project.site, project.families, __version__)
+    return Plant(Catalogue.of(project.site, project.families), __version__)
 
 
 def general_name(point: Point) -> str:
@@ -151,7 +152,7 @@ def registers(rows: Iterable[Row]) -> list[tuple[str, str, str, str, str]]:
 
 def test_the_register_map_is_that_of_the_export(plant: Plant) -> None:
     reference = page("reference/modbus.md")
-    drive: DriveMap = drive_maps(plant)[0]
+    drive: DriveMap = drive_maps(plant.catalogue)[0]
     for heading, rows in (
         ("Input registers of a drive", [r for r in drive.rows if r.table is Table.INPUT_REGISTER]),
         ("Holding registers of a drive", [r for r in drive.rows if r.table is Table.HOLDING_REGISTER]),
@@ -161,7 +162,7 @@ def test_the_register_map_is_that_of_the_export(plant: Plant) -> None:
             for row in reference.table(heading)
         ]
         assert shown == registers(rows), heading
-    bridge = [row for row in units_of(plant).bridge_rows if "/" not in row.name]
+    bridge = [row for row in units_of(plant.catalogue).bridge_rows if "/" not in row.name]
     shown = [(row["address"], row["name"], row["unit"]) for row in reference.table("The bridge's own unit")]
     assert shown[:-1] == [(str(row.address), row.name, row.unit or "–") for row in bridge]
 

@@ -106,7 +106,10 @@ async def enabled_after_it_hung(plant: Plant, peer: str, *arguments: object) -> 
 async def test_a_backlog_of_modbus_does_not_keep_a_drive_moving(connections: int, seconds: float) -> None:
     plant = plant_for("modbus")
     server = ModbusServer(
-        view_of(plant), units_of(plant), ModbusTable.model_validate({"listen": "127.0.0.1:0"}), time.monotonic
+        view_of(plant),
+        units_of(plant.catalogue),
+        ModbusTable.model_validate({"listen": "127.0.0.1:0"}),
+        time.monotonic,
     )
     await server.start()
     try:

@@ -174,7 +174,7 @@ class ZenohController(Controller):
 @contextmanager
 def modbus_clients(bridge: FamilyBridge) -> Iterator[Callable[[str], Controller]]:
     with ModbusTcpClient("127.0.0.1", port=bridge.site.port, timeout=_LIMIT_S) as client:
-        drives = bridge.call(lambda: dict(bridge.service.plant.drives))
+        drives = bridge.call(lambda: dict(bridge.service.plant.catalogue.drives))
 
         def make(mapping: str) -> Controller:
             map_ = DriveMap(drives[bridge.site.drives[mapping]])

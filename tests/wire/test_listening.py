@@ -35,7 +35,7 @@ CLIENTS = 20
 async def modbus(folder: Path) -> AsyncIterator[int]:
     plant = make_plant()
     table = ModbusTable.model_validate({"listen": f"{HOST}:0"})
-    server = ModbusServer(view_of(plant), units_of(plant), table, time.monotonic)
+    server = ModbusServer(view_of(plant), units_of(plant.catalogue), table, time.monotonic)
     await server.start()
     try:
         yield server.port

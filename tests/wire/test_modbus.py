@@ -49,7 +49,7 @@ def on_the_bus(plant: Plant) -> tuple[int, ...]:
 @asynccontextmanager
 async def serving(plant: Plant, **settings: object) -> AsyncIterator[ModbusServer]:
     table = ModbusTable.model_validate({"listen": f"{HOST}:0", **settings})
-    server = ModbusServer(view_of(plant), units_of(plant), table, time.monotonic)
+    server = ModbusServer(view_of(plant), units_of(plant.catalogue), table, time.monotonic)
     await server.start()
     try:
         yield server
@@ -261,7 +261,7 @@ async def test_an_owner_that_is_gone_and_not_watched_holds_nobody_up():
         return time.monotonic() + later
 
     table = ModbusTable.model_validate({"listen": f"{HOST}:0"})
-    server = ModbusServer(view_of(plant, clock), units_of(plant), table, clock)
+    server = ModbusServer(view_of(plant, clock), units_of(plant.catalogue), table, clock)
     await server.start()
     try:
         async with pymodbus(server, "127.0.0.2") as other:
@@ -497,7 +497,7 @@ async def test_pymodbus_sees_which_words_and_values_are_not_good(plant: Plant, s
     async with pymodbus(server) as client:
         words, high, low = (await client.read_input_registers(21, count=3, device_id=1)).registers
     assert words == 4
-    rows = [row.name for row in DriveMap(plant.drives["conveyor/fu1"]).inputs]
+    rows = [row.name for row in DriveMap(plant.catalogue.drives["conveyor/fu1"]).inputs]
     bad = {name for place, name in enumerate(rows[:32]) if (high << 16 | low) >> place & 1}
     assert "actual/frequency" not in bad
     assert "identity/serial" in bad, "not read yet"

@@ -62,14 +62,14 @@ def _unread(bridge: FamilyBridge) -> list[str]:
 def _runs(bridge: FamilyBridge) -> Iterator[Asked]:
     plant = bridge.service.plant
     index, image = plant.image.index, plant.image
-    for drive_map in drive_maps(plant):
+    for drive_map in drive_maps(plant.catalogue):
         for run in runs_of(drive_map.rows):
             names = [f"{drive_map.drive_name}/{row.name}" for row in run.rows]
             there = [name not in index or image.read(name).quality.has_value for name in names]
             yield _asked(drive_map.unit_id, run, has_values=any(there))
             if run.table is Table.INPUT_REGISTER:
                 yield Asked(drive_map.unit_id, 3, MIRROR + run.start, run.count, any(there))
-    for run in runs_of(units_of(plant).bridge_rows):
+    for run in runs_of(units_of(plant.catalogue).bridge_rows):
         yield _asked(255, run, has_values=True)
 
 

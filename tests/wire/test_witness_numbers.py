@@ -25,7 +25,7 @@ FU3 = "conveyor/fu3"
 
 async def served(plant: Plant, **settings: object) -> ModbusServer:
     table = ModbusTable.model_validate({"listen": f"{HOST}:0", **settings})
-    server = ModbusServer(view_of(plant), units_of(plant), table, time.monotonic)
+    server = ModbusServer(view_of(plant), units_of(plant.catalogue), table, time.monotonic)
     await server.start()
     return server
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from bridge.catalogue.codes import WatchdogState
 from bridge.command.leg import start
 from bridge.command.leg.due import judge
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.settle import settle
-from bridge.command.leg.state import LegState, Output, WatchdogState
+from bridge.command.leg.state import LegState, Output
 from bridge.command.leg.turn import Turn
 
 

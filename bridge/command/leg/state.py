@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-from enum import IntEnum, StrEnum
+from enum import StrEnum
 from typing import Final, NamedTuple
 
 from bridge.command.messages.request import Identity
 from bridge.drive import DriveState
 from bridge.text import Text
-
-
-class WatchdogState(IntEnum):
-    """The watchdog as others see it, numbered as Modbus serves it (input register 14)."""
-
-    OFF = 0
-    IDLE = 1
-    RUNNING = 2
-    TRIPPED = 3
-
-    @property
-    def label(self) -> str:
-        return self.name.lower()
-
-
-WATCHDOG_STATES: Final = tuple((state.value, state.label) for state in WatchdogState)
 
 
 class Stage(StrEnum):

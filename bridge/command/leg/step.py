@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, Final
 
+from bridge.catalogue.points import LIFE_SIGN
 from bridge.command.leg import alive, order, owners, reports, start
 from bridge.command.leg.deeds import About, happen
 from bridge.command.leg.due import judge, run_out
@@ -37,7 +38,6 @@ from bridge.command.leg.turn import Turn
 from bridge.command.leg.words import at_rest, control_word
 from bridge.command.messages.event import Kind
 from bridge.command.messages.freshness import TAKEN_LATE, arrival_of, is_stale, limit_ms_of
-from bridge.command.messages.life_sign import LEAF
 from bridge.command.messages.request import (
     DONE,
     STOP_ACTIONS,
@@ -193,9 +193,9 @@ def _write(turn: Turn, request: Request, values: Mapping[str, Value]) -> None:
     is_owner = request.identity.goes_on_as(turn.owner.identity)
     # A new owner inherits no setpoints.
     kept = turn.setpoints if is_owner else turn.rest
-    alive_until = alive.read(turn, request.identity, values.get(LEAF))
-    if LEAF in values:
-        values = {name: value for name, value in values.items() if name != LEAF}
+    alive_until = alive.read(turn, request.identity, values.get(LIFE_SIGN))
+    if LIFE_SIGN in values:
+        values = {name: value for name, value in values.items() if name != LIFE_SIGN}
     telegram = turn.settings.decode(values, kept, control_word(words, turn))
     word = telegram.control_word
     if word is not None and not words.is_valid(word):

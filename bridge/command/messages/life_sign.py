@@ -16,9 +16,6 @@ from typing import Final
 
 from bridge.config import LIFE_SIGN_MS
 
-LEAF: Final = "life_sign"
-"""Name of the point that offers the token, in ``supervision``, and of the one that takes it, in
-``command``."""
 _OFFERED_S: Final = LIFE_SIGN_MS / 1000
 _TOKENS: Final = 65_535
 """From 1 on; none comes again before the others have had their turn, which takes 18 hours. 0 is none."""

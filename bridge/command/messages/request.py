@@ -7,22 +7,9 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum, StrEnum
 from typing import Any, ClassVar, Final
 
+from bridge.catalogue.codes import Source as Source
 from bridge.image import Value
 from bridge.text import Text, render
-
-
-class Source(IntEnum):
-    """Where a command comes from, numbered as Modbus serves the owner (input register 20)."""
-
-    NONE = 0
-    OPCUA = 1
-    MODBUS = 2
-    ZENOH = 3
-    LOCAL = 4
-
-    @property
-    def label(self) -> str:
-        return self.name.lower()
 
 
 class Role(IntEnum):

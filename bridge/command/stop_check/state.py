@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import Enum, IntEnum, StrEnum
+from enum import Enum, StrEnum
 from math import inf
 from typing import Final, NamedTuple
 
+from bridge.catalogue.codes import LastStop as LastStop
 from bridge.command.stop_check.sums import StopTime, Unfollowed
 
 
@@ -51,20 +52,6 @@ PLACES: Final[Mapping[Place, str]] = {
 }
 
 
-class LastStop(IntEnum):
-    """Outcome of the last stop."""
-
-    NONE = 0
-    FORWARDED = 1
-    FOLLOWED = 2
-    IGNORED = 3
-
-    @property
-    def label(self) -> str:
-        return self.name.lower()
-
-
-LAST_STOPS: Final = tuple((state.value, state.label) for state in LastStop)
 _JUDGED: Final = (Place.ON_BUS, Place.CHANGING)
 _AWAITS_SENDING: Final = (Place.TO_SEND, Place.CHANGING)
 

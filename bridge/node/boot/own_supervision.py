@@ -8,6 +8,7 @@ from functools import partial
 from bridge.base.sdo_texts import text_of
 from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.sdo import SdoError
+from bridge.catalogue import DriveSpec, NodeSpec
 from bridge.command import Drive
 from bridge.command.node import Node
 from bridge.drive import OwnJudgement, OwnVerdict
@@ -67,7 +68,11 @@ def _reader(node: Node, result: BootResult) -> Reader:
 
 
 def read_places(
-    node: Node, drive: Drive | None, *, link: bool = False, read: Reader = optional
+    node: Node | NodeSpec,
+    drive: Drive | DriveSpec | None,
+    *,
+    link: bool = False,
+    read: Reader = optional,
 ) -> Generator[Read, bytes | None, Raws]:
     """The node's own objects, or those that each drive has for itself. What cannot be read is left out."""
     raw: Raws = {}

@@ -11,6 +11,7 @@ from bridge.canopen import cobid
 from bridge.canopen.dialogue import Read, Write, optional
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoError
+from bridge.catalogue import NodeSpec
 from bridge.command.node import Node
 from bridge.mapping.model import SdoServer
 from bridge.node.boot.actions import Action, BootResult, Do, Nmt, Step, number, told_as
@@ -24,7 +25,7 @@ _OFF: Final = cobid.PDO_DISABLED
 _COMPARED: Final = _OFF | cobid.COB_ID_MASK
 
 
-def open_sdo_servers(node: Node, result: BootResult) -> Do:
+def open_sdo_servers(node: Node | NodeSpec, result: BootResult) -> Do:
     """Bring 120xh:1 (to the node) and :2 (from the node) to the COB-IDs of the mapping file, switched on.
 
     Written only where they differ, and read back. Raises BootError J where the node refuses.

@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoChannel
+from bridge.catalogue import NodeSpec
 from bridge.command import HasParameters
 from bridge.command.node import Node
 from bridge.mapping.model import SdoServer, Slot
@@ -22,13 +23,13 @@ _SHARE: Final = 0.5
 """How much of the bus a block transfer may take."""
 
 
-def opened_servers(node: Node) -> list[SdoServer]:
+def opened_servers(node: Node | NodeSpec) -> list[SdoServer]:
     """The further servers that the site file wants to be used, in its order."""
     servers = {server.number: server for server in node.family.sdo}
     return [servers[number] for number in node.table.sdo_channels if number in servers]
 
 
-def channel_of(node: Node, slot: Slot) -> int | None:
+def channel_of(node: Node | NodeSpec, slot: Slot) -> int | None:
     """The number of the channel that reaches this drive's parameters, or None where none is open."""
     return node.family.sdo_channel(slot, node.table.sdo_channels)
 
@@ -54,7 +55,7 @@ def parameter_places(node: Node) -> list[ParameterPlace]:
 class SdoChannels:
     """By number: 1 is the server of object 1200h."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: Node | NodeSpec) -> None:
         table = node.table
         segment_s = _SEGMENT_BITS / node.bus.bitrate / _SHARE
 
@@ -67,7 +68,6 @@ class SdoChannels:
                 segment_s=segment_s,
             )
 
-        self._node = node
         self._channels = {FIRST: channel(cobid.SDO_REQUEST, cobid.SDO_REPLY)}
         self._channels |= {
             server.number: channel(server.request, server.reply) for server in opened_servers(node)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge import __version__
-from bridge.command.node import Node
+from bridge.catalogue import NodeSpec
 from bridge.config import BusTable
 from bridge.northbound.gateway.session import Net
 
@@ -16,7 +16,7 @@ _VERSION: Final = "0 0 {version} 0 1 3.00 {version}"
 implementation (CiA 309-3). The bridge has neither a vendor id nor a serial number."""
 
 
-def net_of(bus: BusTable, number: int, nodes: Iterable[Node], tap: Path) -> Net:
+def net_of(bus: BusTable, number: int, nodes: Iterable[NodeSpec], tap: Path) -> Net:
     """``number`` is what clients call it; ``nodes`` are those of the site; at ``tap`` the bus process passes
     its frames on where no other process can hear them."""
     version = ".".join(__version__.split(".")[:2])
@@ -29,7 +29,7 @@ def net_of(bus: BusTable, number: int, nodes: Iterable[Node], tap: Path) -> Net:
     )
 
 
-def _on_first(node: Node) -> str | None:
+def _on_first(node: NodeSpec) -> str | None:
     """Name of the drive, or of a node that is none, whose parameters the node's first SDO channel reaches."""
     if node.device:
         return node.device.name

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.command.device import Device
+from bridge.catalogue import DeviceSpec
 from bridge.image import DataType, Point, Quality
 from bridge.mapping.device import Signal
 from bridge.northbound.modbus.registers import (
@@ -57,7 +57,7 @@ class DeviceMap:
     and ``outputs`` its coils and holding registers, ``parameters`` those from register 1000 on. ``texts`` is
     what device identification knows, by object id."""
 
-    def __init__(self, device: Device, points: Mapping[str, Point], allows: Allows | None = None) -> None:
+    def __init__(self, device: DeviceSpec, allows: Allows | None = None) -> None:
         """``allows`` is for the access column; without it, the access is what the mapping offers."""
         allows = allows or Allows()
         self._allows = allows
@@ -65,12 +65,8 @@ class DeviceMap:
         self.unit_id = device.unit_id
         self.device_name = device.name
         self.texts = {0: family.family.vendor, 1: family.family.name, 6: device.name}
-        self.has_outputs = device.outputs is not None
-        own = {
-            name[len(device.name) + 1 :]: point
-            for name, point in points.items()
-            if name.startswith(f"{device.name}/")
-        }
+        self.has_outputs = device.is_commanded
+        own = {point.name[len(device.name) + 1 :]: point for point in device.points}
         self.bits, self.inputs = _signals("input", family.input, own, "r")
         access = "rw" if allows.may_command else "r"
         self.coils, self.outputs = _signals("output", family.output, own, access)

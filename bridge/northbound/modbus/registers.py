@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from bridge.command import Drive
+from bridge.catalogue import DriveSpec
 from bridge.config import WordOrder
 from bridge.image import DataType, Point, Quality
 from bridge.mapping.model import Family
@@ -121,7 +121,7 @@ class DriveMap:
     ``timeout_range_ms`` what an owner may write to ``TIMEOUT``, None where that is nothing. ``texts`` is what
     device identification knows without asking the drive, by object id."""
 
-    def __init__(self, drive: Drive, allows: Allows | None = None) -> None:
+    def __init__(self, drive: DriveSpec, allows: Allows | None = None) -> None:
         """``allows`` is for the access column; without it, the access is what the drive's family offers."""
         allows = allows or Allows()
         self.drive_name = drive.name

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from bridge.catalogue.codes import NODE_CODES, NodeState, WatchdogState
 from bridge.command import Identity, Request
-from bridge.command.leg.state import WatchdogState
-from bridge.command.link import NodeState
-from bridge.command.points import NODE_CODES
 from bridge.drive import DriveState
 from bridge.image import Quality, Value
 from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused

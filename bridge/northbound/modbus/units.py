@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
-from bridge.command import Drive, Plant, Source
-from bridge.command.device import Device
-from bridge.command.rights import rights_of
+from bridge.catalogue import Catalogue, DeviceSpec, DriveSpec, Source, rights_of
 from bridge.northbound.modbus.device_registers import DeviceMap
 from bridge.northbound.modbus.registers import Allows, DriveMap, Row, Table, row_maker
 
@@ -21,22 +19,22 @@ _MODULE_STATE: Final = (
 )
 
 
-def drive_maps(plant: Plant) -> tuple[DriveMap, ...]:
+def drive_maps(catalogue: Catalogue) -> tuple[DriveMap, ...]:
     """The maps of all drives, by unit id, with the access that this site gives."""
-    return tuple(DriveMap(drive, _allows(plant, drive)) for _, drive in sorted(plant.by_unit.items()))
+    drives = sorted(catalogue.drives.values(), key=lambda drive: drive.unit_id)
+    return tuple(DriveMap(drive, _allows(catalogue, drive)) for drive in drives)
 
 
-def _allows(plant: Plant, one: Drive | Device) -> Allows:
-    rights = rights_of(plant, Source.MODBUS)
-    write = partial(rights.may_write, plant)
+def _allows(catalogue: Catalogue, one: DriveSpec | DeviceSpec) -> Allows:
+    rights = rights_of(catalogue, Source.MODBUS)
+    write = partial(rights.may_write, catalogue)
     return Allows(write, may_command=rights.may_command(one), may_stop=rights.may_stop(one))
 
 
-def device_maps(plant: Plant) -> tuple[DeviceMap, ...]:
+def device_maps(catalogue: Catalogue) -> tuple[DeviceMap, ...]:
     """The maps of all nodes that are no drives, by unit id, with the access that this site gives."""
-    points = {point.name: point for point in plant.image.points}
-    devices = sorted(plant.devices.values(), key=lambda device: device.unit_id)
-    return tuple(DeviceMap(device, points, _allows(plant, device)) for device in devices)
+    devices = sorted(catalogue.devices.values(), key=lambda device: device.unit_id)
+    return tuple(DeviceMap(device, _allows(catalogue, device)) for device in devices)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +65,12 @@ class Units:
         )
 
 
-def units_of(plant: Plant) -> Units:
+def units_of(catalogue: Catalogue) -> Units:
     """The units of a site; what may be written is not looked at."""
     return Units(
-        plant.site.site.name,
-        tuple(bus.name for bus in plant.site.bus),
-        tuple(node.name for node in plant.nodes.values() if node.table.enabled),
-        tuple(map(DriveMap, plant.drives.values())),
-        device_maps(plant),
+        catalogue.site.site.name,
+        tuple(bus.name for bus in catalogue.site.bus),
+        tuple(node.name for node in catalogue.nodes.values() if node.table.enabled),
+        tuple(map(DriveMap, catalogue.drives.values())),
+        device_maps(catalogue),
     )

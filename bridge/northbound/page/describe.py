@@ -8,47 +8,27 @@ from typing import Any
 
 import msgspec
 
+from bridge.catalogue import Catalogue, DriveSpec
 from bridge.condition.layout import Layout, layout_of
-from bridge.config import Site
 from bridge.drive.scaling import scale_of
 from bridge.image import Image, Point
 from bridge.mapping import Family
-from bridge.parameter import Names
 
 _encode = msgspec.json.Encoder().encode
 
 
-def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str, Any]:
+def described(image: Image, catalogue: Catalogue) -> dict[str, Any]:
     """Description of the site, for JSON. ``places`` has for each drive, bus, node and the bridge which of
     ``natures`` has its points, by their names there. Drives of a kind have one in common, so that a plant of
     hundreds is loaded as soon as a small one. What is empty is left out of a point."""
-    layout = layout_of(image.points, site, families)
-    places, natures = _natures(image.points, layout, _scaled(image, site, families))
-    nodes: list[dict[str, Any]] = []
-    drives: list[dict[str, Any]] = []
-    for bus in site.bus:
-        for node in bus.node:
-            family = families[node.mapping_key]
-            of_node = {"name": node.name, "bus": bus.name, "id": node.id, "family": family.family.name}
-            nodes.append(of_node)
-            for drive in node.drive:
-                name = f"{node.name}/{family.leaf_of(drive)}"
-                drives.append(
-                    {
-                        "name": name,
-                        "node": node.name,
-                        "bus": bus.name,
-                        "family": family.family.name,
-                        "mapping": node.mapping,
-                        "control": drive.control,
-                        "stop_by_anyone": drive.stop_by_anyone,
-                        "on_expiry": drive.on_expiry,
-                        "states": list(dict.fromkeys(state.name for state in family.status_word.state)),
-                        "stops_in": _stops_in(family),
-                        "main": layout.mains.get(name, ""),
-                        "set_bits": list(family.status_word.parameter_set_bits),
-                    }
-                )
+    layout = layout_of(image.points, catalogue)
+    places, natures = _natures(image.points, layout, _scaled(image, catalogue))
+    site = catalogue.site
+    nodes = [
+        {"name": node.name, "bus": node.bus.name, "id": node.table.id, "family": node.family.family.name}
+        for node in catalogue.nodes.values()
+    ]
+    drives = [_drive(one, layout.mains.get(one.name, "")) for one in catalogue.drives.values()]
     return {
         "site": site.site.name,
         "buses": [{"name": bus.name, "bitrate": bus.bitrate, "interface": bus.interface} for bus in site.bus],
@@ -56,6 +36,25 @@ def described(image: Image, site: Site, families: dict[str, Family]) -> dict[str
         "drives": drives,
         "places": places,
         "natures": natures,
+    }
+
+
+def _drive(drive: DriveSpec, main: str) -> dict[str, Any]:
+    """``main`` is what moves it most tellingly."""
+    status = drive.family.status_word
+    return {
+        "name": drive.name,
+        "node": drive.node.name,
+        "bus": drive.bus.name,
+        "family": drive.family.family.name,
+        "mapping": drive.node.mapping,
+        "control": drive.control,
+        "stop_by_anyone": drive.stop_by_anyone,
+        "on_expiry": drive.table.on_expiry,
+        "states": list(dict.fromkeys(state.name for state in status.state)),
+        "stops_in": _stops_in(drive.family),
+        "main": main,
+        "set_bits": list(status.parameter_set_bits),
     }
 
 
@@ -79,7 +78,7 @@ def _natures(
     return places, natures
 
 
-def _scaled(image: Image, site: Site, families: dict[str, Family]) -> dict[str, dict[str, Any]]:
+def _scaled(image: Image, catalogue: Catalogue) -> dict[str, dict[str, Any]]:
     """Scales of the values that may be written, by the value's point: ``scaled_by`` has the point of the
     parameter in each parameter set, below the drive, empty where there is none, and ``of_full`` the limits
     as multiples of the parameter's value.
@@ -87,23 +86,21 @@ def _scaled(image: Image, site: Site, families: dict[str, Family]) -> dict[str, 
     So the page shows the limits of the drive's own P105 or C01, and not those of the site file.
     """
     there = {point.name for point in image.points}
-    known = {name: Names(family) for name, family in families.items()}
     found: dict[str, dict[str, Any]] = {}
-    for node in (node for bus in site.bus for node in bus.node):
-        family = families[node.mapping_key]
+    for node in catalogue.nodes.values():
+        family = node.family
         points = {
             family.parameter_and_set(entry.name): f"parameter/{entry.leaf}"
-            for entry in known[node.mapping_key].points()
+            for entry in node.axis_names.of().points()
         }
-        for table in node.drive:
-            drive = f"{node.name}/{family.leaf_of(table)}"
-            for value in family.values_of(family.slot_named(table.slot)):
+        for drive in node.drives:
+            for value in family.values_of(drive.slot):
                 one = scale_of(value, 1.0)
                 if value.group != "command" or one is None or not value.full:
                     continue
                 sets = [points.get((value.full, number), "") for number in range(1, family.sets + 1)]
-                if f"{drive}/{sets[0]}" in there:
-                    found[f"{drive}/{value.leaf}"] = {"scaled_by": sets, "of_full": [one.low, one.high]}
+                if f"{drive.name}/{sets[0]}" in there:
+                    found[f"{drive.name}/{value.leaf}"] = {"scaled_by": sets, "of_full": [one.low, one.high]}
     return found
 
 

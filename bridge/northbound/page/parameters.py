@@ -18,11 +18,12 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from bridge.base.errors import FileFaults
-from bridge.config import NodeTable, Site
+from bridge.catalogue import Catalogue
+from bridge.config import NodeTable
 from bridge.image import Value
 from bridge.mapping import Family
 from bridge.northbound.page.guards import MOST_FILE
-from bridge.parameter import AxisNames, Entry, Names, backups
+from bridge.parameter import Entry, Names, backups
 from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.factory import DESCRIPTIONS, factory
 from bridge.parameter.set_file import read_set
@@ -62,20 +63,15 @@ class Holder:
     on_first: bool
 
 
-def holders_of(site: Site, families: Mapping[str, Family]) -> dict[str, Holder]:
+def holders_of(catalogue: Catalogue) -> dict[str, Holder]:
     """Drives and devices with parameters, by the names that commands have for them."""
-    known = {name: AxisNames(family) for name, family in families.items()}
     found: dict[str, Holder] = {}
-    for bus in site.bus:
-        for node in bus.node:
-            family, names = families[node.mapping_key], known[node.mapping_key]
-            if family.is_device:
-                found[node.name] = Holder(node.name, node, family, names.of(), on_first=True)
-            for drive in node.drive:
-                name = f"{node.name}/{family.leaf_of(drive)}"
-                slot = family.slot_named(drive.slot)
-                on_first = family.is_on_first(slot)
-                found[name] = Holder(name, node, family.of_slot(slot), names.of(slot.axis), on_first)
+    for node in catalogue.nodes.values():
+        if one := catalogue.devices.get(node.name):
+            found[one.name] = Holder(one.name, one.node, one.family, one.names, on_first=True)
+        for drive in node.drives:
+            on_first = drive.family.is_on_first(drive.slot)
+            found[drive.name] = Holder(drive.name, drive.node, drive.family, drive.names, on_first)
     return found
 
 

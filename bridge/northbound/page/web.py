@@ -22,10 +22,10 @@ from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
 
 from bridge.base.sources import source_of
+from bridge.catalogue import Catalogue
 from bridge.command import Role
 from bridge.condition.layout import layout_of
-from bridge.config import PageTable, Site, UserTable
-from bridge.mapping import Family
+from bridge.config import PageTable, UserTable
 from bridge.northbound.logins import PasswordChecks, TooManyChecks
 from bridge.northbound.page.bus import Bus, Capture
 from bridge.northbound.page.describe import described
@@ -104,13 +104,13 @@ class Page:
     def __init__(
         self,
         view: View,
-        site: Site,
-        families: dict[str, Family],
+        catalogue: Catalogue,
         sources: PageSources,
         clock: Callable[[], float],
         kept: Path | None = None,
     ) -> None:
         """``kept`` is a file for the sessions, for a front after this one."""
+        site = catalogue.site
         settings, table = site.opcua, site.page or PageTable.model_validate({})
         self._clock = clock
         self._fault_texts = sources.fault_texts
@@ -120,13 +120,13 @@ class Page:
         self._sessions = Sessions()
         self._throttle = Throttle()
         self._checks = PasswordChecks(most=_MOST_CHECKS)
-        layout = layout_of(view.image.points, site, families)
+        layout = layout_of(view.image.points, catalogue)
         self._tabs = Tabs(view, layout, self._sessions, TrafficViews(sources.taps), clock)
         if kept is not None:
             file = SessionFile(kept, self._credentials(settings.user if settings else ()))
             self._sessions.restore(file.load(clock()))
             self._tabs.keep = file.save
-        self._description = _encode(described(view.image, site, families))
+        self._description = _encode(described(view.image, catalogue))
         self._is_encrypted = table.certificate is not None
         # The port: cookies know none, and two pages of one host would log each other out.
         name = f"session-{table.listen.rpartition(':')[2]}"
@@ -147,7 +147,7 @@ class Page:
             Route("/api/logout", self._logout, methods=["POST"]),
             *Integration(site, sources.exports, self._has_session).routes,
             *Parameters(
-                holders_of(site, families),
+                holders_of(catalogue),
                 sources.counts,
                 sources.dictionaries,
                 body_of,

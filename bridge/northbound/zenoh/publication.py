@@ -6,8 +6,7 @@ from functools import partial
 from itertools import repeat
 from typing import Final
 
-from bridge.command.link import NodeState
-from bridge.command.points import NODE_CODES
+from bridge.catalogue.codes import NODE_CODES, NodeState
 from bridge.config import ZenohTable
 from bridge.image import Quality
 from bridge.northbound.view import View

@@ -30,7 +30,7 @@ class Node:
 
 
 def opened(node: Node, more: str = "sdo_channels = [3]") -> OpenChannels:
-    task = OpenChannels(node_of(more=more), 10.0)
+    task = OpenChannels(node_of(more=more).spec, 10.0)
     for _ in range(20):
         for frame in task.take_frames():
             if frame.can_id == 0x605:
@@ -57,7 +57,7 @@ def test_one_that_the_node_refuses_is_the_failure() -> None:
 
 
 def test_without_any_it_is_done_at_once() -> None:
-    task = OpenChannels(node_of(), 10.0)
+    task = OpenChannels(node_of().spec, 10.0)
     assert task.is_finished(10.0)
     assert task.take_frames() == []
 

@@ -8,7 +8,7 @@ from canopen.nmt import NMT_COMMANDS, NMT_STATES
 from bridge.canopen import nmt
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.command.points import NMT_STATES as POINT_CODES
+from bridge.catalogue.codes import NMT_STATES as POINT_CODES
 
 
 def test_the_nmt_states() -> None:

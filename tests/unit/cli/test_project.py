@@ -61,3 +61,14 @@ def test_what_cannot_work_is_a_fault_of_the_file(tmp_path: Path) -> None:
     done = CliRunner().invoke(make_app(), ["check", path, "--json"])
     assert done.exit_code == 2
     assert json.loads(done.stdout)["ok"] is False
+
+
+def test_more_drives_than_modbus_has_units_are_a_fault(tmp_path: Path) -> None:
+    """1 … 247 (Modbus over serial line V1.02, 2.2), and `run` refuses them."""
+    drives = [sites.drive(slot, "none", 0, sites.ACCEPTED) for slot in ("fu1", "fu2")]
+    nodes = [sites.node(*drives, name=f"n{n}", node_id=n % 60 + 1) for n in range(124)]
+    buses = [sites.bus(*nodes[at : at + 60], name=f"can{at}") for at in range(0, 124, 60)]
+    done = CliRunner().invoke(make_app(), ["check", "--json", str(sites.write(tmp_path, *buses))])
+    assert done.exit_code == 2
+    (fault,) = json.loads(done.stdout)["faults"]
+    assert (fault["key"], fault["message"]) == ("unit_id", "more than 247 drives have no Modbus unit id")

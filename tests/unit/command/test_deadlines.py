@@ -7,6 +7,7 @@ from math import inf
 
 import pytest
 
+from bridge.catalogue import Catalogue
 from bridge.command.deadlines import Deadlines
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.link import NodeState
@@ -176,7 +177,7 @@ def test_of_nobody_nothing_is_due() -> None:
 def test_a_drive_of_which_nobody_told_is_reported(tmp_path) -> None:
     whole = sites.bus(sites.node(sites.drive("fu1", "modbus", 200)))
     site = load_site(sites.write(tmp_path, whole, sites.modbus()))
-    plant = Plant(site, {sites.FAMILY: sites.family(sites.FAMILY)}, "0")
+    plant = Plant(Catalogue.of(site, {sites.FAMILY: sites.family(sites.FAMILY)}), "0")
     events: list[Event] = []
     plant.on_event(events.append)
     (drive,) = plant.drives.values()

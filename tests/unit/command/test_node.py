@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.catalogue import Catalogue
 from bridge.command import Plant
 from bridge.command.node import Node
 from bridge.config import Site
@@ -37,7 +38,7 @@ def with_axes() -> Node:
     family = plain.model_copy(update={"slot": [*slots, *plain.slot[2:]]})
     drives = [sites.drive(slot.name, "none", 0, "") for slot in slots]
     site = Site.model_validate(sites.parsed(sites.site(sites.bus(sites.node(*drives)))))
-    return Plant(site, {sites.FAMILY: family}, "1.2.3").nodes["conveyor"]
+    return Plant(Catalogue.of(site, {sites.FAMILY: family}), "1.2.3").nodes["conveyor"]
 
 
 def test_of_several_axes_each_has_the_objects_of_its_own_profile() -> None:

@@ -169,12 +169,6 @@ class TestPoints:
         assert (known.low, known.unit) == (-100.0, "Hz")
         assert points["conveyor/infeed/command/frequency"].low is None
 
-    def test_unit_ids_are_as_given_and_else_in_order(self, hall: Hall):
-        assert {unit: drive.name for unit, drive in hall.plant.by_unit.items()} == {
-            1: "conveyor/infeed",
-            2: "conveyor/fu1",
-        }
-
     def test_the_bridge_says_what_it_is(self, hall: Hall):
         assert hall.plant.image.read("bridge/version").value == "1.2.3"
         assert hall.plant.image.read("bridge/drives_configured").value == 2

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.base.errors import FileFaults
+from bridge.catalogue import Catalogue
 from bridge.command import (
     Action,
     Code,
@@ -90,9 +90,8 @@ def counted(hall: Hall) -> object:
 
 
 def test_what_is_known_from_the_start_is_good_from_then_on() -> None:
-    plant = Plant(
-        Site.model_validate(sites.parsed(SITE)), {sites.FAMILY: sites.family(sites.FAMILY)}, "1.2", 5.0
-    )
+    site = Site.model_validate(sites.parsed(SITE))
+    plant = Plant(Catalogue.of(site, {sites.FAMILY: sites.family(sites.FAMILY)}), "1.2", 5.0)
     for name, value in {
         "bridge/version": "1.2",
         "bridge/drives_configured": 2,
@@ -111,25 +110,6 @@ def test_what_is_known_from_the_start_is_good_from_then_on() -> None:
     plant.refresh(6.0)
     for name in ("bridge/refused_writes", "bridge/drives_good"):
         assert plant.image.read(name) == Reading(0, Quality.GOOD, 6.0, "")
-
-
-def many_drives(count: int) -> str:
-    """Two on each node but the last one, a hundred nodes on a bus."""
-    slots = [("fu1", "fu2")[: count - place] for place in range(0, count, 2)]
-    nodes = [
-        sites.node(*(sites.drive(slot, "modbus", 0, "") for slot in has), name=f"n{n}", node_id=n % 100 + 1)
-        for n, has in enumerate(slots)
-    ]
-    return sites.site(sites.bus(*nodes[:100]), sites.bus(*nodes[100:], name="can1"), sites.modbus())
-
-
-def test_modbus_has_247_units_and_no_drive_goes_without() -> None:
-    """1 … 247 (Modbus over serial line V1.02, 2.2)."""
-    plant = sites.plant_of(many_drives(247))
-    assert list(plant.by_unit) == list(range(1, 248))
-    with pytest.raises(FileFaults) as told:
-        sites.plant_of(many_drives(248))
-    assert str(told.value) == ": unit_id: more than 247 drives have no Modbus unit id"
 
 
 # the end

@@ -18,9 +18,8 @@ def test_a_place_is_in_its_node_and_that_on_its_bus() -> None:
 
 def mains(*points: tuple[str, str]) -> str | None:
     text = sites.site(sites.bus(sites.node(sites.drive("fu1", "none", 0))))
-    plant = sites.plant_of(text)
     shown = [Point(name=f"conveyor/fu1/{leaf}", data_type=DataType.FLOAT, unit=unit) for leaf, unit in points]
-    found = layout_of(shown, plant.site, {sites.FAMILY: sites.family(sites.FAMILY)})
+    found = layout_of(shown, sites.catalogue_of(text))
     assert found.drives == {"conveyor/fu1": "conveyor"}
     assert (found.nodes, found.buses) == ({"conveyor": "can0"}, ("can0",))
     return found.mains.get("conveyor/fu1")

@@ -11,9 +11,8 @@ FAULT, READY = 0x0008, 0x0231
 
 
 def layout():
-    plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "none", 0)))))
-    families = {sites.FAMILY: sites.family(sites.FAMILY)}
-    return with_faults(layout_of(plant.image.points, plant.site, families), plant.site, families)
+    catalogue = sites.catalogue_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "none", 0)))))
+    return with_faults(layout_of(catalogue.points, catalogue), catalogue)
 
 
 def test_a_drive_in_fault_is_explained_by_its_last_emergency() -> None:

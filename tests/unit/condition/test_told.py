@@ -6,9 +6,10 @@ import json
 
 import pytest
 
+from bridge.catalogue.codes import CONDITIONS
 from bridge.condition.causes import Known, Shown
 from bridge.condition.findings import Rank, Trouble
-from bridge.condition.told import CONDITIONS, MOST, condition, troubles_json
+from bridge.condition.told import MOST, condition, troubles_json
 from bridge.text import Text
 
 LOST = Trouble(Rank.ALARM, "node_lost", "conveyor", (("how", "heartbeat"),))

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from bridge.bustools.own_check import OwnCheck
 from bridge.canopen.frame import Frame
+from bridge.catalogue import Catalogue
 from bridge.cli.app import make_app
-from bridge.command import Plant
 from bridge.drive import OwnVerdict
 from bridge.lint import Severity, Verdict, lint
 from bridge.project import Project, load_project
@@ -116,14 +116,14 @@ def test_audit_has_them_beside_the_drives(tmp_path: Path) -> None:
 )
 def test_the_node_is_asked(tmp_path: Path, watch_ms: int, mode: int, verdict: OwnVerdict) -> None:
     project = project_of(tmp_path, OWNED)
-    plant = Plant(project.site, project.families, "0")
+    catalogue = Catalogue.of(project.site, project.families)
     simulated = simulate_description(description_of("io16.eds"), 21)
     simulated.start(0.0)
     word = (127 << 16 | watch_ms).to_bytes(4, "little")
     simulated.on_frame(Frame(0x615, b"\x23\x16\x10\x01" + word), 0.0)
     simulated.on_frame(Frame(0x615, bytes((0x2F, 0x06, 0x62, 0x02, mode, 0, 0, 0))), 0.0)
     simulated.take_frames()
-    task = OwnCheck(list(plant.nodes.values()), 0.0)
+    task = OwnCheck(list(catalogue.nodes.values()), 0.0)
     now = 0.0
     while not task.is_finished(now) and now < 5.0:
         task.on_time(now)

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.base.errors import Unavailable
+from bridge.catalogue.points import CONNECTION_COUNTS
 from bridge.command import (
     Action,
     Code,
@@ -32,7 +33,6 @@ from bridge.command import (
     WriteParameter,
 )
 from bridge.command.messages.request import COMMANDS
-from bridge.command.points import CONNECTION_COUNTS
 from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
 from bridge.mirror.endpoint import prepare_folder

@@ -38,11 +38,11 @@ def carried_out(bench: Bench, requests: Sequence[Request]) -> list[Outcome]:
 class TestModbus:
     @pytest.fixture
     def unit(self, bench: Bench) -> DeviceUnit:
-        (device,) = device_maps(bench.plant)
+        (device,) = device_maps(bench.plant.catalogue)
         return DeviceUnit(device, bench.view, Words32("ABCD"))
 
     def test_the_map(self, bench: Bench) -> None:
-        (device,) = device_maps(bench.plant)
+        (device,) = device_maps(bench.plant.catalogue)
         places = {row.name: (row.table, row.address, row.type, row.access) for row in device.rows}
         assert places["output/valves"] == (Table.HOLDING_REGISTER, 32, "uint16", "rw")
         assert places["output/speed"] == (Table.HOLDING_REGISTER, 33, "float32", "rw")

@@ -53,7 +53,7 @@ def test_opc_ua_has_a_node_of_the_right_kind_for_each(bench: Bench) -> None:
 
 
 def test_modbus_has_two_registers_of_the_right_type_for_each(bench: Bench) -> None:
-    rows = {row.name: row for row in DriveMap(bench.plant.drives[DRIVE]).rows}
+    rows = {row.name: row for row in DriveMap(bench.plant.catalogue.drives[DRIVE]).rows}
     shown = {
         leaf: (rows[leaf].table, rows[leaf].type)
         for leaf in ("command/target", "command/mode", "command/valve_a", "actual/in_position")
@@ -68,7 +68,7 @@ def test_modbus_has_two_registers_of_the_right_type_for_each(bench: Bench) -> No
 
 
 def test_modbus_writes_an_enumeration_as_a_number(bench: Bench) -> None:
-    rows = {row.name: row for row in DriveMap(bench.plant.drives[DRIVE]).rows}
+    rows = {row.name: row for row in DriveMap(bench.plant.catalogue.drives[DRIVE]).rows}
     dispatcher = dispatcher_of(bench.plant, lambda: bench.now, view=bench.view)
     answers: list[bytes] = []
     for number, code in ((3, 0x10), (2, 0x90)):

@@ -17,7 +17,6 @@ from bridge.northbound.zenoh.keys import event_json
 from bridge.service.event_log import log_event
 from bridge.service.plant_condition import PlantCondition
 from tests.support import sites
-from tests.support.condition import families_of
 from tests.support.node_states import node_goes
 from tests.support.views import view_of
 
@@ -33,8 +32,7 @@ class Box:
         self.now = 100.0
         self.events: list[Event] = []
         self.plant.on_event(self.events.append)
-        families = families_of(self.plant)
-        self.condition = PlantCondition(self.plant, families, lambda: self.now, lambda at: round(at * 1e9))
+        self.condition = PlantCondition(self.plant, lambda: self.now, lambda at: round(at * 1e9))
         self.plant.set("bus/can0/state", 0, self.now)
         for node in self.plant.nodes.values():
             node_goes(self.plant, node, NodeState.OPERATIONAL, self.now, tell=False)
@@ -92,7 +90,7 @@ def test_an_event_without_a_known_cause_names_none(box: Box) -> None:
 
 
 def test_an_unproven_stop_is_in_every_summary(box: Box) -> None:
-    unit = BridgeUnit(units_of(box.plant), view_of(box.plant))
+    unit = BridgeUnit(units_of(box.plant.catalogue), view_of(box.plant))
     (before,) = unit.read_words(Table.INPUT_REGISTER, 0, 1, PLC)
     assert before >> 8 == 0
     name = "press/fu1/supervision/worst_case_bridge_ms"

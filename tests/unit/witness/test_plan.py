@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Plant
+from bridge.catalogue import Catalogue
 from bridge.config import load_site
 from bridge.drive import ControlWords, DriveState, StatusWords
 from bridge.lint import lint
@@ -133,9 +133,9 @@ def test_a_node_without_drives_has_a_unit(tmp_path: Path) -> None:
     path = sites.write(tmp_path, sites.bus(shaft, given, drive), sites.modbus(0))
     (bus,) = plan(load_site(path), path.parent)
     project = load_project(path)
-    plant = Plant(project.site, project.families, "0")
-    assert [one.unit_id for one in bus.drives] == list(plant.by_unit) == [3]
-    assert {one.name: one.unit_id for one in plant.devices.values()} == {"shaft": 2, "other": 1}
+    catalogue = Catalogue.of(project.site, project.families)
+    assert [one.unit_id for one in bus.drives] == [one.unit_id for one in catalogue.drives.values()] == [3]
+    assert {one.name: one.unit_id for one in catalogue.devices.values()} == {"shaft": 2, "other": 1}
 
 
 def bus_of(folder: Path, node: str, more: str = "", *, own: int | None = None) -> WatchedBus:

@@ -12,9 +12,9 @@ import pytest_asyncio
 from asyncua import Client, Node, ua
 from asyncua.common.subscription import Subscription
 
+from bridge.catalogue.points import site_points
 from bridge.command import Event, Kind
 from bridge.command.link import NodeState
-from bridge.command.points import site_points
 from bridge.image import Point, Quality
 from bridge.image.point import DataType
 from bridge.northbound.opcua.server import OpcUaServer
@@ -31,7 +31,7 @@ LOAD = "bus/can0/load"
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def served(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[tuple[OpcUaServer, LocalView]]:
     many = [Point(name=f"bus/can0/{n // 50}/{n}", data_type=DataType.UINT32) for n in range(MANY)]
-    with patch("bridge.command.plant.site_points", lambda *site: site_points(*site) | {"many": many}):
+    with patch("bridge.catalogue.site.site_points", lambda *site: site_points(*site) | {"many": many}):
         plant = make_plant()
     async with serving(OPEN, tmp_path_factory.mktemp("state"), plant) as found:
         yield found

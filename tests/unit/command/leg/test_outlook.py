@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.catalogue.codes import WatchdogState
 from bridge.command import TakeControl
 from bridge.command.leg.outlook import next_deadline, output_then, trips_at, until, watchdog_state
-from bridge.command.leg.state import WatchdogState
 from tests.support.leg import RUN, SHUT_DOWN, Leg, running_nord, settings_of
 from tests.support.rig import OPERATOR
 

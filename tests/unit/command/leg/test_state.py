@@ -15,17 +15,9 @@ from bridge.command.leg.state import (
     STARTING,
     UNHEARD,
     WANTS_STOP_WORD,
-    WATCHDOG_STATES,
     Motion,
     Stage,
-    WatchdogState,
 )
-
-
-def test_the_watchdogs_states_are_numbered_as_modbus_serves_them() -> None:
-    """docs/reference: input register 14."""
-    assert WATCHDOG_STATES == ((0, "off"), (1, "idle"), (2, "running"), (3, "tripped"))
-    assert WatchdogState.TRIPPED.label == "tripped"
 
 
 def test_each_stage_is_normal_or_in_a_start_or_tripped_and_never_two_of_them() -> None:

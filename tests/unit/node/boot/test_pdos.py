@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.sdo import SdoError
+from bridge.catalogue import Catalogue
 from bridge.command import Plant
 from bridge.node import boot
 from bridge.text import render
@@ -39,7 +40,7 @@ def good() -> Answers:
 
 
 def run(folder: Path, answers: Answers) -> boot.BootResult:
-    plant = Plant(write_site(folder), {"nord/sk-tu4-cao": NORD}, "0")
+    plant = Plant(Catalogue.of(write_site(folder), {"nord/sk-tu4-cao": NORD}), "0")
     generator = boot.boot(plant.nodes["conveyor"])
     try:
         action = next(generator)

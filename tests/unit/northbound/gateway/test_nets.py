@@ -16,8 +16,8 @@ def net(interface: str = "virtual", *, slot: str = "fu1") -> Net:
     channel = 'channel = "vcan0"' if interface == "socketcan" else ""
     bus = sites.bus(sites.node(sites.drive(slot, "none", 0, "")), interface=interface, more=channel)
     other = sites.bus(sites.node(sites.drive("fu1", "none", 0, ""), name="other"), name="can1")
-    plant = sites.plant_of(sites.site(bus, other))
-    return net_of(plant.site.bus[0], 3, plant.nodes.values(), Path("/run/hall-can0.frames"))
+    catalogue = sites.catalogue_of(sites.site(bus, other))
+    return net_of(catalogue.site.bus[0], 3, catalogue.nodes.values(), Path("/run/hall-can0.frames"))
 
 
 def test_it_has_the_nodes_of_its_bus_alone() -> None:

@@ -14,9 +14,7 @@ from tests.support.nodes import device_plant
 
 def map_of(folder: Path, mapping: str = ENCODER, more: str = "") -> DeviceMap:
     plant = device_plant(folder, mapping, more)
-    device = plant.nodes["shaft"].device
-    assert device is not None
-    return DeviceMap(device, {point.name: point for point in plant.image.points})
+    return DeviceMap(plant.catalogue.devices["shaft"])
 
 
 def rows(one: DeviceMap, table: Table) -> dict[int, Row]:

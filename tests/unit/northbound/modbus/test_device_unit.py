@@ -41,11 +41,11 @@ def bench(tmp_path: Path) -> Bench:
 class TestModbus:
     @pytest.fixture
     def unit(self, bench: Bench) -> DeviceUnit:
-        (device,) = device_maps(bench.plant)
+        (device,) = device_maps(bench.plant.catalogue)
         return DeviceUnit(device, bench.view, Words32("ABCD"))
 
     def test_the_map(self, bench: Bench) -> None:
-        (device,) = device_maps(bench.plant)
+        (device,) = device_maps(bench.plant.catalogue)
         assert device.unit_id == 1
         places = {row.name: (row.table, row.address, row.type) for row in device.rows}
         assert places["input/position"] == (Table.INPUT_REGISTER, 32, "float32")
@@ -100,5 +100,5 @@ class TestModbus:
                 unit.plan_words(start, [0] * count, CALLER)
 
     def test_who_it_is(self, bench: Bench) -> None:
-        (device,) = device_maps(bench.plant)
+        (device,) = device_maps(bench.plant.catalogue)
         assert device.texts == {0: "Acme", 1: "Encoder", 6: "shaft"}

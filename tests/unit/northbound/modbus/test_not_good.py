@@ -17,7 +17,7 @@ from bridge.command.link import FurtherTpdo, NodeState
 from bridge.image import Quality
 from bridge.mapping import family_names
 from bridge.mapping.model import ProcessValue
-from bridge.northbound.modbus.registers import DriveMap
+from bridge.northbound.modbus.units import drive_maps
 from tests.support import sites
 from tests.support.invented import SPIN, spin_bench, spindle
 from tests.support.modbus_site import PLC
@@ -39,7 +39,7 @@ class Reader:
 
     def __init__(self, plant: Plant, clock: list[float]) -> None:
         self._dispatcher = dispatcher_of(plant, lambda: clock[0])
-        self.map = DriveMap(plant.by_unit[UNIT])
+        self.map = drive_maps(plant.catalogue)[UNIT - 1]
 
     def read(self, start: int, count: int) -> list[int]:
         """The registers, or -code where the read was refused."""

@@ -10,7 +10,8 @@ import pytest
 
 from bridge.command import Identity, Role, Source
 from bridge.northbound.modbus.pdu import ExceptionCode
-from bridge.northbound.modbus.registers import PARAMETERS, DriveMap, Table
+from bridge.northbound.modbus.registers import PARAMETERS, Table
+from bridge.northbound.modbus.units import drive_maps
 from bridge.sim.nord.nord_supervision import Presence
 from tests.support.bench import Bench, write_site
 from tests.support.views import dispatcher_of
@@ -25,7 +26,7 @@ class Station:
         self.bench = Bench(write_site(folder))
         self.bench.run(SETTLED_S)
         self.dispatcher = dispatcher_of(self.bench.plant, lambda: self.bench.now, view=self.bench.view)
-        self.map = DriveMap(self.bench.plant.by_unit[UNIT])
+        self.map = drive_maps(self.bench.plant.catalogue)[UNIT - 1]
 
     def place(self, name: str) -> int:
         (row,) = [row for row in self.map.parameters if row.name == f"parameter/{name}"]

@@ -66,7 +66,7 @@ def test_a_value_without_scale_is_not_configured_and_only_it():
 def test_further_points_come_after_the_scaled_values_as_they_are_listed():
     rig = Rig()
     rig.runs(ENABLED)
-    names = [row.name for row in DriveMap(rig.fu1).inputs]
+    names = [row.name for row in DriveMap(rig.fu1.spec).inputs]
     assert names[:2] == ["actual/frequency", "actual/current"]
     assert names[2:6] == [
         "supervision/telegram_downtime_s",
@@ -78,7 +78,7 @@ def test_further_points_come_after_the_scaled_values_as_they_are_listed():
     ours = [name for name in names[:-1] if not name.startswith("parameter/")]
     assert ours[-4:] == [f"identity/{leaf}" for leaf in ("vendor", "product", "revision", "serial")]
     assert names[: len(ours)] == ours
-    rows = {row.name: row for row in DriveMap(rig.fu1).inputs}
+    rows = {row.name: row for row in DriveMap(rig.fu1.spec).inputs}
     downtime, stop = rows["supervision/telegram_downtime_s"], rows["supervision/worst_case_stop_ms"]
     assert rig.read(4, downtime.address, 2) == list(float_words(0.5))
     assert (stop.type, rig.read(4, stop.address, 2)) == ("uint32", [0, 25 + 200 + 20 + 10 + 10])
@@ -88,7 +88,7 @@ def test_further_points_come_after_the_scaled_values_as_they_are_listed():
 def test_nothing_is_readable_beyond_the_map():
     rig = Rig()
     rig.runs(ENABLED)
-    rows = DriveMap(rig.fu1).inputs
+    rows = DriveMap(rig.fu1.spec).inputs
     end = rows[-1].address + 2
     assert rig.read(4, end, 1) == [NO_ADDRESS]
     assert rig.read(4, 40, end - 40 + 1) == [NO_ADDRESS]
@@ -223,20 +223,20 @@ def test_unknown_units_are_not_configured():
 
 def test_the_list_is_complete_and_without_overlap():
     plant = make_plant()
-    assert [m.unit_id for m in drive_maps(plant)] == [1, 2, 9]
-    for drive_map in drive_maps(plant):
+    assert [m.unit_id for m in drive_maps(plant.catalogue)] == [1, 2, 9]
+    for drive_map in drive_maps(plant.catalogue):
         for table in Table:
             used = [
                 a for r in drive_map.rows if r.table is table for a in range(r.address, r.address + r.size)
             ]
             assert used == sorted(set(used))
-    references = {row.name: row.reference for row in DriveMap(plant.by_unit[1]).rows if row.size == 2}
+    references = {row.name: row.reference for row in drive_maps(plant.catalogue)[0].rows if row.size == 2}
     assert references["actual/frequency"] == "30033"
     assert references["command/frequency"] == "40033"
-    access = {(m.unit_id, r.name): r.access for m in drive_maps(plant) for r in m.rows}
+    access = {(m.unit_id, r.name): r.access for m in drive_maps(plant.catalogue) for r in m.rows}
     assert access[1, "supervision/fieldbus_timeout_ms"] == "r"
     assert access[9, "supervision/fieldbus_timeout_ms"] == "rw"
-    bridge = units_of(plant).bridge_rows
+    bridge = units_of(plant.catalogue).bridge_rows
     assert [row.name for row in bridge][-3:] == ["conveyor/fu1", "conveyor/fu2", "conveyor/fu3"]
 
 
@@ -251,7 +251,7 @@ def test_every_listed_register_can_be_read():
         Table.HOLDING_REGISTER: 3,
         Table.INPUT_REGISTER: 4,
     }
-    for row in DriveMap(rig.drive("fu2")).rows:
+    for row in DriveMap(rig.drive("fu2").spec).rows:
         if row.name in ("actual/position", "command/position"):
             continue  # not in the telegram
         if row.name.startswith("parameter/"):

@@ -86,7 +86,7 @@ def test_every_run_of_every_familys_export_is_read(mapping: str) -> None:
     plant = family_plant(mapping)
     dispatcher = dispatcher_of(plant, lambda: NOW)
     absent = 0
-    for drive_map in drive_maps(plant):
+    for drive_map in drive_maps(plant.catalogue):
         for run in runs_of(drive_map.rows):
             answer = ask(dispatcher, drive_map.unit_id, run.function, run.start, run.count)
             missing = absent_of(plant, drive_map.drive_name, run)
@@ -99,7 +99,7 @@ def test_every_run_of_every_familys_export_is_read(mapping: str) -> None:
                 assert words(answer)[at : at + row.size] == [0] * row.size, row
             absent += len(missing)
     assert absent, "a family without a value that is not there proves nothing"
-    for run in runs_of(units_of(plant).bridge_rows):
+    for run in runs_of(units_of(plant.catalogue).bridge_rows):
         assert ask(dispatcher, 255, run.function, run.start, run.count)[0] == run.function
 
 
@@ -115,7 +115,7 @@ def test_every_value_that_is_not_good_says_so(mapping: str) -> None:
     """Registers 22 and 23 for the first 32, the discrete inputs from 4096 on for all."""
     plant = family_plant(mapping)
     dispatcher = dispatcher_of(plant, lambda: NOW)
-    for drive_map in drive_maps(plant):
+    for drive_map in drive_maps(plant.catalogue):
         unit, rows = drive_map.unit_id, drive_map.inputs
         flags = bits(dispatcher, unit, VALUE_FLAGS, len(rows))
         high, low = words(ask(dispatcher, unit, 4, 22, 2))
@@ -133,7 +133,9 @@ def test_what_is_not_there_reads_0_beside_others_and_is_refused_alone() -> None:
     assert rig.read(4, 34, 2) == [-0x0A], "the scale of the current is not known"
     assert rig.read(4, 32, 4)[2:] == [0, 0]
     assert len(rig.read(4, 10, 26)) == 26
-    serial = next(row.address for row in drive_maps(rig.plant)[0].inputs if row.name == "identity/serial")
+    serial = next(
+        row.address for row in drive_maps(rig.plant.catalogue)[0].inputs if row.name == "identity/serial"
+    )
     assert rig.read(4, serial - 2, 4) == [-0x0B], "nothing else in it is there"
 
 
@@ -141,7 +143,7 @@ def test_while_there_is_no_data_a_block_with_the_drives_values_is_refused() -> N
     """No 0 Hz of a drive that nobody hears."""
     rig = Rig()
     rig.runs(0x0237, 0x2000, 0x2000)
-    rows = {row.name: row.address for row in drive_maps(rig.plant)[0].inputs}
+    rows = {row.name: row.address for row in drive_maps(rig.plant.catalogue)[0].inputs}
     assert len(rig.read(4, 32, 66)) == 66
     rig.node(NodeState.LOST)
     rig.now += 3.0
@@ -156,7 +158,7 @@ def test_of_a_device_one_absent_input_costs_no_other(tmp_path: Path) -> None:
     """No TPDO of the encoder carries its speed."""
     bench = device_bench(tmp_path, encoder(), ENCODER)
     bench.run(1.0)
-    (device,) = device_maps(bench.plant)
+    (device,) = device_maps(bench.plant.catalogue)
     dispatcher = dispatcher_of(bench.plant, lambda: bench.now, view=bench.view)
     for run in runs_of(device.rows):
         answer = ask(dispatcher, device.unit_id, run.function, run.start, run.count)
@@ -176,7 +178,7 @@ def test_of_a_device_one_absent_input_costs_no_other(tmp_path: Path) -> None:
 def test_of_an_output_block_every_run_is_read(tmp_path: Path) -> None:
     bench = device_bench(tmp_path, io_block(), IO_BLOCK, OUTPUTS)
     bench.run(2.0)
-    (device,) = device_maps(bench.plant)
+    (device,) = device_maps(bench.plant.catalogue)
     dispatcher = dispatcher_of(bench.plant, lambda: bench.now, view=bench.view)
     for run in runs_of(device.rows):
         answer = ask(dispatcher, device.unit_id, run.function, run.start, run.count)
@@ -220,6 +222,6 @@ class TestMirror:
     @pytest.mark.parametrize("mapping", family_names())
     def test_it_is_behind_all_other_registers(self, mapping: str) -> None:
         assert PARAMETERS + 2 * MOST_PARAMETERS <= MIRROR
-        for drive_map in drive_maps(family_plant(mapping)):
+        for drive_map in drive_maps(family_plant(mapping).catalogue):
             holding = [row for row in drive_map.rows if row.table is Table.HOLDING_REGISTER]
             assert max(row.address + row.size for row in holding) <= MIRROR

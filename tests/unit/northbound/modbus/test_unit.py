@@ -71,7 +71,7 @@ def test_a_node_that_is_out_of_service_says_nothing_of_the_module():
     plant.set("bus/can0/state", 0, 100.0)
     node_goes(plant, plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
     node_goes(plant, plant.nodes["spare"], NodeState.DISABLED, 100.0)
-    unit = BridgeUnit(units_of(plant), view_of(plant, lambda: 100.0))
+    unit = BridgeUnit(units_of(plant.catalogue), view_of(plant, lambda: 100.0))
     (state,) = unit.read_words(Table.INPUT_REGISTER, 0, 1, PLC)
     assert state == 0x02, "operational, and nothing else"
 

@@ -13,6 +13,7 @@ import pytest
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
+from bridge.catalogue import Catalogue
 from bridge.command import Plant
 from bridge.image import DataType, Image, Point
 from bridge.mapping import family_names
@@ -43,7 +44,7 @@ def of_all_families(folder: Path) -> Plant:
 
 def of_project(path: Path) -> Plant:
     project = load_project(path)
-    return Plant(project.site, project.families, "1.2.3")
+    return Plant(Catalogue.of(project.site, project.families), "1.2.3")
 
 
 PLANTS: dict[str, Callable[[Path], Plant]] = {

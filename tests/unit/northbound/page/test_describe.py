@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bridge.northbound.page.describe import described
 from tests.support import sites
-from tests.support.condition import families_of
 
 DRIVE, BUS = "conveyor/fu1", "bus/can0"
 _SITE = sites.site(
@@ -14,7 +13,7 @@ _SITE = sites.site(
 
 def test_the_site_is_described_by_the_names_of_its_points() -> None:
     plant = sites.plant_of(_SITE)
-    told = described(plant.image, plant.site, families_of(plant))
+    told = described(plant.image, plant.catalogue)
     assert [one["name"] for one in told["drives"]] == [DRIVE, "conveyor/fu2"]
     assert all(one["main"] == "frequency" and one["stops_in"] == "ready" for one in told["drives"])
     names = {f"{place}/{leaf}" for place, kind in told["places"].items() for leaf in told["natures"][kind]}

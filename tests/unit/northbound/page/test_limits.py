@@ -35,7 +35,7 @@ def test_a_setpoint_is_limited_as_the_drive_scales_it(
     bench = Bench(site, family=family, mapping=mapping, node=node)
     bench.run(3.0)
     (drive,) = bench.plant.drives
-    told = described(bench.plant.image, site, {mapping: family})
+    told = described(bench.plant.image, bench.plant.catalogue)
     nature = told["natures"][told["places"][drive]][f"command/{leaf}"]
     full = f"{drive}/{nature['scaled_by'][0]}"
     place = next(at for at, point in enumerate(bench.plant.image.points) if point.name == full)

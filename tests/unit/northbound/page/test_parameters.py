@@ -20,8 +20,7 @@ _SITE = sites.site(sites.bus(sites.node(sites.drive("fu1", "lease", 1000), sites
 
 
 def holders() -> dict[str, Holder]:
-    plant = sites.plant_of(_SITE)
-    return holders_of(plant.site, {node.table.mapping: node.family for node in plant.nodes.values()})
+    return holders_of(sites.catalogue_of(_SITE))
 
 
 def test_each_drive_has_its_parameters_with_range_states_and_wear() -> None:

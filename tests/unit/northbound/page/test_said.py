@@ -70,7 +70,7 @@ APART: Final = (
 )
 UNSAID: Final[dict[str, tuple[str, ...]]] = {
     "bridge/command/messages/event.py": ("Zq zq (because: 7Xq)",),
-    "bridge/command/plant.py": ("Zq zq on 7Xq", "more than 247 drives have no Modbus unit id"),
+    "bridge/command/plant.py": ("Zq zq on 7Xq",),
     "bridge/command/worst_case.py": (
         "how much older the owner's last telegram may be than the bridge assumes",
     ),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from bridge.catalogue import Catalogue
 from bridge.command import Action, Identity, Plant, Source
 from bridge.northbound.zenoh.commands import BUS_METHODS, BadCommand, Commands
 from tests.support.quick import MAPPING, NORD, quick_site
@@ -15,7 +16,7 @@ WHO = Identity(Source.ZENOH, "plc")
 
 @pytest.fixture
 def commands(tmp_path: Path) -> Commands:
-    return Commands(Plant(quick_site(tmp_path, 2), {MAPPING: NORD}, "0").image.points)
+    return Commands(Plant(Catalogue.of(quick_site(tmp_path, 2), {MAPPING: NORD}), "0").image.points)
 
 
 @pytest.mark.parametrize("action", BUS_METHODS)

@@ -7,36 +7,22 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any, Final
 
-from bridge.command.leg.state import WATCHDOG_STATES
-from bridge.command.link import NodeState
-from bridge.command.messages.life_sign import LEAF as LIFE_SIGN
-from bridge.command.parameter_points import parameter_points
-from bridge.command.stop_check.state import LAST_STOPS
-from bridge.condition.told import CONDITIONS
+from bridge.catalogue.codes import (
+    CONDITIONS,
+    CONTROLLER_STATES,
+    LAST_STOPS,
+    NMT_STATES,
+    NODE_STATES,
+    WATCHDOG_STATES,
+)
+from bridge.catalogue.parameter_points import parameter_points
 from bridge.config import BusTable, DriveTable, NodeTable, Site
 from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec, scales_of
-from bridge.image import DataType, Point
+from bridge.image.point import DataType, Point
 from bridge.mapping.device import Signal
 from bridge.mapping.model import Family, Poll, ProcessValue
 from bridge.parameter import Names
 
-NMT_STATES: Final = (
-    (0, "initialising"),
-    (4, "stopped"),
-    (5, "operational"),
-    (127, "pre_operational"),
-    (255, "unknown"),
-)
-NODE_CODES: Final = {
-    NodeState.ABSENT: 0,
-    NodeState.BOOTING: 1,
-    NodeState.OPERATIONAL: 2,
-    NodeState.LOST: 3,
-    NodeState.STOPPED: 4,
-    NodeState.DISABLED: 5,
-    NodeState.CONFIG_ERROR: 6,
-}
-NODE_STATES: Final = tuple((code, state.name.lower()) for state, code in NODE_CODES.items())
 CONNECTION_COUNTS: Final = {
     "modbus_refused_connections": "Modbus connections that were refused",
     "modbus_broken_connections": "Modbus connections that the bridge ended",
@@ -44,8 +30,9 @@ CONNECTION_COUNTS: Final = {
     "opcua_broken_connections": "OPC UA connections that the bridge ended",
     "zenoh_broken_connections": "zenoh connections that have ended, whoever ended them",
 }
-CONTROLLER_STATES: Final = ((0, "ok"), (1, "warning"), (2, "passive"), (3, "bus_off"), (4, "down"))
-
+LIFE_SIGN: Final = "life_sign"
+"""Name of the point that offers the token, in ``supervision``, and of the one that takes it, in
+``command``."""
 
 _FLAG, _TEXT, _REAL = DataType.BOOL, DataType.STRING, DataType.FLOAT
 _U8, _U16, _U32 = DataType.UINT8, DataType.UINT16, DataType.UINT32

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.image import DataType, Point
+from bridge.image.point import DataType, Point
 from bridge.mapping.model import Parameter
 from bridge.parameter import Entry, Names
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command.parameter_points import parameter_points
+from bridge.catalogue.parameter_points import parameter_points
 from bridge.mapping import load_family
 from bridge.mapping.model import Aliases, Parameter
 from bridge.parameter import Names

@@ -27,13 +27,14 @@ class Rank(IntEnum):
 @dataclass(frozen=True, slots=True)
 class Trouble:
     """``place`` is ``<node>/<drive>``, ``<node>``, ``bus/<bus>`` or ``bridge``. ``is_of_bus``: a fault with
-    which a drive answers a silent bus."""
+    which a drive answers a silent bus. ``fronts`` are the servers that fail."""
 
     rank: Rank
     kind: str
     place: str
     facts: tuple[tuple[str, Value | Text], ...] = ()
     is_of_bus: bool = False
+    fronts: frozenset[str] = frozenset()
 
 
 class Look:
@@ -186,5 +187,12 @@ def silence_of(look: Look, bus: str, nodes: Sequence[str]) -> Iterator[Trouble]:
 
 
 def of_bridge(look: Look) -> Iterator[Trouble]:
-    if failing := look("bridge/fronts_failing"):
-        yield Trouble(Rank.WARNING, "fronts_failing", "bridge", (("fronts", failing),))
+    if failing := look.words("bridge/fronts_failing"):
+        facts = (("fronts", failing),)
+        yield Trouble(Rank.WARNING, "fronts_failing", "bridge", facts, fronts=_fronts_in(failing))
+
+
+def _fronts_in(failing: Text | str) -> frozenset[str]:
+    parts = () if isinstance(failing, str) else dict(failing.facts)["parts"]
+    texts = [one for one in parts if isinstance(one, Text)] if isinstance(parts, tuple) else []
+    return frozenset(str(dict(one.facts)["front"]) for one in texts)

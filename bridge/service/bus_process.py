@@ -41,6 +41,7 @@ from bridge.service.parts import Ports, ServerPart, Supervisor
 from bridge.service.plant_condition import PlantCondition
 from bridge.service.preflight import check_files
 from bridge.service.wear import WearKeeper
+from bridge.text import Text
 
 _log = logging.getLogger(__name__)
 
@@ -227,11 +228,11 @@ class Service:
     def _servers(self) -> Iterator[ServerPart]:
         has = self._opened.has
         if self.modbus:
-            yield ServerPart("modbus", "the Modbus server", self.modbus, is_started=has("modbus"))
+            yield ServerPart("modbus", Text.of("front.modbus"), self.modbus, is_started=has("modbus"))
         for bus, gateway in self.gateways.items():
             name = f"gateway {bus}"
-            yield ServerPart(name, f"the gateway of {bus}", gateway, is_started=has(name))
-        yield ServerPart("mirror", "the link to the fronts", self.mirror)
+            yield ServerPart(name, Text.of("front.gateway", bus=bus), gateway, is_started=has(name))
+        yield ServerPart("mirror", Text.of("front.link"), self.mirror)
 
     async def _start(self) -> None:
         """Ready is who serves what the site file says, or can say what it does not serve."""

@@ -89,7 +89,8 @@ UNSAID: Final[dict[str, tuple[str, ...]]] = {
     ),
     "bridge/parameter/ledger.py": ("10 min",),
     "bridge/parameter/names.py": ("parameter set",),
-    "bridge/service/parts.py": ("7Xq; not served: Zq zq",),
+    "bridge/service/front_process.py": ("the bus process has given this front up",),
+    "bridge/service/parts.py": ("7Xq; not served: 7Xq",),
 }
 """What is no message on the page: keys, logs, and parts of messages that are tested as a whole."""
 _COMMAND: Final = re.compile(r"(?:modprobe|ip link) .*")

@@ -369,12 +369,12 @@ class Drive(WordTiming):
     def _refresh_supervision(self, now: float) -> None:
         channel = self.channel
         fault = channel.fault
-        values: tuple[Value, ...] = (
-            channel.fault_text,
+        values: tuple[Value | Text, ...] = (
+            channel.fault_said,
             fault.number,
             fault.cause,
             fault.remedy,
-            channel.last_fault_text,
+            channel.last_fault_said,
             str(channel.owner or ""),
             int(channel.watchdog_state),
             channel.timeout_ms,
@@ -412,7 +412,7 @@ class Drive(WordTiming):
         if life is not None:
             self._image.keep(self._life[0], life.token(now), now)
 
-    def _show(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
-        """Values that the bridge itself knows: their quality is always good."""
+    def _show(self, indices: Sequence[int], values: Sequence[Value | Text], now: float) -> None:
+        """What the bridge itself knows: its quality is always good."""
         for index, value in zip(indices, values, strict=True):
-            self._image.set(index, value, now)
+            self._image.say(index, value, now)

@@ -144,16 +144,16 @@ def of_drive(
         yield Trouble(Rank.WARNING, "stop_unproven", drive, (("why", reason),))
 
 
-def _shown(look: Look, drive: str) -> tuple[tuple[str, Value], ...]:
+def _shown(look: Look, drive: str) -> tuple[tuple[str, Value | Text], ...]:
     """The facts of the fault that the points show; none where there is none."""
-    text = look(f"{drive}/status/fault_text")
+    text = look.words(f"{drive}/status/fault_text")
     if not text:
         return ()
     rest = ((leaf, look(f"{drive}/status/fault_{leaf}") or "") for leaf in ("number", "cause", "remedy"))
     return (("text", text), *rest)
 
 
-def _own(look: Look, drive: str, own_fault: OwnFault | None) -> tuple[tuple[str, Value], ...]:
+def _own(look: Look, drive: str, own_fault: OwnFault | None) -> tuple[tuple[str, Value | Text], ...]:
     """The facts of the drive's own fault. After a trip the points show the bridge's, which says no more than
     that the controller is silent."""
     word = look(f"{drive}/status/drive_status_word")
@@ -163,7 +163,7 @@ def _own(look: Look, drive: str, own_fault: OwnFault | None) -> tuple[tuple[str,
     fault = own_fault(word, code if isinstance(code, int) else 0)
     if fault is None:
         return ()
-    return (("text", str(fault)), ("number", fault.number), ("cause", fault.cause), ("remedy", fault.remedy))
+    return (("text", fault.said), ("number", fault.number), ("cause", fault.cause), ("remedy", fault.remedy))
 
 
 def of_meaning(look: Look, drive: str, main: str) -> Iterator[Trouble]:

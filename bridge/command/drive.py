@@ -28,9 +28,8 @@ from bridge.mapping.model import Family, Meaning, Slot
 from bridge.text import Text
 
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
-_FAULT: Final = ("fault_text", "fault_number", "fault_cause", "fault_remedy")
+_FAULT: Final = ("fault_number", "fault_cause", "fault_remedy")
 _SUPERVISION: Final = (
-    "last_fault_text",
     "owner",
     "watchdog_state",
     "fieldbus_timeout_ms",
@@ -133,6 +132,8 @@ class Drive(WordTiming):
 
         self._control_word, *self._setpoint_indices = places("command", ["control_word", *carried])
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
+        (self._fault_text,) = places("status", ("fault_text",))
+        (self._last_fault_text,) = places("supervision", ("last_fault_text",))
         self._supervision = places("status", _FAULT) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
         self._life = places("supervision", (LIFE_SIGN,)) if self.table.life_sign else []
@@ -369,12 +370,10 @@ class Drive(WordTiming):
     def _refresh_supervision(self, now: float) -> None:
         channel = self.channel
         fault = channel.fault
-        values: tuple[Value | Text, ...] = (
-            channel.fault_said,
+        values: tuple[Value, ...] = (
             fault.number,
             fault.cause,
             fault.remedy,
-            channel.last_fault_said,
             str(channel.owner or ""),
             int(channel.watchdog_state),
             channel.timeout_ms,
@@ -387,6 +386,8 @@ class Drive(WordTiming):
             channel.refused_writes,
         )
         self._show(self._supervision, values, now)
+        self._image.say(self._fault_text, channel.fault_said, now)
+        self._image.say(self._last_fault_text, channel.last_fault_said, now)
         self._show_stop_time(now)
 
     def _show_stop_time(self, now: float) -> None:
@@ -412,7 +413,7 @@ class Drive(WordTiming):
         if life is not None:
             self._image.keep(self._life[0], life.token(now), now)
 
-    def _show(self, indices: Sequence[int], values: Sequence[Value | Text], now: float) -> None:
-        """What the bridge itself knows: its quality is always good."""
+    def _show(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
+        """Values that the bridge itself knows: their quality is always good."""
         for index, value in zip(indices, values, strict=True):
-            self._image.say(index, value, now)
+            self._image.set(index, value, now)

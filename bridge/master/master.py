@@ -263,7 +263,7 @@ class Master:
             with self._replies:
                 self._plant.deliver_outcomes()
 
-    def _enforce(self, node: str, action: Action, why: str, now: float) -> None:
+    def _enforce(self, node: str, action: Action, why: Text, now: float) -> None:
         for line in self._lines:
             line.network.enforce(node, action, why, now)
 

@@ -179,7 +179,8 @@ class Supervisor:
     def _settled(self, part: Part, now: float) -> None:
         self._unknown.discard(part.name)
         self._look()
-        self._plant.say(_FAILING, self._failing_said, now)
+        image = self._plant.image
+        image.say(image.index[_FAILING], self._failing_said, now)
         self._notifier.status(self.status)
 
     def _look(self) -> None:

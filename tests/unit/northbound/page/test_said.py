@@ -36,8 +36,6 @@ COVERED: Final = (
     "bridge/northbound/page/parameters.py",
     "bridge/canopen/abort.py",
     "bridge/canopen/datatypes.py",
-    "bridge/canopen/duplicate.py",
-    "bridge/canopen/nmt.py",
     "bridge/canopen/pdo.py",
     "bridge/canopen/sdo_transfer.py",
     "bridge/can/listener.py",

@@ -10,7 +10,6 @@ from typing import Final
 import pytest
 
 from bridge.canopen import abort
-from bridge.canopen.habits import HABITS
 from bridge.canopen.sdo_ways_back import WAYS_BACK
 from bridge.command.link import NodeState
 from bridge.command.messages.request import Code
@@ -192,9 +191,6 @@ def test_texts_are_put_together_from_phrases(said: str, german: str) -> None:
     assert BOOK.said(said) == german
 
 
-@pytest.mark.parametrize("count", [1, 32])
-def test_each_habit_of_a_device_has_its_german_phrase(count: int) -> None:
-    for habit in HABITS.values():
-        assert lacking(habit.said(count, 8, 1)) == []
+def test_each_way_back_from_block_transfer_has_its_german_phrase() -> None:
     for way in WAYS_BACK:
         assert lacking(way.says) == []

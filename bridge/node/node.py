@@ -443,7 +443,7 @@ class NodeCore:
     def _show(self, now: float) -> None:
         self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
 
-    def _count_write(self, owner: str, address: str, name: str) -> str:
+    def _count_write(self, owner: str, address: str, name: str) -> Text | str:
         """The boot-up writes to an EEPROM: counted as of its beginning."""
         ledger, eeprom = self._ledger, self.node.family.eeprom
         cycles = eeprom.cycles if eeprom else None

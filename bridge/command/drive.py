@@ -132,8 +132,7 @@ class Drive(WordTiming):
 
         self._control_word, *self._setpoint_indices = places("command", ["control_word", *carried])
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
-        (self._fault_text,) = places("status", ("fault_text",))
-        (self._last_fault_text,) = places("supervision", ("last_fault_text",))
+        self._faults = places("status", ("fault_text",)) + places("supervision", ("last_fault_text",))
         self._supervision = places("status", _FAULT) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
         self._life = places("supervision", (LIFE_SIGN,)) if self.table.life_sign else []
@@ -386,8 +385,11 @@ class Drive(WordTiming):
             channel.refused_writes,
         )
         self._show(self._supervision, values, now)
-        self._image.say(self._fault_text, channel.fault_said, now)
-        self._image.say(self._last_fault_text, channel.last_fault_said, now)
+        for index, said in zip(self._faults, (channel.fault_said, channel.last_fault_said), strict=True):
+            if said:
+                self._image.say(index, said, now)
+            else:
+                self._image.set(index, "", now)
         self._show_stop_time(now)
 
     def _show_stop_time(self, now: float) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from bridge.canopen import abort
+from bridge.canopen.decode_sdo import SdoSaid, shown
 from bridge.canopen.sdo_transfer import SdoError
 from bridge.text import Text
 
@@ -45,9 +46,42 @@ _ABORTS: Final[Mapping[int, Text]] = {
 _UNKNOWN: Final = Text.of("abort.unknown")
 
 
+_REQUESTS: Final[Mapping[str, Callable[[str, int], Text]]] = {
+    "length": lambda _, count: Text.of("sdo_request.length", count=count),
+    "unknown": lambda _, command: Text.of("sdo_request.unknown", command=command),
+    "abort": lambda name, code: Text.of("sdo_request.abort", object=name, why=text_of_abort(code), code=code),
+    "read": lambda name, _: Text.of("sdo_request.read", object=name),
+    "read_on": lambda name, _: Text.of("sdo_request.read_on", object=name),
+    "write_long": lambda name, count: Text.of("sdo_request.write_bytes", object=name, count=count),
+    "segment": lambda name, _: Text.of("sdo_request.segment", object=name),
+    "block_read": lambda name, _: Text.of("sdo_request.block_read", object=name),
+    "block_read_start": lambda name, _: Text.of("sdo_request.block_read_start", object=name),
+    "block_read_end": lambda name, _: Text.of("sdo_request.block_read_end", object=name),
+    "taken": lambda name, number: Text.of("sdo_request.taken", object=name, number=number),
+    "block_write": lambda name, _: Text.of("sdo_request.block_write", object=name),
+    "block_write_end": lambda name, _: Text.of("sdo_request.block_write_end", object=name),
+    "block_segment": lambda name, number: Text.of("sdo_request.block_segment", object=name, number=number),
+    "last_block_segment": lambda name, sub: Text.of("sdo_request.last_segment", object=name, number=sub),
+}
+
+
 def text_of_abort(code: int) -> Text:
     """The meaning of an abort code (CiA 301 §7.2.4.3.17)."""
     return _ABORTS.get(code, _UNKNOWN)
+
+
+def text_of_request(said: SdoSaid) -> Text:
+    """A request of a client to a server."""
+    about = dict(said.values)
+    name = f"{about.get('index', '')}h:{about.get('sub', 0):02X}"
+    if said.act in ("write", "value"):
+        data = bytes.fromhex(str(about["data"]))
+        value = shown(data) if data else Text.of("sdo_request.nothing")
+        is_begin = said.act == "write"
+        return Text.of("sdo_request.write" if is_begin else "sdo_request.value", object=name, value=value)
+    if said.act == "write_long" and said.number is None:
+        return Text.of("sdo_request.write_segments", object=name)
+    return _REQUESTS[said.act](name, said.number or 0)
 
 
 def text_of(error: SdoError) -> Text:

@@ -52,7 +52,9 @@ class HabitWatch:
 
     def habits(self) -> dict[int, list[str]]:
         """Habits by node id, of the nodes that have any."""
-        said = {node_id: counter.said() for node_id, counter in sorted(self._counters.items())}
+        said = {
+            node_id: list(map(str, counter.said())) for node_id, counter in sorted(self._counters.items())
+        }
         return {node_id: habits for node_id, habits in said.items() if habits}
 
     def _compare(self, node_id: int, odd: Odd, has: int, due: int) -> None:

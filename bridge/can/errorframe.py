@@ -8,6 +8,8 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Final, NamedTuple
 
+from bridge.text import Text
+
 _TX_TIMEOUT: Final = 0x001
 _LOST_ARBITRATION: Final = 0x002
 _CONTROLLER: Final = 0x004
@@ -23,55 +25,55 @@ _WARNING: Final = 0x04 | 0x08
 _PASSIVE: Final = 0x10 | 0x20
 _ACTIVE: Final = 0x40
 _CONTROLLER_TEXTS: Final = (
-    "receive buffer overflow",
-    "transmit buffer overflow",
-    "warning level reached for receive errors",
-    "warning level reached for transmit errors",
-    "error passive, receiving",
-    "error passive, transmitting",
-    "error active again",
+    Text.of("can_error.receive_overflow"),
+    Text.of("can_error.transmit_overflow"),
+    Text.of("can_error.receive_warning"),
+    Text.of("can_error.transmit_warning"),
+    Text.of("can_error.receive_passive"),
+    Text.of("can_error.transmit_passive"),
+    Text.of("can_error.active_again"),
 )
 _PROTOCOL_TEXTS: Final = (
-    "bit error",
-    "form error",
-    "stuff error",
-    "cannot send a dominant bit",
-    "cannot send a recessive bit",
-    "overload",
-    "active error announced",
-    "while transmitting",
+    Text.of("can_error.bit"),
+    Text.of("can_error.form"),
+    Text.of("can_error.stuff"),
+    Text.of("can_error.no_dominant"),
+    Text.of("can_error.no_recessive"),
+    Text.of("can_error.overload"),
+    Text.of("can_error.announced"),
+    Text.of("can_error.transmitting"),
 )
 _LOCATIONS: Final = {
-    0x02: "identifier bits 10-3",
-    0x03: "start of frame",
-    0x04: "RTR bit",
-    0x05: "IDE bit",
-    0x06: "identifier bits 2-0",
-    0x07: "identifier bits 17-13",
+    0x02: Text.of("can_place.identifier_bits", bits="10-3"),
+    0x03: Text.of("can_place.start_of_frame"),
+    0x04: Text.of("can_place.rtr"),
+    0x05: Text.of("can_place.ide"),
+    0x06: Text.of("can_place.identifier_bits", bits="2-0"),
+    0x07: Text.of("can_place.identifier_bits", bits="17-13"),
     0x08: "CRC",
-    0x09: "reserved bit 0",
-    0x0A: "data",
-    0x0B: "data length code",
-    0x0C: "RTR bit",
-    0x0D: "reserved bit 1",
-    0x0E: "identifier bits 4-0",
-    0x0F: "identifier bits 12-5",
-    0x12: "intermission",
-    0x18: "CRC delimiter",
-    0x19: "ACK slot",
-    0x1A: "end of frame",
-    0x1B: "ACK delimiter",
+    0x09: Text.of("can_place.reserved_bit", bit=0),
+    0x0A: Text.of("can_place.data"),
+    0x0B: Text.of("can_place.length"),
+    0x0C: Text.of("can_place.rtr"),
+    0x0D: Text.of("can_place.reserved_bit", bit=1),
+    0x0E: Text.of("can_place.identifier_bits", bits="4-0"),
+    0x0F: Text.of("can_place.identifier_bits", bits="12-5"),
+    0x12: Text.of("can_place.intermission"),
+    0x18: Text.of("can_place.crc_delimiter"),
+    0x19: Text.of("can_place.ack_slot"),
+    0x1A: Text.of("can_place.end_of_frame"),
+    0x1B: Text.of("can_place.ack_delimiter"),
 }
 _WIRE_FAULTS: Final = {
-    0x04: "CANH broken",
-    0x05: "CANH shorted to the battery",
-    0x06: "CANH shorted to the supply",
-    0x07: "CANH shorted to ground",
-    0x40: "CANL broken",
-    0x50: "CANL shorted to the battery",
-    0x60: "CANL shorted to the supply",
-    0x70: "CANL shorted to ground",
-    0x80: "CANL shorted to CANH",
+    0x04: Text.of("can_error.canh_broken"),
+    0x05: Text.of("can_error.canh_battery"),
+    0x06: Text.of("can_error.canh_supply"),
+    0x07: Text.of("can_error.canh_ground"),
+    0x40: Text.of("can_error.canl_broken"),
+    0x50: Text.of("can_error.canl_battery"),
+    0x60: Text.of("can_error.canl_supply"),
+    0x70: Text.of("can_error.canl_ground"),
+    0x80: Text.of("can_error.canl_canh"),
 }
 
 
@@ -108,35 +110,43 @@ def judge(can_id: int, data: bytes) -> ErrorNews:
     return ErrorNews(state, counters)
 
 
-def describe(can_id: int, data: bytes) -> str:
+def describe(can_id: int, data: bytes) -> Text:
     """An error frame in words, its classes in the order of <linux/can/error.h>."""
-    found: list[str] = []
+    found: list[Text] = []
     if can_id & _TX_TIMEOUT:
-        found.append("transmission timed out")
+        found.append(Text.of("can_error.transmission_timed_out"))
     if can_id & _LOST_ARBITRATION:
-        found.append(f"arbitration lost in bit {data[0]}" if data[0] else "arbitration lost")
+        found.append(_lost_arbitration(data[0]))
     if can_id & _CONTROLLER:
-        found += _bits(data[1], _CONTROLLER_TEXTS) or ["controller problem"]
+        found += _bits(data[1], _CONTROLLER_TEXTS) or [Text.of("can_error.controller")]
     if can_id & _PROTOCOL:
-        place = _LOCATIONS.get(data[3])
-        found.append(
-            ", ".join(_bits(data[2], _PROTOCOL_TEXTS) or ["protocol violation"])
-            + (f" in {place}" if place else "")
-        )
+        found.append(_protocol_violation(data))
     if can_id & _TRANSCEIVER:
-        found.append(_WIRE_FAULTS.get(data[4], "transceiver fault"))
+        found.append(_WIRE_FAULTS.get(data[4], Text.of("can_error.transceiver")))
     if can_id & _NO_ACK:
-        found.append("no acknowledge: nobody else on the bus, or another bit rate")
+        found.append(Text.of("can_error.no_acknowledge"))
     if can_id & _BUS_OFF:
-        found.append("bus-off")
+        found.append(Text.word("controller_state", "bus-off"))
     if can_id & _BUS_ERROR and not can_id & (_PROTOCOL | _NO_ACK):
-        found.append("bus error")
+        found.append(Text.of("can_error.bus"))
     if can_id & _RESTARTED:
-        found.append("controller restarted")
+        found.append(Text.of("can_error.restarted"))
     if can_id & _COUNTERS:
-        found.append(f"{data[6]} transmit and {data[7]} receive errors")
-    return "; ".join(found) or "unspecified error"
+        found.append(Text.of("can_error.counters", transmit=data[6], receive=data[7]))
+    return Text.of("can_error.several", errors=tuple(found or [Text.of("can_error.unspecified")]))
 
 
-def _bits(octet: int, texts: tuple[str, ...]) -> list[str]:
+def _lost_arbitration(bit: int) -> Text:
+    return Text.of("can_error.arbitration_lost_in", bit=bit) if bit else Text.of("can_error.arbitration_lost")
+
+
+def _protocol_violation(data: bytes) -> Text:
+    errors = tuple(_bits(data[2], _PROTOCOL_TEXTS) or [Text.of("can_error.protocol")])
+    place = _LOCATIONS.get(data[3])
+    if place is None:
+        return Text.of("can_error.violations", errors=errors)
+    return Text.of("can_error.violations_in", errors=errors, place=place)
+
+
+def _bits(octet: int, texts: tuple[Text, ...]) -> list[Text]:
     return [text for number, text in enumerate(texts) if octet >> number & 1]

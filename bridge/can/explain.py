@@ -4,41 +4,37 @@ from __future__ import annotations
 
 import errno
 
+from bridge.text import Text, render
+
 
 class WrongBitrate(OSError):
     """The interface runs at another bit rate than the site file says."""
 
     def __init__(self, channel: str, actual: int, stated: int) -> None:
-        super().__init__(
-            errno.EINVAL,
-            f"{channel} runs at {actual} bit/s, the site file says {stated}: change one of them "
-            f"(ip link set {channel} down; ip link set {channel} up type can bitrate {stated})",
-        )
+        self.said = Text.of("can.wrong_bitrate", channel=channel, actual=actual, stated=stated)
+        super().__init__(errno.EINVAL, render(self.said))
 
 
 class TooSlow(OSError):
     """The interface is slower than was assumed, as nobody has said its bit rate."""
 
     def __init__(self, channel: str, actual: int, assumed: int) -> None:
-        super().__init__(
-            errno.EINVAL,
-            f"{channel} runs at {actual} bit/s, and requests at the pace of the assumed {assumed} would "
-            f"flood it: give --bitrate {actual}",
-        )
+        self.said = Text.of("can.too_slow", channel=channel, actual=actual, assumed=assumed)
+        super().__init__(errno.EINVAL, render(self.said))
 
 
-def explain(error: OSError, channel: str) -> str:
+def explain(error: OSError, channel: str) -> Text:
     """Sentence on ``error`` of ``channel`` with its remedy."""
     if isinstance(error, WrongBitrate | TooSlow):
-        return error.strerror or str(error)
+        return error.said
     match error.errno:
         case errno.ENODEV | errno.ENXIO:
-            return f"there is no interface {channel}; see `ip link`, and deploy/ for networkd files"
+            return Text.of("can.no_interface", channel=channel)
         case errno.ENETDOWN:
-            return f"interface {channel} is down: ip link set {channel} up type can bitrate …"
+            return Text.of("can.interface_down", channel=channel)
         case errno.EAFNOSUPPORT | errno.EPROTONOSUPPORT:
-            return "this kernel has no SocketCAN (modprobe can can-raw can-bcm)"
+            return Text.of("can.no_socketcan")
         case errno.EPERM | errno.EACCES:
-            return f"no permission to open {channel}"
+            return Text.of("can.no_permission", channel=channel)
         case _:
-            return f"{channel} cannot be opened: {error.strerror or error}"
+            return Text.of("can.not_opened", channel=channel, why=error.strerror or str(error))

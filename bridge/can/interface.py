@@ -10,6 +10,7 @@ from bridge.can.burstend import Burst
 from bridge.can.errorframe import ControllerState as ControllerState
 from bridge.can.errorframe import describe
 from bridge.canopen.frame import Frame
+from bridge.text import Text
 
 
 @dataclass(slots=True)
@@ -30,17 +31,17 @@ class BusStatus:
     bursts_refused: str = ""
     """Reason why the kernel takes no bursts at present, so that a timer of ours sends them; empty where it
     does."""
-    _last_error: tuple[int, bytes] | str = ""
+    _last_error: tuple[int, bytes] | Text | str = ""
 
-    def note_error(self, error: tuple[int, bytes] | str) -> None:
+    def note_error(self, error: tuple[int, bytes] | Text | str) -> None:
         """The latest trouble: identifier and data of an error frame, or a sentence."""
         self._last_error = error
 
     @property
-    def last_error(self) -> str:
-        """The latest trouble in words, empty where there was none."""
+    def last_error(self) -> Text | str:
+        """The latest trouble, empty where there was none."""
         # Put into words only when somebody looks: a broken wire gives thousands of them a second.
-        return self._last_error if isinstance(self._last_error, str) else describe(*self._last_error)
+        return describe(*self._last_error) if isinstance(self._last_error, tuple) else self._last_error
 
 
 class Bus(Protocol):

@@ -21,6 +21,7 @@ from bridge.can.interface import ControllerState
 from bridge.can.ownframes import OwnFrames
 from bridge.can.softbus import SoftBus
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
+from bridge.text import Text
 
 _MOST_WAITING: Final = 1 << 14
 _MOST_TO_SEND: Final = 256
@@ -93,9 +94,7 @@ class PythonCanBus(SoftBus):
                 self._status.note_error((message.arbitration_id, data))
             return
         if message.is_fd:
-            self._status.note_error(
-                f"CAN FD frame {message.arbitration_id:03X}h: not read, this bus is classical CAN"
-            )
+            self._status.note_error(Text.of("can.fd_frame", can_id=message.arbitration_id))
             return
         frame = frame_of(message, time.monotonic())
         if not message.is_rx or self._is_own(frame):
@@ -130,7 +129,8 @@ class PythonCanBus(SoftBus):
         """Receiving thread: the adapter is gone. Looks for it, less and less often, until it is back."""
         self._status.outages += 1
         self._status.state = ControllerState.DOWN
-        self._status.note_error(f"{self._interface} {self._channel}: {error}")
+        said = Text.of("can.adapter", interface=self._interface, channel=self._channel, why=str(error))
+        self._status.note_error(said)
         self._rouse()
         _shut_down(broken)
         pause_s = _REOPEN_S[0]

@@ -20,10 +20,13 @@ Value = int | str
 
 @dataclass(frozen=True, slots=True)
 class SdoSaid:
-    """One SDO frame. ``values`` are its facts by name, for scripts."""
+    """One SDO frame. ``values`` are its facts by name, for scripts. Of a request, ``act`` is what it does
+    and ``number`` the bytes, the segment or the command that it is about."""
 
     text: str
     values: tuple[tuple[str, Value], ...] = ()
+    act: str = ""
+    number: int | None = None
 
 
 @dataclass(slots=True)
@@ -45,7 +48,7 @@ class SdoListener:
     def request(self, data: bytes) -> SdoSaid:
         """A frame from client to server."""
         if len(data) != 8:
-            return SdoSaid(f"SDO request of {len(data)} bytes")
+            return SdoSaid(f"SDO request of {len(data)} bytes", act="length", number=len(data))
         command = data[0]
         if command == ABORT:
             return self._abort(data, "client")
@@ -58,18 +61,20 @@ class SdoListener:
                 return self._initiate_download(data)
             case 2:
                 self._begin(data)
-                return self._about("read", f"read {self._object}")
+                return self._about("read", f"read {self._object}", act="read")
             case 3:
-                return self._about("read", f"read {self._object}: next segment")
+                return self._about("read", f"read {self._object}: next segment", act="read_on")
             case 5:
                 return self._block_upload_request(data)
             case 6:
                 if command & 1:
-                    return self._about("write", f"block write {self._object}: end")
+                    return self._about("write", f"block write {self._object}: end", act="block_write_end")
                 self._begin(data)
-                return self._about("write", f"block write {self._object}")
+                return self._about("write", f"block write {self._object}", act="block_write")
             case _:
-                return SdoSaid(f"SDO request with unknown command {command:02X}h")
+                return SdoSaid(
+                    f"SDO request with unknown command {command:02X}h", act="unknown", number=command
+                )
 
     def reply(self, data: bytes) -> SdoSaid:
         """A frame from server to client."""
@@ -108,24 +113,28 @@ class SdoListener:
         self._data.clear()
         self._block = ""
 
-    def _about(self, what: str, text: str, *more: tuple[str, Value]) -> SdoSaid:
+    def _about(
+        self, what: str, text: str, *more: tuple[str, Value], act: str = "", number: int | None = None
+    ) -> SdoSaid:
         head = (("operation", what), ("index", f"{self._index:04X}"), ("sub", self._sub))
-        return SdoSaid(text, (*head, *more))
+        return SdoSaid(text, (*head, *more), act, number)
 
     def _abort(self, data: bytes, who: str) -> SdoSaid:
         self._name(data)
         self._block = ""
         code = U32.unpack_from(data, 4)[0]
         text = f"{self._object}: the {who} aborts: {abort.text(code)} ({code:08X}h)"
-        return self._about("abort", text, ("abort_code", f"{code:08X}"), ("abort_text", abort.text(code)))
+        facts = ("abort_code", f"{code:08X}"), ("abort_text", abort.text(code))
+        return self._about("abort", text, *facts, act="abort", number=code)
 
     def _initiate_download(self, data: bytes) -> SdoSaid:
         self._begin(data)
         if data[0] & 2:
             value = expedited(data)
             text = f"write {self._object} := {shown(value)}"
-            return self._about("write", text, ("data", value.hex()))
-        return self._about("write", f"write {self._object}: {_size(data, data[0] & 1)} in segments")
+            return self._about("write", text, ("data", value.hex()), act="write")
+        text = f"write {self._object}: {_size(data, data[0] & 1)} in segments"
+        return self._about("write", text, act="write_long", number=_count(data) if data[0] & 1 else None)
 
     def _initiate_upload(self, data: bytes) -> SdoSaid:
         self._begin(data)
@@ -137,10 +146,10 @@ class SdoListener:
     def _segment(self, data: bytes, what: str) -> SdoSaid:
         self._collect(segment(data))
         if not data[0] & 1:
-            return self._about(what, f"{self._object}: segment")
+            return self._about(what, f"{self._object}: segment", act="segment")
         value = bytes(self._data)
         sign = ":=" if what == "write" else "="
-        return self._about(what, f"{self._object} {sign} {shown(value)}", ("data", value.hex()))
+        return self._about(what, f"{self._object} {sign} {shown(value)}", ("data", value.hex()), act="value")
 
     def _collect(self, part: bytes) -> None:
         if len(self._data) + len(part) <= _MOST_COLLECTED:
@@ -150,7 +159,9 @@ class SdoListener:
         self._sequence, self._is_last = data[0] & 0x7F, bool(data[0] & 0x80)
         last = ", the last" if self._is_last else ""
         what = "write" if self._block == "down" else "read"
-        return self._about(what, f"{self._object}: block segment {self._sequence}{last}")
+        act = "last_block_segment" if self._is_last else "block_segment"
+        text = f"{self._object}: block segment {self._sequence}{last}"
+        return self._about(what, text, act=act, number=self._sequence)
 
     def _acknowledged(self, sequence: int) -> None:
         """The receiver has taken segments up to ``sequence``; those after it are sent again."""
@@ -161,15 +172,16 @@ class SdoListener:
         match data[0] & 3:
             case 0:
                 self._begin(data)
-                return self._about("read", f"block read {self._object}")
+                return self._about("read", f"block read {self._object}", act="block_read")
             case 1:
-                return self._about("read", f"block read {self._object}: end confirmed")
+                return self._about("read", f"block read {self._object}: end confirmed", act="block_read_end")
             case 2:
                 self._acknowledged(data[1])
-                return self._about("read", f"{self._object}: segments up to {data[1]} taken")
+                text = f"{self._object}: segments up to {data[1]} taken"
+                return self._about("read", text, act="taken", number=data[1])
             case _:
                 self._block, self._is_last = "up", False
-                return self._about("read", f"block read {self._object}: start")
+                return self._about("read", f"block read {self._object}: start", act="block_read_start")
 
     def _block_download_reply(self, data: bytes) -> SdoSaid:
         match data[0] & 3:
@@ -186,7 +198,11 @@ class SdoListener:
 
 
 def _size(data: bytes, is_given: int) -> str:
-    return f"{U32.unpack_from(data, 4)[0]} bytes" if is_given else "bytes"
+    return f"{_count(data)} bytes" if is_given else "bytes"
+
+
+def _count(data: bytes) -> int:
+    return U32.unpack_from(data, 4)[0]
 
 
 def shown(value: bytes) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 _WINDOW: Final = 20
@@ -18,8 +19,35 @@ _FOREIGN_S: Final = 2.0
 """For this long after another client's request, an answer may belong to that client."""
 
 
+@dataclass(frozen=True, slots=True)
+class StateChanges:
+    """The heartbeat changed the state so often within so many messages."""
+
+    changes: int
+    messages: int
+
+
+@dataclass(frozen=True, slots=True)
+class TooManyHeartbeats:
+    """So many came within a shorter time than expected."""
+
+    count: int
+    took_s: float
+    expected_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class AnsweredTwice:
+    """So many SDO requests were."""
+
+    requests: int
+
+
+DuplicateSign = StateChanges | TooManyHeartbeats | AnsweredTwice
+
+
 class DuplicateCheck:
-    """Watches one node id. Each method returns what is wrong, in words, or None."""
+    """Watches one node id. Each method returns what is wrong, or None."""
 
     def __init__(self) -> None:
         self.period_s: float | None = None
@@ -38,7 +66,7 @@ class DuplicateCheck:
         self._changes = 0
         self._state = -1
 
-    def on_heartbeat(self, state: int, time: float) -> str | None:
+    def on_heartbeat(self, state: int, time: float) -> DuplicateSign | None:
         """A heartbeat; a boot-up message goes to ``restart``."""
         if self.period_s is None:
             return None
@@ -54,16 +82,16 @@ class DuplicateCheck:
         took_s, changes, expected_s = time - self._begin, self._changes, _WINDOW * self.period_s
         self.restart()
         if changes >= _TURNS:
-            return f"its heartbeat changed state {changes} times within {_WINDOW} messages"
+            return StateChanges(changes, _WINDOW)
         if took_s < _TOO_SOON * expected_s:
-            return f"{_WINDOW} heartbeats came within {took_s:.2f} s, {expected_s:.2f} s were expected"
+            return TooManyHeartbeats(_WINDOW, took_s, expected_s)
         return None
 
     def on_foreign_request(self, time: float) -> None:
         """An SDO request that is not ours."""
         self._foreign_at = time
 
-    def on_reply(self, data: bytes, time: float, *, matched: bool) -> str | None:
+    def on_reply(self, data: bytes, time: float, *, matched: bool) -> DuplicateSign | None:
         """An SDO answer; ``matched`` if it belongs to a request of ours. The caller leaves out late answers
         to our requests."""
         if matched:
@@ -79,4 +107,4 @@ class DuplicateCheck:
         if self._extra < _EXTRA_REPLIES:
             return None
         self._extra = 0
-        return f"{_EXTRA_REPLIES} SDO requests were answered twice"
+        return AnsweredTwice(_EXTRA_REPLIES)

@@ -81,6 +81,19 @@ HABITS: Final[Mapping[Odd, Habit]] = MappingProxyType(
 )
 
 
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """How often one has shown, and the numbers of the last frame; ``str()`` is the sentence."""
+
+    odd: Odd
+    count: int
+    has: int
+    due: int
+
+    def __str__(self) -> str:
+        return HABITS[self.odd].said(self.count, self.has, self.due)
+
+
 @dataclass(slots=True)
 class _Count:
     count: int = 0
@@ -104,26 +117,26 @@ class HabitCounter:
         counted.has, counted.due = has, due
         self.has_news |= counted.count >= counted.news_from
 
-    def said(self, least: int = 1) -> list[str]:
-        """A sentence for each habit that has shown at least ``least`` times."""
-        return [_said(odd, one) for odd, one in self._counts.items() if one.count >= least]
+    def said(self, least: int = 1) -> list[Shown]:
+        """Each habit that has shown at least ``least`` times."""
+        return [_shown(odd, one) for odd, one in self._counts.items() if one.count >= least]
 
-    def habits(self) -> list[str]:
-        """Sentences as in ``said``, for those that are too frequent for a disturbance."""
+    def habits(self) -> list[Shown]:
+        """As ``said``, those that are too frequent for a disturbance."""
         return self.said(_NAMED_FROM)
 
-    def take_news(self) -> list[str]:
-        """Sentences as in ``habits``, for those that have become habits since the last call, or ten times as
+    def take_news(self) -> list[Shown]:
+        """As ``habits``, those that have become habits since the last call, or ten times as
         frequent."""
         self.has_news = False
-        news: list[str] = []
+        news: list[Shown] = []
         for odd, one in self._counts.items():
             if one.count >= one.news_from:
-                news.append(_said(odd, one))
+                news.append(_shown(odd, one))
                 while one.news_from <= one.count:
                     one.news_from *= _AGAIN_AFTER
         return news
 
 
-def _said(odd: Odd, counted: _Count) -> str:
-    return HABITS[odd].said(counted.count, counted.has, counted.due)
+def _shown(odd: Odd, counted: _Count) -> Shown:
+    return Shown(odd, counted.count, counted.has, counted.due)

@@ -35,6 +35,7 @@ from bridge.parameter import backups
 from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.factory import DESCRIPTIONS
 from bridge.project import Project, load_project
+from bridge.text import render
 
 _ALL_BITS = 0xFFFF_FFFF
 
@@ -256,7 +257,7 @@ def _restore(place: _Place, done: Exchange, options: _Options) -> None:
 
 
 def _facts(restored: backups.Restored) -> dict[str, Any]:
-    warnings = {one.warning for one in restored.written if one.warning} | {restored.warning} - {""}
+    warnings = {render(one.warning) for one in restored.written if one.warning} | {restored.warning} - {""}
     return restored_facts(restored) | {"warnings": sorted(warnings)}
 
 
@@ -271,4 +272,4 @@ def _save(target: Target, done: Exchange) -> None:
         tell(f"{target.node.name}: {lack}")
         done.saved(lack)
         return
-    done.saved(saved.warning)
+    done.saved(render(saved.warning))

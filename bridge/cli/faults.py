@@ -21,6 +21,7 @@ from bridge.mapping import load_family
 from bridge.mapping.loader import family_names
 from bridge.mapping.model import Family
 from bridge.project import load_project
+from bridge.text import render
 
 
 class Tongue(StrEnum):
@@ -104,7 +105,11 @@ def matching(family: Family, wanted: str, language: Language) -> list[Explained]
     codes = {name: words.listed(name) for name in emergency_codes(family)}
     exact = [one for name, one in (codes | every).items() if wanted and _is_number(wanted, name, one.number)]
     part = wanted.lower()
-    return exact or [one for one in every.values() if part in one.number.lower() or part in one.text.lower()]
+
+    def has_part(one: Explained) -> bool:
+        return part in one.number.lower() or part in render(one.text).lower()
+
+    return exact or list(filter(has_part, every.values()))
 
 
 def _is_number(wanted: str, name: str, number: str) -> bool:

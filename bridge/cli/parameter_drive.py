@@ -24,6 +24,7 @@ from bridge.parameter import DriveParameters, Entry, Ledger, Names, ParameterErr
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.parameter.protection import Gate
 from bridge.project import load_project
+from bridge.text import Text
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 DriveArgument = Annotated[
@@ -46,7 +47,7 @@ T = TypeVar("T")
 class Saved:
     """Outcome of a save: the guard's ``warning``, or ``why_not`` where nothing can be saved on command."""
 
-    warning: str = ""
+    warning: Text | str = ""
     why_not: str = ""
 
 

@@ -28,9 +28,8 @@ from bridge.mapping.model import Meaning
 from bridge.text import Text
 
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
-_FAULT: Final = ("fault_text", "fault_number", "fault_cause", "fault_remedy")
+_FAULT: Final = ("fault_number", "fault_cause", "fault_remedy")
 _SUPERVISION: Final = (
-    "last_fault_text",
     "owner",
     "watchdog_state",
     "fieldbus_timeout_ms",
@@ -124,6 +123,7 @@ class Drive(WordTiming):
 
         self._control_word, *self._setpoint_indices = places("command", ["control_word", *carried])
         self._value_indices = places("command", [codec.model.name for codec in self._commands])
+        self._faults = places("status", ("fault_text",)) + places("supervision", ("last_fault_text",))
         self._supervision = places("status", _FAULT) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
         self._life = places("supervision", (LIFE_SIGN,)) if self.table.life_sign else []
@@ -361,11 +361,9 @@ class Drive(WordTiming):
         channel = self.channel
         fault = channel.fault
         values: tuple[Value, ...] = (
-            channel.fault_text,
             fault.number,
             fault.cause,
             fault.remedy,
-            channel.last_fault_text,
             str(channel.owner or ""),
             int(channel.watchdog_state),
             channel.timeout_ms,
@@ -378,6 +376,11 @@ class Drive(WordTiming):
             channel.refused_writes,
         )
         self._show(self._supervision, values, now)
+        for index, said in zip(self._faults, (channel.fault_said, channel.last_fault_said), strict=True):
+            if said:
+                self._image.say(index, said, now)
+            else:
+                self._image.set(index, "", now)
         self._show_stop_time(now)
 
     def _show_stop_time(self, now: float) -> None:

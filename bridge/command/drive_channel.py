@@ -19,7 +19,7 @@ from bridge.config import DriveTable
 from bridge.drive import FAULTED, DriveState, EmergencyMeaning, Explained, Meanings
 from bridge.image import Quality
 from bridge.mapping.model import Family
-from bridge.text import Text
+from bridge.text import Text, render
 
 
 class DriveChannel(Channel):
@@ -112,8 +112,14 @@ class DriveChannel(Channel):
         return self.family.faults.controller_silent if self.is_tripped else self._status.link_fault
 
     @property
+    def fault_said(self) -> Text | str:
+        """The present fault with its number; empty where there is none."""
+        return self._status.fault_said(self._bridge_fault, self.state)
+
+    @property
     def fault_text(self) -> str:
-        return self._status.fault_text(self._bridge_fault, self.state)
+        """The present fault in English."""
+        return render(self.fault_said)
 
     @property
     def fault(self) -> Explained:
@@ -121,8 +127,9 @@ class DriveChannel(Channel):
         return self._status.fault(self._bridge_fault, self.state)
 
     @property
-    def last_fault_text(self) -> str:
-        return self._status.last_fault_text
+    def last_fault_said(self) -> Text | str:
+        """The last fault with its number; empty where there was none."""
+        return self._status.last_fault_said
 
     # from the drive
 
@@ -145,8 +152,8 @@ class DriveChannel(Channel):
         status.word = word
         is_news = is_news or not leg.way.is_heard
         if is_news or leg.stage in AWAITS_REPORT or leg.trip.ramps_until is not None:
-            text = status.fault_text(self._bridge_fault, state) if state in FAULTED else ""
-            self._happen(event.Report(state, is_taken, text), now)
+            said = status.fault_said(self._bridge_fault, state) if state in FAULTED else ""
+            self._happen(event.Report(state, is_taken, said), now)
 
     def on_unchanged(self, now: float) -> None:
         """A TPDO arrived that says what the last one said."""
@@ -176,7 +183,7 @@ class DriveChannel(Channel):
         self._status.on_emcy(told)
         if is_its_own:
             severity = 100 if told.is_gone else 700
-            said = Text.of("node.emergency", number=told.code, text=Text.plain(told.text))
+            said = Text.of("node.emergency", number=told.code, text=told.said)
             self._tell(now, Kind.EMERGENCY, severity, said)
         self._settled(now)
 
@@ -221,7 +228,7 @@ class DriveChannel(Channel):
         reaction = self.settings.on_expiry
         if reaction == "silence" and not self.leg.silence_stops:
             reaction = "disable_voltage"
-        fault = self._status.fault_text(self.family.faults.controller_silent, self.state)
+        fault = self._status.fault_said(self.family.faults.controller_silent, self.state)
         return Text.of("watchdog.reaction", reaction=Text.word("reaction", reaction), fault=fault)
 
     def _on_ignored(self, now: float) -> None:

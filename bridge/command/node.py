@@ -19,7 +19,7 @@ from bridge.mapping.model import ObjectRef
 from bridge.parameter import Ledger, Names
 from bridge.text import Text
 
-Enforce = Callable[[str, Action, str, float], None]
+Enforce = Callable[[str, Action, Text, float], None]
 """Does something to a node in the bridge's own name; the second text says why."""
 
 

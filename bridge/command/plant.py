@@ -324,7 +324,7 @@ class Plant:
         if conclusion.event is not None:
             self.report(conclusion.event)
         if conclusion.action is not None:
-            enforce(one.node_name, conclusion.action, f"the bridge: {one.name} ignores its stop", now)
+            enforce(one.node_name, conclusion.action, Text.of("stopped_by.plant", name=one.name), now)
 
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bridge.drive import FAULTED, DriveState, EmergencyMeaning, Explained, FaultWords, StatusWords
 from bridge.mapping.model import Family
+from bridge.text import Text
 
 
 class DriveStatus:
@@ -41,11 +42,11 @@ class DriveStatus:
             self._drive_last = last
         return (self.drive_fault, self.last_fault) != before
 
-    def fault_text(self, bridge_fault: float, state: DriveState) -> str:
+    def fault_said(self, bridge_fault: float, state: DriveState) -> Text | str:
         """The present fault, the bridge's own before the drive's; empty where there is none."""
         if not (bridge_fault or self.drive_fault) and state in FAULTED:
-            return self._told.text if self._told else "fault"
-        return str(self.fault(bridge_fault, state))
+            return self._told.said if self._told else Text.word("drive_state", "fault")
+        return self.fault(bridge_fault, state).said
 
     def fault(self, bridge_fault: float, state: DriveState) -> Explained:
         """The present fault with its cause and remedy; empty texts where there is none."""
@@ -54,12 +55,12 @@ class DriveStatus:
             return words.own(bridge_fault)
         if self.drive_fault:
             cause = told.cause if told and told.number == self.drive_fault else None
-            return words.of_drive(self.drive_fault, cause, words.of_code(told.code).text if told else "")
+            return words.of_drive(self.drive_fault, cause, words.code_text(told.code) if told else "")
         if told is None or state not in FAULTED:
             return Explained()
         return words.of_code(told.code) if told.number is None else words.of_drive(told.number, told.cause)
 
     @property
-    def last_fault_text(self) -> str:
+    def last_fault_said(self) -> Text | str:
         """The last fault in the maker's form; empty where there was none."""
-        return str(self._fault_words.of_drive(self.last_fault)) if self.last_fault else ""
+        return self._fault_words.of_drive(self.last_fault).said if self.last_fault else ""

@@ -89,9 +89,7 @@ def _of_owner(layout: Layout, cause: Known, one: Known) -> bool:
 def _through_front(layout: Layout, cause: Known, one: Known) -> bool:
     """At a drive that is commanded through a server that fails."""
     protocol = one.owner.partition(":")[0]
-    served_by = _SERVED_BY.get(protocol, protocol)
-    failing = str(dict(cause.trouble.facts).get("fronts", ""))
-    return any(part.partition(":")[0] == served_by for part in failing.split("; "))
+    return _SERVED_BY.get(protocol, protocol) in cause.trouble.fronts
 
 
 _SERVED_BY: Final = {"local": "page"}

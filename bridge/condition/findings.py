@@ -27,13 +27,14 @@ class Rank(IntEnum):
 @dataclass(frozen=True, slots=True)
 class Trouble:
     """``place`` is ``<node>/<drive>``, ``<node>``, ``bus/<bus>`` or ``bridge``. ``is_of_bus``: a fault with
-    which a drive answers a silent bus."""
+    which a drive answers a silent bus. ``fronts`` are the servers that fail."""
 
     rank: Rank
     kind: str
     place: str
     facts: tuple[tuple[str, Value | Text], ...] = ()
     is_of_bus: bool = False
+    fronts: frozenset[str] = frozenset()
 
 
 class ImageReader:
@@ -146,16 +147,16 @@ def of_drive(
         yield Trouble(Rank.WARNING, "stop_unproven", drive, (("why", reason),))
 
 
-def _shown(reader: ImageReader, drive: str) -> tuple[tuple[str, Value], ...]:
+def _shown(reader: ImageReader, drive: str) -> tuple[tuple[str, Value | Text], ...]:
     """The facts of the fault that the points show; none where there is none."""
-    text = reader(f"{drive}/status/fault_text")
+    text = reader.words(f"{drive}/status/fault_text")
     if not text:
         return ()
     rest = ((leaf, reader(f"{drive}/status/fault_{leaf}") or "") for leaf in ("number", "cause", "remedy"))
     return (("text", text), *rest)
 
 
-def _own(reader: ImageReader, drive: str, own_fault: OwnFault | None) -> tuple[tuple[str, Value], ...]:
+def _own(reader: ImageReader, drive: str, own_fault: OwnFault | None) -> tuple[tuple[str, Value | Text], ...]:
     """The facts of the drive's own fault. After a trip the points show the bridge's, which says no more than
     that the controller is silent."""
     word = reader(f"{drive}/status/drive_status_word")
@@ -165,7 +166,7 @@ def _own(reader: ImageReader, drive: str, own_fault: OwnFault | None) -> tuple[t
     fault = own_fault(word, code if isinstance(code, int) else 0)
     if fault is None:
         return ()
-    return (("text", str(fault)), ("number", fault.number), ("cause", fault.cause), ("remedy", fault.remedy))
+    return (("text", fault.said), ("number", fault.number), ("cause", fault.cause), ("remedy", fault.remedy))
 
 
 def of_meaning(reader: ImageReader, drive: str, main: str) -> Iterator[Trouble]:
@@ -189,5 +190,12 @@ def silence_of(reader: ImageReader, bus: str, nodes: Sequence[str]) -> Iterator[
 
 
 def of_bridge(reader: ImageReader) -> Iterator[Trouble]:
-    if failing := reader("bridge/fronts_failing"):
-        yield Trouble(Rank.WARNING, "fronts_failing", "bridge", (("fronts", failing),))
+    if failing := reader.words("bridge/fronts_failing"):
+        facts = (("fronts", failing),)
+        yield Trouble(Rank.WARNING, "fronts_failing", "bridge", facts, fronts=_fronts_in(failing))
+
+
+def _fronts_in(failing: Text | str) -> frozenset[str]:
+    parts = () if isinstance(failing, str) else dict(failing.facts)["parts"]
+    texts = [one for one in parts if isinstance(one, Text)] if isinstance(parts, tuple) else []
+    return frozenset(str(dict(one.facts)["front"]) for one in texts)

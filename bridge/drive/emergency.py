@@ -7,6 +7,7 @@ from typing import Final
 
 from bridge.drive.fault_words import FaultWords
 from bridge.mapping.model import Family
+from bridge.text import Text, render
 
 _VENDOR_BYTE: Final = 3
 """The manufacturer's bytes begin here (CiA 301 §7.2.7.3.1)."""
@@ -19,10 +20,15 @@ class EmergencyMeaning:
     event."""
 
     code: int
-    text: str
+    said: Text | str
     is_gone: bool
     number: int | None = None
     cause: int | None = None
+
+    @property
+    def text(self) -> str:
+        """In English."""
+        return render(self.said)
 
 
 class EmergencyReader:
@@ -38,27 +44,31 @@ class EmergencyReader:
         if model.event is not None and (event := _byte(vendor, model.event.byte)) is not None:
             is_gone = code == 0 or event == model.event.gone
             cause = None if model.event.cause_byte is None else _byte(vendor, model.event.cause_byte)
-            text = model.text(code) if is_gone else self._named(event, "event", code, cause)
-            return EmergencyMeaning(code, text, is_gone, event, None if is_gone else cause)
+            said = model.text(code) if is_gone else self._event(event, code, cause)
+            return EmergencyMeaning(code, said, is_gone, event, None if is_gone else cause)
         if model.number is not None and self._has_number(code):
             first = model.number.byte - _VENDOR_BYTE
             number = int.from_bytes(vendor[first : first + model.number.size], "little")
             if number:
-                return EmergencyMeaning(
-                    code, self._named(number, "error", code), is_gone=False, number=number
-                )
+                return EmergencyMeaning(code, self._error(number, code), is_gone=False, number=number)
         return EmergencyMeaning(code, model.text(code), is_gone=code == 0)
 
     def _has_number(self, code: int) -> bool:
         names = (f"{code:04X}", f"{code >> 8:02X}xx")
         return any(name in names for name in self._model.number.codes) if self._model.number else False
 
-    def _named(self, number: int, what: str, code: int, cause: int | None = None) -> str:
-        found = self._words.of_drive(number, cause)
+    def _event(self, event: int, code: int, cause: int | None) -> Text | str:
+        found = self._words.of_drive(event, cause)
+        if self._words.knows(event):
+            return found.said
+        said = Text.of("fault.unknown_event", number=found.number, text=self._model.text(code))
+        return Text.of("fault.with_cause", text=said, cause=cause) if cause else said
+
+    def _error(self, number: int, code: int) -> Text | str:
+        found = self._words.of_drive(number)
         if self._words.knows(number):
-            return str(found)
-        said = f"{what} {found.number}, {self._model.text(code)}"
-        return f"{said}, cause {cause}" if cause else said
+            return found.said
+        return Text.of("fault.unknown_error", number=found.number, text=self._model.text(code))
 
 
 def _byte(vendor: bytes, place: int) -> int | None:

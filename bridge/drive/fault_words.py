@@ -12,6 +12,7 @@ from typing import Final, Literal
 
 from bridge.mapping.faults import FORM_FIELD, Explanation
 from bridge.mapping.model import Family
+from bridge.text import Text, render
 
 Language = Literal["en", "de"]
 _DECIMAL: Final = ("number", "group")
@@ -32,12 +33,21 @@ class Explained:
     """``number`` is in the maker's form; a text is empty where nobody says anything."""
 
     number: str = ""
-    text: str = ""
+    text: Text | str = ""
     cause: str = ""
     remedy: str = ""
 
     def __str__(self) -> str:
-        return f"{self.number} {self.text}".strip()
+        return render(self.said)
+
+    @property
+    def said(self) -> Text | str:
+        """Number and text, as far as they are there."""
+        if not self.number:
+            return self.text
+        if not self.text:
+            return Text.of("fault.number", number=self.number)
+        return Text.of("fault.numbered", number=self.number, text=self.text)
 
 
 class FaultWords:
@@ -70,7 +80,8 @@ class FaultWords:
             return self._explained(number, name, found)
         exact = f"{name}.{cause}"
         said = self._explained(number, exact, self._text(exact) or found)
-        return Explained(number, f"{said.text}, cause {cause}", said.cause, said.remedy)
+        told = Text.of("fault.with_cause", text=said.text, cause=cause)
+        return Explained(number, told, said.cause, said.remedy)
 
     def knows(self, fault: float) -> bool:
         """Whether the family has a text for what a drive tells."""
@@ -80,6 +91,10 @@ class FaultWords:
         """An emergency message that has nothing but its code."""
         name = f"{code:04X}h"
         return self._explained(name, name, self._text(name))
+
+    def code_text(self, code: int) -> str:
+        """Text of an emergency code."""
+        return self._text(f"{code:04X}h")
 
     def listed(self, name: str) -> Explained:
         """A fault by the name that the mapping file has for it: ``10.3``, ``41``, ``52.1``, ``8130h``."""

@@ -161,16 +161,17 @@ class Image:
     def say(
         self,
         index: int,
-        said: Text | str,
+        said: Text | Value,
         now: float,
         quality: Quality = Quality.GOOD,
         why: Text | str = "",
     ) -> None:
-        """Store the words of a text; ``said`` tells what they are the words of."""
-        words = render(said)
+        """Store a value, or the words of a text; ``said`` tells what they are the words of."""
         if isinstance(said, Text):
+            words = render(said)
             self._said[index] = words, said
-        self.set(index, words, now, quality, why)
+            said = words
+        self.set(index, said, now, quality, why)
 
     def said(self, index: int) -> Text | None:
         """The text whose words are the value of this point; None where nobody has told one."""

@@ -33,10 +33,10 @@ class BusPoints:
             "frames_lost": status.frames_lost,
             "frames_expired": status.frames_expired,
             "error_frames": status.error_frames,
-            "last_error": status.last_error,
         }
         for leaf, value in values.items():
             self._image.put(f"bus/{self._bus.name}/{leaf}", value, now)
+        self._image.say(self._image.index[f"bus/{self._bus.name}/last_error"], status.last_error, now)
         self._show_load(status, now)
         self._tell_errors(status, now)
 
@@ -56,7 +56,7 @@ class BusPoints:
         number = status.error_frames - self._errors_told
         if number and self._error_limit.allows(now):
             self._errors_told = status.error_frames
-            error = Text.plain(status.last_error)
+            error = status.last_error
             said = Text.of("bus.error_frames", number=number, error=error)
             if number == 1:
                 said = Text.of("bus.error_frame", error=error)

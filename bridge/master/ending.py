@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from bridge.command import Action, Commanded, Plant
 from bridge.command.commanded import has_followed
 from bridge.command.node import Enforce
-from bridge.text import render
+from bridge.text import Text, render
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +75,10 @@ def end(plant: Plant, now: float, enforce: Enforce, *, can_send: bool = True) ->
 
 
 def _stopped(ignoring: Sequence[Commanded], now: float, enforce: Enforce) -> Iterator[str]:
-    why = "the bridge at its end: {} does not follow its stop"
     for one in ignoring:
         if one.table.reacts_to_ignored_stop != "report":
             if one.stop_check.is_judged:
-                enforce(one.node_name, Action.STOP_NODE, why.format(one.name), now)
+                enforce(one.node_name, Action.STOP_NODE, Text.of("stopped_by.end", name=one.name), now)
             yield one.node_name
 
 

@@ -11,11 +11,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
+from bridge.base.nmt_texts import text_of_command, text_of_state
 from bridge.base.ratelimit import Pauses
+from bridge.base.sdo_texts import text_of_request
 from bridge.canopen import cobid, nmt
-from bridge.canopen.decode_sdo import SdoListener
+from bridge.canopen.decode_sdo import SdoListener, SdoSaid
 from bridge.canopen.frame import Frame
-from bridge.canopen.nmt import NmtCommand
+from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.command import Drive, Event, EventQueue, Kind
 from bridge.config import BusTable
 from bridge.drive import DriveState
@@ -40,7 +42,7 @@ _NMT_BYTES: Final = 2
 _SEVERE: Final = 900
 _HARMLESS: Final = 500
 
-Stop = Callable[[Sequence[NodeCore], str, float], None]
+Stop = Callable[[Sequence[NodeCore], Text, float], None]
 """Stops these nodes: who they are, why, and now."""
 
 
@@ -126,15 +128,13 @@ class Intruders:
         alone do not: their sender is an intruder."""
         return frame.can_id == self._heartbeat_id or (not acts and frame.can_id in self._commands)
 
-    def name(self, frame: Frame) -> str:
-        """What this frame is."""
+    def name(self, frame: Frame) -> Text:
+        """The name of this frame."""
         if frame.can_id == self._heartbeat_id:
-            what = f"the heartbeat of node {self._bus.master_node_id}, the bridge's own"
-        elif frame.can_id in self._commands:
-            what = self._commands[frame.can_id][1].label
-        else:
-            what = "SYNC"
-        return f"{what} ({frame.can_id:03X}h)"
+            return _named(frame, Text.of("frame.own_heartbeat", id=self._bus.master_node_id))
+        if frame.can_id in self._commands:
+            return _named(frame, self._commands[frame.can_id][1].label)
+        return _named(frame, "SYNC")
 
     # what comes
 
@@ -148,10 +148,11 @@ class Intruders:
         elif frame.can_id == cobid.SYNC:
             self._meet(frame, [node for node in self._nodes if _follows_sync(node)], lambda: self.name(frame))
         else:
-            self._meet(frame, self._nodes, lambda: f"{self.name(frame)}: {_said_state(frame.data)}")
+            said = partial(_state_said, frame)
+            self._meet(frame, self._nodes, lambda: Text.of("frame.says", frame=self.name(frame), said=said()))
 
-    def _said_command(self, frame: Frame, command: Command) -> str:
-        return f"{self.name(frame)}: {command.said(frame.data)}"
+    def _said_command(self, frame: Frame, command: Command) -> Text:
+        return Text.of("frame.says", frame=self.name(frame), said=command.said(frame.data))
 
     def _on_nmt(self, then: Handler | None, frame: Frame) -> None:
         """Our own NMT commands do not come back. A node that is in operation loses it by some of them, which
@@ -162,11 +163,10 @@ class Intruders:
         held = [node for node in addressed if node.is_held]
         if command == NmtCommand.STOP and len(held) == len(addressed):
             # Another bridge that stops what is stopped is not answered: it would answer in its turn.
-            self._meet(frame, None, lambda: f"NMT {nmt.describe(frame.data)} (000h)")
+            self._meet(frame, None, partial(_nmt_said, frame))
             return
         back = [node for node in held if command in (NmtCommand.START, NmtCommand.ENTER_PRE_OPERATIONAL)]
-        said = partial("NMT {} (000h)".format, nmt.describe(frame.data))
-        self._meet(frame, back, said, bool(back), brings_back=bool(back))
+        self._meet(frame, back, partial(_nmt_said, frame), bool(back), brings_back=bool(back))
 
     def _addressed(self, data: bytes) -> tuple[int | None, Sequence[NodeCore]]:
         """The command, and whom it is for; nobody where it is none."""
@@ -176,7 +176,7 @@ class Intruders:
         return command, [node for node in self._nodes if node_id in (0, node.table.id)]
 
     def _on_time(self, frame: Frame) -> None:
-        self._meet(frame, [], lambda: f"TIME ({frame.can_id:03X}h)")
+        self._meet(frame, [], lambda: _named(frame, "TIME"))
 
     def _on_sdo(self, node: NodeCore, then: Handler | None, frame: Frame) -> None:
         """Somebody reads or writes an object of a node. Reading has no consequences: a tool may look."""
@@ -184,18 +184,13 @@ class Intruders:
             then(frame)
         said = self._sdo.setdefault(frame.can_id, SdoListener()).request(frame.data)
         writes = ("operation", "write") in said.values
-        self._meet(
-            frame,
-            [node] if writes else None,
-            lambda: f"SDO request to {node.node.name} ({frame.can_id:03X}h): {said.text}",
-            writes,
-        )
+        self._meet(frame, [node] if writes else None, partial(_request_said, frame, node, said), writes)
 
     def _meet(
         self,
         frame: Frame,
         affected: Sequence[NodeCore] | None,
-        said: Callable[[], str],
+        said: Callable[[], Text],
         is_worse: bool = False,
         *,
         brings_back: bool = False,
@@ -220,7 +215,7 @@ class Intruders:
         due = [node for node in stopped if self._is_due(node, frame.time, brings_back=brings_back)]
         running = [node for node in due if not node.is_held]
         if running:
-            self._stop(running, f"the bridge, because of an intruder: {said()}", frame.time)
+            self._stop(running, Text.of("stopped_by.intruder", frame=said()), frame.time)
         for node in due:
             self._stopped[node.table.id] = frame.time + _STOP_AGAIN_S
             if node not in running:
@@ -308,11 +303,11 @@ def _follows_sync(node: NodeCore) -> bool:
     return any(pdo.is_synchronous for pdos in node.wire.pdos for pdo in (*pdos.rpdos, *pdos.tpdos))
 
 
-def _met(frame: str, since: int) -> Text:
+def _met(frame: Text, since: int) -> Text:
     """``since`` are frames that were not told of."""
     if since:
-        return Text.of("intruder.met_again", frame=Text.plain(frame), frames=since + 1)
-    return Text.of("intruder.met", frame=Text.plain(frame))
+        return Text.of("intruder.met_again", frame=frame, frames=since + 1)
+    return Text.of("intruder.met", frame=frame)
 
 
 def _answered(met: Text, stopped: Sequence[NodeCore], nodes: Sequence[NodeCore]) -> Text:
@@ -324,10 +319,22 @@ def _answered(met: Text, stopped: Sequence[NodeCore], nodes: Sequence[NodeCore])
     return Text.of("intruder.answered", what=met, answer=answer)
 
 
-def _said_state(data: bytes) -> str:
-    state = nmt.state_of(data[0]) if len(data) == 1 else None
-    said = "nonsense" if state is None else "that it starts" if not state else state.words
-    return (
-        f"the id seems to be used twice: another device said {said}. A second bridge, or a device with this "
-        "id: switch it off, give it another id, or change master_node_id"
-    )
+def _named(frame: Frame, what: Text | str) -> Text:
+    return Text.of("frame.named", what=what, can_id=frame.can_id)
+
+
+def _nmt_said(frame: Frame) -> Text:
+    return _named(frame, Text.of("frame.nmt", command=text_of_command(frame.data)))
+
+
+def _request_said(frame: Frame, node: NodeCore, said: SdoSaid) -> Text:
+    name = _named(frame, Text.of("frame.sdo_request", node=node.node.name))
+    return Text.of("frame.says", frame=name, said=text_of_request(said))
+
+
+def _state_said(frame: Frame) -> Text:
+    state = nmt.state_of(frame.data[0]) if len(frame.data) == 1 else None
+    if state is None:
+        return Text.of("frame.id_used_twice", said=Text.of("frame.nonsense"))
+    said = Text.of("frame.starts") if state is NmtState.INITIALISING else text_of_state(state)
+    return Text.of("frame.id_used_twice", said=said)

@@ -263,7 +263,7 @@ class Master:
             with self._replies:
                 self._plant.deliver_outcomes()
 
-    def _enforce(self, node: str, action: Action, why: str, now: float) -> None:
+    def _enforce(self, node: str, action: Action, why: Text, now: float) -> None:
         for line in self._lines:
             line.network.enforce(node, action, why, now)
 
@@ -323,8 +323,7 @@ class Master:
         state = Text.word("controller_state", status.state.name.lower())
         said = Text.of("bus.state", bus=line.bus.name, state=state)
         if status.state is not ControllerState.OK and status.last_error:
-            error = Text.plain(status.last_error)
-            said = Text.of("bus.state_after", bus=line.bus.name, state=state, error=error)
+            said = Text.of("bus.state_after", bus=line.bus.name, state=state, error=status.last_error)
         self._plant.events.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], said))
 
     def _tell_refusal(self, line: BusLine, now: float) -> None:
@@ -335,7 +334,7 @@ class Master:
         line.shown_refusal = refusal
         said = Text.of("bus.bursts_sent_again")
         if refusal:
-            said = Text.of("bus.bursts_refused", refusal=Text.plain(refusal))
+            said = Text.of("bus.bursts_refused", refusal=refusal)
         self._plant.events.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 200, said))
 
     def _arm(self, now: float) -> None:

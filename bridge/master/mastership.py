@@ -43,13 +43,13 @@ class BusMastership:
         listens = self._listening.part is Part.LISTENING
         return Text.of("bus.listens" if listens else "bus.leaves", bus=self._bus.name)
 
-    def heard(self, sign: str, now: float) -> Text | None:
+    def heard(self, sign: Text, now: float) -> Text | None:
         """``sign`` reveals another bridge. If this one gives way by that it sends nothing more, not even
         stops: the reason, with which all that is known of the bus is to be forgotten."""
         if not self._listening.heard(now):
             return None
         until_ms = self._listening.silence_s * 1000
-        self._tell(Text.of("bus.gives_way", sign=Text.plain(sign), until_ms=until_ms), now)
+        self._tell(Text.of("bus.gives_way", sign=sign, until_ms=until_ms), now)
         return Text.of("bus.other_in_charge", bus=self._bus.name)
 
     def on_time(self, now: float) -> None:

@@ -11,6 +11,7 @@ from typing import Final
 
 from bridge.can.interface import BusStatus
 from bridge.canopen import cobid, nmt
+from bridge.canopen.duplicate import DuplicateSign
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sync import SyncWindow
@@ -104,7 +105,7 @@ class Network:
             self._intruders.on_frame(frame)
         self._pump(now)
 
-    def _on_other_bridge(self, sign: str, now: float) -> None:
+    def _on_other_bridge(self, sign: Text, now: float) -> None:
         if why := self.mastership.heard(sign, now):
             self._give_way(now, why)
             self.mastership.say_passive(now)
@@ -167,7 +168,7 @@ class Network:
         """The bridge was away for longer than its bursts last."""
         self.mastership.came_back(now)
 
-    def _stop_nodes(self, nodes: Sequence[NodeCore], why: str, now: float) -> None:
+    def _stop_nodes(self, nodes: Sequence[NodeCore], why: Text, now: float) -> None:
         are_all = len(nodes) == len(self.nodes) > 1 and not self._takes_over(nodes)
         for node in nodes:
             node.carry_out_command(Action.STOP_NODE, why, now, send=not are_all)
@@ -193,7 +194,7 @@ class Network:
         for node in sorted(self.nodes, key=lambda node: node.table.start_order):
             if node.table.enabled:
                 # A reset of the communication waits until the stopped words have been taken over.
-                node.carry_out_command(action, "the bridge at its start", now, send=not whole)
+                node.carry_out_command(action, Text.of("stopped_by.start"), now, send=not whole)
                 self._frames += node.wire.take_frames(only_commands=True)
                 if whole:
                     self._frames.append(nmt.command(node_commands.NMT[action], node.table.id))
@@ -233,7 +234,7 @@ class Network:
                     return True
         return False
 
-    def enforce(self, name: str, action: Action, why: str, now: float) -> None:
+    def enforce(self, name: str, action: Action, why: Text, now: float) -> None:
         """Do this to the node ``name``, if it is on this bus."""
         for node in self.nodes:
             if node.node.name == name:
@@ -268,7 +269,7 @@ class Network:
         if not each:
             self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
 
-    def duplicate(self, node: Neighbour, sign: str, now: float) -> None:
+    def duplicate(self, node: Neighbour, sign: DuplicateSign, now: float) -> None:
         self._watch.on_duplicate(node.table.id, sign, now)
 
     def is_taken(self, node: Neighbour, cob_id: int) -> bool:

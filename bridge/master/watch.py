@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from bridge.base.nmt_texts import text_of_command
 from bridge.base.ratelimit import Pauses
-from bridge.canopen import cobid, nmt
+from bridge.canopen import cobid
+from bridge.canopen.duplicate import DuplicateSign, StateChanges, TooManyHeartbeats
 from bridge.canopen.frame import Frame
 from bridge.command import BusSide, Event, Kind
 from bridge.text import Text
@@ -53,10 +55,9 @@ class BusWatch:
         if not self._acts():
             return
         self._master_at = frame.time
-        what = nmt.describe(frame.data)
         self._tell(
             "master",
-            Text.of("bus.second_master", command=Text.plain(what)),
+            Text.of("bus.second_master", command=text_of_command(frame.data)),
             frame.time,
             700,
         )
@@ -77,13 +78,13 @@ class BusWatch:
         if self._own_id is not None:
             self._duplicates[self._own_id] = now
 
-    def on_duplicate(self, node_id: int, sign: str, now: float) -> None:
+    def on_duplicate(self, node_id: int, sign: DuplicateSign, now: float) -> None:
         """A configured node id behaves as if two devices had it."""
         self._duplicates[node_id] = now
         name = self._known.get(node_id, "unknown")
         self._tell(
             f"duplicate {node_id}",
-            Text.of("bus.id_used_twice", id=node_id, name=name, sign=Text.plain(sign)),
+            Text.of("bus.id_used_twice", id=node_id, name=name, sign=_said(sign)),
             now,
             700,
         )
@@ -98,6 +99,16 @@ class BusWatch:
         self._image.put(f"{top}/second_master", now - self._master_at < _FORGET_S, now)
         self._image.put(f"{top}/unexpected_nodes", _listed(self._strangers, now), now)
         self._image.put(f"{top}/duplicate_ids", _listed(self._duplicates, now), now)
+
+
+def _said(sign: DuplicateSign) -> Text:
+    match sign:
+        case StateChanges(changes, messages):
+            return Text.of("duplicate.state_changes", changes=changes, messages=messages)
+        case TooManyHeartbeats(count, took_s, expected_s):
+            return Text.of("duplicate.heartbeats", count=count, took_s=took_s, expected_s=expected_s)
+        case _:
+            return Text.of("duplicate.answered_twice", requests=sign.requests)
 
 
 def _listed(seen: dict[int, float], now: float) -> str:

@@ -61,7 +61,7 @@ class Emergencies:
         is_of_one_drive = len(concerned) == 1 or any(one.slot.emcy_drive is not None for one in concerned)
         if self._node.device or (concerned and not is_of_one_drive):
             severity = _GONE if told.is_gone else _COMES
-            said = Text.of("node.emergency", number=told.code, text=Text.plain(told.text))
+            said = Text.of("node.emergency", number=told.code, text=told.said)
             self._events.report(Event(at, Kind.EMERGENCY, self._node.name, severity, said))
         for drive in concerned:
             drive.channel.on_emcy(told, at, is_its_own=is_of_one_drive)

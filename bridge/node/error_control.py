@@ -9,7 +9,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from bridge.canopen import nmt
-from bridge.canopen.duplicate import DuplicateCheck
+from bridge.canopen.duplicate import DuplicateCheck, DuplicateSign
 from bridge.canopen.frame import Frame
 from bridge.canopen.heartbeat import HeartbeatConsumer, NodeGuard
 from bridge.canopen.nmt import NmtState
@@ -32,7 +32,7 @@ class Sign(Enum):
 class ErrorControl:
     """``duplicate`` is called where two devices seem to have this node id."""
 
-    def __init__(self, table: NodeTable, duplicate: Callable[[str, float], None]) -> None:
+    def __init__(self, table: NodeTable, duplicate: Callable[[DuplicateSign, float], None]) -> None:
         self._table = table
         self._duplicate = duplicate
         self._duplicates = DuplicateCheck()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from bridge.canopen.duplicate import DuplicateSign
 from bridge.config import NodeTable
 from bridge.text import Text
 
@@ -50,7 +51,7 @@ class Neighbours(Protocol):
 
     def stop_others(self, node: Neighbour, why: Text, now: float) -> None: ...
 
-    def duplicate(self, node: Neighbour, sign: str, now: float) -> None: ...
+    def duplicate(self, node: Neighbour, sign: DuplicateSign, now: float) -> None: ...
 
     def is_taken(self, node: Neighbour, cob_id: int) -> bool:
         """Whether another node of the bus has something on this identifier."""

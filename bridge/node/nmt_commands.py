@@ -163,6 +163,6 @@ def _nmt(
         node.boot_next(now + _AFTER_RESET_S)
     else:
         node.boot_next(None)
-        stops, by = command is NmtCommand.STOP, Text.plain(who)
-        node.say(Text.of("node.stopped_by" if stops else "node.pre_operational_by", who=by), now)
+        stops = command is NmtCommand.STOP
+        node.say(Text.of("node.stopped_by" if stops else "node.pre_operational_by", who=who), now)
         node.set_state(NodeState.STOPPED, now)

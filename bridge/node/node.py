@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
+from bridge.base.habit_texts import text_of_habit
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.command import Action, BusSide
 from bridge.command.link import NodeState
@@ -298,7 +299,7 @@ class NodeCore:
         self.error_control.stop(now)
         habits = self.wire.habits.said()
         if habits and error.absent:
-            hint = Text.of("boot.habits", habits=tuple(map(Text.plain, habits)))
+            hint = Text.of("boot.habits", habits=tuple(map(text_of_habit, habits)))
             error = boot.BootError(error.letter, error.what, absent=True, hint=hint)
         self._view.failed(error, now)
         if self.state is NodeState.BOOTING:
@@ -325,7 +326,8 @@ class NodeCore:
     def tell_habits(self, now: float) -> None:
         """Tell what its frames have that the standard does not allow, where there are news of that."""
         if self.is_operational and (news := self.wire.habits.take_news()):
-            self._view.shows_habits(news, self.wire.habits.habits(), now)
+            habits = self.wire.habits.habits()
+            self._view.shows_habits([*map(text_of_habit, news)], [*map(text_of_habit, habits)], now)
 
     # states
 
@@ -441,7 +443,7 @@ class NodeCore:
     def _show(self, now: float) -> None:
         self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
 
-    def _count_write(self, owner: str, address: str, name: str) -> str:
+    def _count_write(self, owner: str, address: str, name: str) -> Text | str:
         """The boot-up writes to an EEPROM: counted as of its beginning."""
         ledger, eeprom = self._ledger, self.node.family.eeprom
         cycles = eeprom.cycles if eeprom else None

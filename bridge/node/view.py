@@ -79,11 +79,11 @@ class NodeView:
             self._tell(Kind.EMERGENCY, 300, Text.of("node.says", errors=said), now)
         self._errors = said
 
-    def shows_habits(self, news: Sequence[str], habits: Sequence[str], now: float) -> None:
+    def shows_habits(self, news: Sequence[Text], habits: Sequence[Text], now: float) -> None:
         """``news`` are habits of the node in operation that are to be told, ``habits`` all of them."""
         for said in news:
-            self._tell(Kind.CONFIGURATION, 300, Text.plain(said), now)
-        self.say(Text.of("boot.noted", outcome=self._success, notes=tuple(map(Text.plain, habits))), now)
+            self._tell(Kind.CONFIGURATION, 300, said, now)
+        self.say(Text.of("boot.noted", outcome=self._success, notes=tuple(habits)), now)
 
     def identified(self, found: Identification, now: float) -> bool:
         """Who the node is, by a boot-up that has succeeded. True where that is somebody else than before,

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Final
 
 from bridge.canopen import cobid, nmt
+from bridge.canopen.duplicate import DuplicateSign
 from bridge.canopen.frame import Frame
 from bridge.canopen.habits import HabitCounter, Odd
 from bridge.canopen.nmt import NmtCommand
@@ -43,7 +44,7 @@ class Listener:
     """An error control message, and when it came."""
     touch: Callable[[], None]
     """Something came that may change frames to be sent or deadlines."""
-    on_duplicate: Callable[[str, float], None]
+    on_duplicate: Callable[[DuplicateSign, float], None]
     """Two devices seem to have this node id."""
     is_taken: Callable[[int], bool]
     is_foreign: Callable[[int], bool]

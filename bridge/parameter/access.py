@@ -20,6 +20,7 @@ from bridge.parameter.ledger import Key, Ledger
 from bridge.parameter.names import Names
 from bridge.parameter.protection import Gate
 from bridge.parameter.transfer import Transfer
+from bridge.text import Text
 
 FRESH_S: Final = 1.0
 """A value that was read this long ago is what the drive holds: it is not read again before a write."""
@@ -49,12 +50,12 @@ class Written:
     reading: Reading
     before: Value | None
     changed: bool
-    warning: str = ""
+    warning: Text | str = ""
 
 
 Reads = Generator[Transfer, tuple[bytes, float], Reading]
 Writes = Generator[Transfer, tuple[bytes, float], Written]
-Saves = Generator[Transfer, tuple[bytes, float], str]
+Saves = Generator[Transfer, tuple[bytes, float], Text | str]
 """Returns the guard's warning, or an empty text."""
 
 
@@ -102,7 +103,7 @@ class DriveParameters:
     def read(self, entry: Entry, now: float, max_age_s: float = 0.0) -> Reads:
         """The value, from the drive, or from the cache where it is not older than ``max_age_s``."""
         if entry.definition and not entry.definition.readable:
-            raise ParameterError(Why.WRITE_ONLY, f"{entry.name} can only be written")
+            raise ParameterError(Why.WRITE_ONLY, Text.of("parameter.write_only", parameter=entry.name))
         data, time = yield from self._fetch(entry, now, max_age_s)
         return Reading(entry, decode(entry, data), time)
 
@@ -167,12 +168,14 @@ class DriveParameters:
         try:
             held, now = yield from self._fetch(entry, now, 0.0)
         except ParameterError as error:
-            raise ParameterError(error.why, f"{error}; it may have been written", error.abort_code) from None
+            said = Text.of("parameter.may_be_written", why=Text.plain(error.said))
+            raise ParameterError(error.why, said, error.abort_code) from None
         if not matches(entry, held, data):
             if lost:
                 raise self._error(entry, lost)
             found = shown(entry, decode(entry, held))
-            raise ParameterError(Why.NOT_TAKEN, f"{entry.name}: the drive took the value and holds {found}")
+            said = Text.of("parameter.holds_other", parameter=entry.name, value=found)
+            raise ParameterError(Why.NOT_TAKEN, said)
         was = None if before is None else decode(entry, before)
         return Written(Reading(entry, _held(entry, held, value), now), was, True, warning)
 
@@ -195,7 +198,7 @@ class DriveParameters:
     def check_writable(self, entry: Entry) -> None:
         """Raises ``ParameterError`` for what nobody writes by this way."""
         if entry.definition and not entry.definition.writable:
-            raise ParameterError(Why.READ_ONLY, f"{entry.name} is read-only")
+            raise ParameterError(Why.READ_ONLY, Text.of("parameter.read_only", parameter=entry.name))
         why = self.names.protection.why_never(entry)
         if why:
             raise ParameterError(Why.PROTECTED, why)
@@ -231,7 +234,7 @@ class DriveParameters:
         ``Why.NOT_CONFIGURED``, as a family without a command is."""
         entry, eeprom = self.saving, self._eeprom
         if entry is None or eeprom is None:
-            raise ParameterError(Why.NOT_CONFIGURED, f"{self.name} has no command that saves its parameters")
+            raise ParameterError(Why.NOT_CONFIGURED, Text.of("parameter.no_save", drive=self.name))
         command = eeprom.save_command
         data = _SAVE if command is None else encode_value(entry, command.value, None)
         key = (self._node_name, str(entry.address))
@@ -249,7 +252,7 @@ class DriveParameters:
             if not failure.by_drive:
                 self._count(key, entry.name, now)
             if command is None and failure.abort_code in MISSING:
-                lack = f"the node has no {_address(entry)}, and saves nothing on command"
+                lack = Text.of("parameter.no_save_object", object=_address(entry))
                 raise ParameterError(Why.NOT_CONFIGURED, lack, failure.abort_code) from None
             raise self._error(entry, failure) from None
         return self._count(key, entry.name, now)
@@ -282,7 +285,7 @@ class DriveParameters:
     def _check(self, key: Key, name: str, now: float) -> None:
         self._ledger.check(key, name, now, self._eeprom.cycles if self._eeprom else None)
 
-    def _count(self, key: Key, name: str, now: float) -> str:
+    def _count(self, key: Key, name: str, now: float) -> Text | str:
         return self._ledger.count(key, name, self._eeprom.cycles if self._eeprom else None, now)
 
     def _wears(self, entry: Entry, now: float) -> Generator[Transfer, tuple[bytes, float], bool]:

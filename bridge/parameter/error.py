@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import Enum
 
+from bridge.text import Text, render
+
 
 class Why(Enum):
     UNKNOWN_NAME = "unknown name"
@@ -23,11 +25,12 @@ class Why(Enum):
 
 
 class ParameterError(Exception):
-    """``str()`` is one sentence for a human; ``abort_code`` is the drive's, or 0."""
+    """``said`` is one sentence for a human, ``str()`` its English; ``abort_code`` is the drive's, or 0."""
 
-    def __init__(self, why: Why, message: str, abort_code: int = 0) -> None:
-        super().__init__(message)
+    def __init__(self, why: Why, said: Text | str, abort_code: int = 0) -> None:
+        super().__init__(render(said))
         self.why = why
+        self.said = said
         self.abort_code = abort_code
 
 

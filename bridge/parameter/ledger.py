@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.parameter.error import ParameterError, Why
+from bridge.text import Text
 
 MOST_WRITES: Final = 10
 WINDOW_S: Final = 600.0
@@ -60,22 +61,18 @@ class Ledger:
         if count is None:
             return
         if cycles and count.writes >= cycles:
-            raise ParameterError(
-                Why.TOO_OFTEN,
-                f"{name} of {key[0]} was written {count.writes} times, and its EEPROM endures {cycles} "
-                f"writes: exchange the drive, then remove {key[1]} of {key[0]} from eeprom.json in the "
-                "state_dir while the service is stopped; or have the drive write to its RAM only",
+            owner, ref = key
+            said = Text.of(
+                "eeprom.worn_out", name=name, owner=owner, count=count.writes, cycles=cycles, object=ref
             )
+            raise ParameterError(Why.TOO_OFTEN, said)
         for most, window_s, within in _WINDOWS:
             left_s = count.recent[-most] + window_s - now if len(count.recent) >= most else 0.0
             if left_s > 0:
-                raise ParameterError(
-                    Why.TOO_OFTEN,
-                    f"{name} was written {most} times within {within}, and the EEPROM wears out; try again "
-                    f"in {left_s:.0f} s, or have the drive write to its RAM only",
-                )
+                said = Text.of("eeprom.too_often", name=name, count=most, within=within, left_s=left_s)
+                raise ParameterError(Why.TOO_OFTEN, said)
 
-    def count(self, key: Key, name: str, cycles: int | None, now: float) -> str:
+    def count(self, key: Key, name: str, cycles: int | None, now: float) -> Text | str:
         """One more write. The warning where it is one of the tenths of ``cycles``, or nothing."""
         count = self._counts.setdefault(key, _Count())
         count.writes += 1
@@ -83,7 +80,7 @@ class Ledger:
         self._unsaved.setdefault(key, []).append(now)
         if not cycles or count.writes * 10 // cycles == (count.writes - 1) * 10 // cycles:
             return ""
-        return f"{name} of {key[0]} was written {count.writes} times: its EEPROM endures {cycles} writes"
+        return Text.of("eeprom.wears", name=name, owner=key[0], count=count.writes, cycles=cycles)
 
     def take_unsaved(self) -> dict[Key, list[float]]:
         """The times of the writes since the last call."""

@@ -42,6 +42,7 @@ from bridge.service.parts import Ports, SupervisedServer, Supervisor
 from bridge.service.plant_condition import PlantCondition
 from bridge.service.preflight import check_files
 from bridge.service.wear import WearKeeper
+from bridge.text import Text
 
 _log = logging.getLogger(__name__)
 
@@ -231,11 +232,11 @@ class Service:
     def _servers(self) -> Iterator[SupervisedServer]:
         has = self._opened.has
         if self.modbus:
-            yield SupervisedServer("modbus", "the Modbus server", self.modbus, is_started=has("modbus"))
+            yield SupervisedServer("modbus", Text.of("front.modbus"), self.modbus, is_started=has("modbus"))
         for bus, gateway in self.gateways.items():
             name = f"gateway {bus}"
-            yield SupervisedServer(name, f"the gateway of {bus}", gateway, is_started=has(name))
-        yield SupervisedServer("mirror", "the link to the fronts", self.mirror)
+            yield SupervisedServer(name, Text.of("front.gateway", bus=bus), gateway, is_started=has(name))
+        yield SupervisedServer("mirror", Text.of("front.link"), self.mirror)
 
     async def _start(self) -> None:
         """Report "ready" once each part serves or is known not to, and wait for ever."""

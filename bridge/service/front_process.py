@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge.base.errors import BridgeError, OperationFailed
+from bridge.text import Text
 
 SIGN_PERIOD_S: Final = 1.0
 _SILENT_LOOKS: Final = 5
@@ -27,6 +28,7 @@ then."""
 _REASON: Final = b"!"
 """Byte on the pipe of signs before the reason why the front ends."""
 _LONGEST_REASON: Final = 1000
+_LONGEST_SHOWN: Final = 300
 _STOP_S: Final = 3.0
 FRONTS: Final = ("opcua", "page", "zenoh")
 """Roles of all fronts of the service."""
@@ -62,7 +64,7 @@ class Front:
         most_mb: int | None = None,
     ) -> None:
         self.name = role
-        self.title = f"the {role} front"
+        self.title = Text.of("front.front", role=role)
         self._arguments = list(arguments)
         self._watched = watched
         self._listening = listening
@@ -73,7 +75,7 @@ class Front:
     def pid(self) -> int | None:
         return self._process.pid if self._process else None
 
-    async def run_once(self, serves: Callable[[], None]) -> str:
+    async def run_once(self, serves: Callable[[], None]) -> Text:
         """Run it until it ends. Returns how, as the end of a sentence. ``serves`` is called at its first sign
         of life, or where it is not watched, once it has run for a second. When cancelled, the front is
         ended."""
@@ -85,7 +87,7 @@ class Front:
         except (BridgeError, OSError, RuntimeError) as error:
             # No port, no process or no thread to be had: the machine is at its limits, which may pass. A
             # child that nobody waits for loses its pipe, and ends by that.
-            return f"cannot be started: {error}"
+            return Text.of("front.cannot_be_started", why=shortened(str(error)))
         finally:
             if ear:
                 ear.close()
@@ -117,19 +119,17 @@ class Front:
 
     async def _wait(
         self, process: asyncio.subprocess.Process, ear: _Ear | None, serves: Callable[[], None]
-    ) -> str:
+    ) -> Text:
         """Wait until it ends, or is killed because it hangs."""
         # One wait for all looks: of each that is given up, asyncio keeps a future until the process ends.
         ended = asyncio.create_task(process.wait())
         try:
             while ear is None or ear.silent_looks <= _SILENT_LOOKS:
                 if (await asyncio.wait({ended}, timeout=SIGN_PERIOD_S))[0]:
-                    return f"ended ({_how(ended.result())})" + (
-                        f": {ear.reason}" if ear and ear.reason else ""
-                    )
+                    return _how(ended.result(), ear.reason if ear else "")
                 if self._most_mb is not None and (held_mb := _resident_mb(process.pid)) > self._most_mb:
                     await _kill(process, ended)
-                    return f"held {held_mb} MB of memory, more than {self._most_mb} MB, and was killed"
+                    return Text.of("front.too_large", held_mb=held_mb, most_mb=self._most_mb)
                 if ear:
                     ear.look()
                 else:
@@ -137,7 +137,7 @@ class Front:
             await _kill(process, ended)
         finally:
             ended.cancel()
-        return f"gave no sign of life for {_SILENT_LOOKS * SIGN_PERIOD_S:g} s and was killed"
+        return Text.of("front.no_sign", silent_s=_SILENT_LOOKS * SIGN_PERIOD_S)
 
     async def _stop(self) -> None:
         process = self._process
@@ -259,8 +259,16 @@ def _resident_mb(pid: int) -> int:
     return pages * resource.getpagesize() // _MB
 
 
-def _how(code: int) -> str:
+def shortened(reason: str) -> str:
+    """An error's words, on one line that a status line has room for."""
+    return " ".join(reason.split())[:_LONGEST_SHOWN]
+
+
+def _how(code: int, reason: str) -> Text:
+    how: Text | str = Text.of("front.exit_status", code=code)
     if code < 0:
         with contextlib.suppress(ValueError):
-            return signal.Signals(-code).name
-    return f"exit status {code}"
+            how = signal.Signals(-code).name
+    if reason:
+        return Text.of("front.ended_because", how=how, why=shortened(reason))
+    return Text.of("front.ended_by_itself", how=how)

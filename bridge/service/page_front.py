@@ -28,6 +28,7 @@ from bridge.project import Project
 from bridge.service.front_process import give_signs
 from bridge.service.page.buses import Buses
 from bridge.service.page.system import SystemOf
+from bridge.text import render
 
 _log = logging.getLogger(__name__)
 
@@ -76,7 +77,9 @@ def sources_of(project: Project) -> PageSources:
 def _in_german(family: Family) -> dict[str, dict[str, str]]:
     words = FaultWords(family, "de")
     listed = [words.listed(name) for name in listed_faults(family)]
-    return {one.number: {"text": str(one), "cause": one.cause, "remedy": one.remedy} for one in listed}
+    return {
+        one.number: {"text": render(one.text), "cause": one.cause, "remedy": one.remedy} for one in listed
+    }
 
 
 async def run_page(project: Project, signs: int | None = None, listening: int | None = None) -> None:

@@ -16,7 +16,8 @@ from bridge.base.notify import Notifier
 from bridge.base.quietlog import log_source
 from bridge.base.ratelimit import Pauses
 from bridge.command import Event, Kind, Plant
-from bridge.text import Text
+from bridge.service.front_process import shortened
+from bridge.text import Text, render
 
 _log = logging.getLogger(__name__)
 
@@ -24,7 +25,6 @@ _FIRST_PAUSE_S: Final = 0.2
 _LAST_PAUSE_S: Final = 10.0
 _STABLE_S: Final = 30.0
 """Time in seconds after which a part that served starts again with the first pause."""
-_LONGEST_REASON: Final = 300
 _FAILING: Final = "bridge/fronts_failing"
 
 
@@ -32,9 +32,9 @@ class Supervised(Protocol):
     """A supervised server or front. ``name`` is that of its point, ``title`` that in sentences."""
 
     name: str
-    title: str
+    title: Text
 
-    async def run_once(self, serves: Callable[[], None]) -> str:
+    async def run_once(self, serves: Callable[[], None]) -> Text:
         """Start it where it has ended, call ``serves`` (once or more) when it can be used, and wait until it
         ends. Returns how, as the end of a sentence. May raise."""
         ...
@@ -77,19 +77,19 @@ class Ports:
 class SupervisedServer:
     """A server of this process, which ``is_started`` already or is to be started first."""
 
-    def __init__(self, name: str, title: str, server: Server, *, is_started: bool = True) -> None:
+    def __init__(self, name: str, title: Text, server: Server, *, is_started: bool = True) -> None:
         self.name = name
         self.title = title
         self._server = server
         self._is_started = is_started
 
-    async def run_once(self, serves: Callable[[], None]) -> str:
+    async def run_once(self, serves: Callable[[], None]) -> Text:
         if not self._is_started:
             await self._server.start()
         self._is_started = False
         serves()
         await self._server.failed()
-        return "has ended"
+        return Text.of("front.has_ended")
 
 
 class Supervisor:
@@ -103,7 +103,7 @@ class Supervisor:
         self._notifier = notifier
         self._clock = clock
         self._status = status
-        self._failing: dict[str, str] = {}
+        self._failing: dict[str, Text] = {}
         self._pauses = Pauses()
         self._told: set[str] = set()
         self._unknown: set[str] = set()
@@ -113,11 +113,16 @@ class Supervisor:
     @property
     def status(self) -> str:
         """Status line of the service, for systemd."""
-        return f"{self._status}; not served: {self._failing_text}" if self._failing else self._status
+        failing = self._failing_said
+        return f"{self._status}; not served: {render(failing)}" if failing else self._status
 
     @property
-    def _failing_text(self) -> str:
-        return "; ".join(f"{name}: {self._failing[name]}" for name in sorted(self._failing))
+    def _failing_said(self) -> Text | str:
+        """Empty where all serve."""
+        parts = tuple(
+            Text.of("front.fails", front=name, how=self._failing[name]) for name in sorted(self._failing)
+        )
+        return Text.of("front.failing", parts=parts) if parts else ""
 
     def expect(self, parts: Sequence[Supervised]) -> None:
         """Set the parts that must have served or failed before ``all_known`` returns."""
@@ -136,27 +141,27 @@ class Supervisor:
             how = await self._run_once(part)
             if time.monotonic() - began > _STABLE_S:
                 pause_s = _FIRST_PAUSE_S
-            self._fails(part, " ".join(how.split())[:_LONGEST_REASON], pause_s)
+            self._fails(part, how, pause_s)
             await asyncio.sleep(pause_s)
             pause_s = min(pause_s * 2, _LAST_PAUSE_S)
 
-    async def _run_once(self, part: Supervised) -> str:
+    async def _run_once(self, part: Supervised) -> Text:
         try:
             return await part.run_once(lambda: self._serves(part))
         except (BridgeError, OSError) as error:
-            return f"has failed: {error}"
+            return Text.of("front.has_failed", why=shortened(str(error)))
         except Exception as error:  # noqa: BLE001 - one of them must not stop the drives of the others
             _log.exception("unexpected", extra=log_source(part.name))
-            return f"has failed: {error!r}"
+            return Text.of("front.has_failed", why=shortened(repr(error)))
 
-    def _fails(self, part: Supervised, how: str, pause_s: float) -> None:
+    def _fails(self, part: Supervised, how: Text, pause_s: float) -> None:
         """Report a failure, at most once a minute: a part that never comes up must not fill a disk."""
         self._failing[part.name] = how
         now = self._clock()
         self._settled(part, now)
         if self._pauses.take(now, part.name) is not None:
             self._told.add(part.name)
-            what = Text.plain(f"{part.title} {how}")
+            what = Text.of("front.what", front=part.title, how=how)
             said = Text.of("front.ended", what=what, pause_s=pause_s)
             self._plant.report(Event(now, Kind.FRONT, "bridge", 700, said))
 
@@ -168,13 +173,14 @@ class Supervisor:
         self._settled(part, now)
         if part.name in self._told:
             self._told.discard(part.name)
-            said = Text.of("front.serves_again", part=Text.plain(part.title))
+            said = Text.of("front.serves_again", part=part.title)
             self._plant.report(Event(now, Kind.FRONT, "bridge", 200, said))
 
     def _settled(self, part: Supervised, now: float) -> None:
         self._unknown.discard(part.name)
         self._look()
-        self._plant.set(_FAILING, self._failing_text, now)
+        image = self._plant.image
+        image.say(image.index[_FAILING], self._failing_said, now)
         self._notifier.status(self.status)
 
     def _look(self) -> None:

@@ -98,7 +98,7 @@ async def test_error_frames_set_state_counters_and_text(loop: Loop, wire: Sniffe
         await loop.until_state(state)
     assert (status.tx_errors, status.rx_errors) == (0x10, 0)
     wire.send(ERROR | 0x88, bytes.fromhex("0000841900000000"))
-    assert await loop.until(lambda: "stuff error" in status.last_error)
+    assert await loop.until(lambda: "stuff error" in str(status.last_error))
     assert status.error_frames == 4
     assert not loop.frames, "an error frame is no frame"
 
@@ -128,7 +128,7 @@ async def test_the_interface_goes_down_and_comes_back(loop: Loop, wire: Sniffer)
     await loop.run(0.1)
     ip("set", "vcan0", "down")
     await loop.until_state(ControllerState.DOWN)
-    assert "interface vcan0 is down" in loop.bus.status.last_error
+    assert "interface vcan0 is down" in str(loop.bus.status.last_error)
     loop.send(Frame(0x605, b"stale"))
     ip("set", "vcan0", "up")
     up = time.time()
@@ -149,8 +149,8 @@ async def test_an_interface_that_is_deleted_and_made_anew_is_found_again() -> No
     try:
         ip("del", "vcan9")
         await loop.until_state(ControllerState.DOWN)
-        assert "there is no interface vcan9" in loop.bus.status.last_error or await loop.until(
-            lambda: "there is no interface vcan9" in loop.bus.status.last_error
+        assert "there is no interface vcan9" in str(loop.bus.status.last_error) or await loop.until(
+            lambda: "there is no interface vcan9" in str(loop.bus.status.last_error)
         )
         ip("add", "vcan9", "type", "vcan")
         ip("set", "vcan9", "up")

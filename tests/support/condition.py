@@ -10,6 +10,7 @@ from bridge.condition.own_faults import with_faults
 from bridge.condition.told import recent_json, troubles_json
 from bridge.condition.troubles import Troubles
 from bridge.image import Image, Quality, Value
+from bridge.text import Text
 from tests.support import sites
 
 LOOK_EVERY_MS = 500.0
@@ -42,6 +43,9 @@ class Watched:
 
     def set(self, name: str, value: Value, quality: Quality = Quality.GOOD, reason: str = "") -> None:
         self.image.set(self.image.index[name], value, self.now_ms / 1000, quality, reason)
+
+    def say(self, name: str, said: Text) -> None:
+        self.image.say(self.image.index[name], said, self.now_ms / 1000)
 
     def beat(self) -> list[dict[str, Any]]:
         """Troubles, as the point tells them."""

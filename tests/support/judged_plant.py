@@ -8,6 +8,7 @@ from bridge.command.drive import Drive
 from bridge.command.link import NodeState
 from bridge.command.stop_check.state import LastStop
 from bridge.image import Value
+from bridge.text import Text
 from tests.support import sites
 from tests.support.leg_words import NORD_TU4, LegWords
 from tests.support.node_states import hand_over, node_goes
@@ -42,7 +43,7 @@ class JudgedPlant:
         self.now = BEGIN
         self.events: list[Event] = []
         self.entries: list[AuditEntry] = []
-        self.enforced: list[tuple[str, Action, str]] = []
+        self.enforced: list[tuple[str, Action, Text]] = []
         self.plant.on_event(self.events.append)
         self.plant.audit.tell_to(self.entries.append)
         self.drive: Drive = self.plant.drives[f"conveyor/{names[0]}"]

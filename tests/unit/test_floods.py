@@ -27,6 +27,7 @@ from bridge.northbound.modbus.units import units_of
 from bridge.northbound.zenoh.session import ZenohServer
 from bridge.service.event_log import log_event
 from bridge.service.parts import Supervisor
+from bridge.text import Text
 from bridge.zenohlink import Message, zenoh_config
 from bridge.zenohlink.worker import Worker
 from tests.support import sites
@@ -351,9 +352,9 @@ def test_what_zenoh_cannot_send(log: QuietLog) -> None:
 
 
 class _Broken:
-    name, title = "modbus", "the Modbus server"
+    name, title = "modbus", Text.of("front.modbus")
 
-    async def run_once(self, serves: Callable[[], None]) -> str:
+    async def run_once(self, serves: Callable[[], None]) -> Text:
         raise KeyError("a fault of ours")
 
 

@@ -18,6 +18,7 @@ from bridge.project import load_project
 from bridge.service.bus_process import Service
 from bridge.sim.nord.nord_tu4 import NordTu4
 from bridge.sim.shell import Simulation
+from bridge.text import Text
 from tests.support import sites
 from tests.support.process import free_port
 from tests.support.zenoh_peer import until
@@ -34,19 +35,19 @@ class SlowFront:
     """Takes its time to end."""
 
     name = "slow"
-    title = "the slow front"
+    title = Text.of("front.front", role="slow")
 
     def __init__(self, ended: Callable[[], None]) -> None:
         self._ended = ended
 
-    async def run_once(self, serves: Callable[[], None]) -> str:
+    async def run_once(self, serves: Callable[[], None]) -> Text:
         serves()
         try:
             await asyncio.get_running_loop().create_future()
         finally:
             self._ended()
             await asyncio.sleep(0.3)
-        return "has ended"
+        return Text.of("front.has_ended")
 
 
 class Moving:

@@ -7,16 +7,17 @@ from dataclasses import dataclass
 from bridge.command.leg.state import Way
 from bridge.command.messages.request import Identity, Request
 from bridge.drive import DriveState
+from bridge.text import Text
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """The drive's status word says this. ``is_taken``: with the bit "set-point acknowledge"; ``fault_text``
-    is empty but for a fault."""
+    """The drive's status word says this. ``is_taken``: with the bit "set-point acknowledge"; ``fault`` is
+    empty but for a fault."""
 
     state: DriveState
     is_taken: bool
-    fault_text: str
+    fault: Text | str
 
 
 @dataclass(frozen=True, slots=True)

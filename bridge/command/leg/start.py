@@ -85,7 +85,7 @@ def on_report(turn: Turn, report: Report, *, is_news: bool) -> None:
     if not is_news and stage not in AWAITS_REPORT:
         return
     if state in FAULTED:
-        why = Text.of("start.fault", fault=Text.plain(report.fault_text))
+        why = Text.of("start.fault", fault=report.fault)
         happen(turn, Stimulus.SAYS_FAULT, About(Outcome(Code.NOT_READY, why)))
     elif stage is not Stage.SETTLING or not _may_be_old(turn, start, state, is_news=is_news):
         _believe(turn)

@@ -124,7 +124,7 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
         try:
             warning = memory.count_write(owner, str(place.ref).upper(), place.name)
         except ParameterError as error:
-            raise BootError("J", Text.of("boot.of", owner=owner, what=Text.plain(str(error)))) from None
+            raise BootError("J", Text.of("boot.of", owner=owner, what=Text.plain(error.said))) from None
         if warning:
             result.notes.append(Text.plain(warning))
 

@@ -288,7 +288,7 @@ class NodeParameters:
         except ParameterError as error:
             return error
 
-    def _on_saved(self, conclude: Reply, result: str | ParameterError) -> None:
+    def _on_saved(self, conclude: Reply, result: Text | str | ParameterError) -> None:
         if isinstance(result, ParameterError):
             conclude(_failed(result))
             return
@@ -309,7 +309,7 @@ class NodeParameters:
     def _tell(self, source: str, severity: int, said: Text) -> None:
         self._events.report(Event(self._now, Kind.CONFIGURATION, source, severity, said))
 
-    def _warn(self, source: str, warning: str) -> None:
+    def _warn(self, source: str, warning: Text | str) -> None:
         if warning:
             self._tell(source, 600, Text.plain(warning))
 
@@ -348,7 +348,7 @@ def _why_not_set(identity: Identity, drive: HasParameters) -> Text | None:
 
 
 def _failed(error: ParameterError) -> Outcome:
-    return Outcome(_CODES[error.why], str(error), forwarded=False, abort_code=error.abort_code)
+    return Outcome(_CODES[error.why], error.said, forwarded=False, abort_code=error.abort_code)
 
 
 def _no(code: Code, why: Text | str) -> Outcome:

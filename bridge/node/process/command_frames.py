@@ -11,26 +11,27 @@ from bridge.node.boot import rpdo_plan
 from bridge.node.process.outputs import OutputPdos, OutputRpdo
 from bridge.node.process.process_data import DrivePdos, Rpdo
 from bridge.node.process.stop_words import StopWords
+from bridge.text import Text
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
     """One RPDO."""
 
-    label: str
+    label: Text
     words: ControlWords
     rpdo: Rpdo | OutputRpdo
 
-    def said(self, data: bytes) -> str:
-        """What ``data`` asks of the drive, in words."""
+    def said(self, data: bytes) -> Text | str:
+        """The words for what ``data`` asks of the drive; bytes where that is nothing."""
         raw = data.hex(" ").upper()
         word = self.rpdo.control_word(data)
         if word is None:
             return raw
         if isinstance(self.rpdo, OutputRpdo):
-            return f"{raw}, which leaves {'no output active' if not word else 'outputs active'}"
-        does = "enables" if self.words.enables(word) else "does not enable"
-        return f"{raw}, control word {word:04X}h, which {does}"
+            return Text.of("frame.outputs_active" if word else "frame.no_output_active", data=raw)
+        enables = self.words.enables(word)
+        return Text.of("frame.enables" if enables else "frame.does_not_enable", data=raw, word=word)
 
     def enables(self, data: bytes) -> bool:
         word = self.rpdo.control_word(data)
@@ -59,10 +60,13 @@ def commands_of(
             rpdos = list(connected[drive.name].rpdos)
         else:
             rpdos = [Rpdo(plan, count) for plan in stop_words.plans(drive).values()]
-        label = f"RPDO of {drive.name if drive else f'{node.name}, {slot.name}'}"
+        label = Text.of("frame.rpdo_of_slot", node=node.name, slot=slot.name)
+        if drive:
+            label = Text.of("frame.rpdo", owner=drive.name)
         for rpdo in rpdos:
             found.setdefault(rpdo.cob_id, Command(label, words, rpdo))
     if outputs:
         words = outputs.control_words
-        return {rpdo.cob_id: Command(f"RPDO of {node.name}", words, rpdo) for rpdo in outputs.rpdos}
+        label = Text.of("frame.rpdo", owner=node.name)
+        return {rpdo.cob_id: Command(label, words, rpdo) for rpdo in outputs.rpdos}
     return found

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import isfinite, nan
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
 from bridge.command import Event, Outcome
 from bridge.image import Columns, Point, Quality, Reading, Value
 from bridge.northbound.zenoh.users import own_keys
-from bridge.text import in_english
+from bridge.text import as_json, in_english
 
 JSON: Final = "application/json"
 TEXT: Final = "text/plain"
@@ -45,6 +45,8 @@ class _Told(msgspec.Struct, omit_defaults=True):
     severity: int
     message: str
     cause: str = ""
+    code: str = ""
+    facts: dict[str, Any] | None = None
 
 
 class _Done(msgspec.Struct, omit_defaults=True):
@@ -182,7 +184,11 @@ def seconds(epoch_ns: int) -> float:
 
 
 def event_json(event: Event, epoch_ns: int) -> bytes:
+    """The time, kind, source, severity and message, with the message's code and facts where it has them, and
+    the cause where something else explains it."""
     told = _Told(seconds(epoch_ns), event.kind, event.source, event.severity, event.message, event.cause)
+    if text := as_json(event.said):
+        told.code, told.facts = text["code"], text["facts"]
     return _encode(told)
 
 

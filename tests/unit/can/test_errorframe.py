@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.can.errorframe import ControllerState, describe, judge
+from bridge.text import LANGUAGES, render
 
 ERROR = 0x2000_0000
 
@@ -41,16 +42,16 @@ def test_every_class_of_error_frame_is_told(
 ) -> None:
     """<linux/can/error.h>"""
     assert judge(ERROR | can_id, bytes.fromhex(data)) == (state, None)
-    assert describe(ERROR | can_id, bytes.fromhex(data)).startswith(text)
+    assert str(describe(ERROR | can_id, bytes.fromhex(data))).startswith(text)
 
 
 def test_error_counters_come_with_any_class() -> None:
     frame = ERROR | 0x204, bytes.fromhex("0020000000008060")
     assert judge(*frame) == (ControllerState.PASSIVE, (0x80, 0x60))
-    assert describe(*frame).endswith("128 transmit and 96 receive errors")
+    assert str(describe(*frame)).endswith("128 transmit and 96 receive errors")
 
 
 @given(st.integers(0, 0x1FFF_FFFF), st.binary(min_size=8, max_size=8))
 def test_no_error_frame_raises(can_id: int, data: bytes) -> None:
     judge(can_id, data)
-    assert describe(can_id, data)
+    assert all(render(describe(can_id, data), language) for language in LANGUAGES)

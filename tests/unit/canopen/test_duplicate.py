@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.canopen.duplicate import DuplicateCheck
+from bridge.canopen.duplicate import (
+    AnsweredTwice,
+    DuplicateCheck,
+    DuplicateSign,
+    StateChanges,
+    TooManyHeartbeats,
+)
 
 OPERATIONAL, PRE_OPERATIONAL = 5, 127
 READ, OTHER_SUB = bytes.fromhex("4300100092010200"), bytes.fromhex("4300100192010200")
@@ -17,10 +23,10 @@ def check(period_s: float | None = 0.05) -> DuplicateCheck:
     return one
 
 
-def told(one: DuplicateCheck, heartbeats: list[tuple[float, int]]) -> list[tuple[int, str]]:
+def told(one: DuplicateCheck, heartbeats: list[tuple[float, int]]) -> list[tuple[int, DuplicateSign]]:
     """Reports, each with the number of heartbeats, (time, state), before it."""
     said = [one.on_heartbeat(state, time) for time, state in heartbeats]
-    return [(number, text) for number, text in enumerate(said, 1) if text]
+    return [(number, sign) for number, sign in enumerate(said, 1) if sign]
 
 
 # heartbeats
@@ -28,8 +34,12 @@ def told(one: DuplicateCheck, heartbeats: list[tuple[float, int]]) -> list[tuple
 
 def test_two_producers_of_the_same_period_are_too_many() -> None:
     both = sorted((0.05 * n + start, OPERATIONAL) for n in range(30) for start in (0.0, 0.02))
-    sentence = "20 heartbeats came within 0.50 s, 1.00 s were expected"
-    assert told(check(), both) == [(21, sentence), (42, sentence)]
+    found = told(check(), both)
+    assert [number for number, _ in found] == [21, 42]
+    for _, sign in found:
+        assert isinstance(sign, TooManyHeartbeats)
+        assert (sign.count, sign.expected_s) == (20, 1.0)
+        assert sign.took_s == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(("pause_s", "is_told"), [(0.69, True), (0.70, False), (1.0, False), (3.0, False)])
@@ -41,7 +51,7 @@ def test_a_single_device_may_be_somewhat_quick(pause_s: float, is_told: bool) ->
 def test_two_that_are_in_different_states_are_found_by_that() -> None:
     """Also where each sends every other heartbeat, so that their number is right."""
     turns = [(0.05 * n, PRE_OPERATIONAL if n % 2 else OPERATIONAL) for n in range(30)]
-    assert told(check(), turns) == [(21, "its heartbeat changed state 20 times within 20 messages")]
+    assert told(check(), turns) == [(21, StateChanges(20, 20))]
 
 
 @pytest.mark.parametrize(("changes", "is_told"), [(0, False), (1, False), (7, False), (8, True)])
@@ -50,7 +60,7 @@ def test_a_single_device_may_change_its_state_now_and_then(changes: int, is_told
     span = [PRE_OPERATIONAL if min(n, changes) % 2 else OPERATIONAL for n in range(21)]
     found = told(check(), [(0.05 * n, state) for n, state in enumerate(span * 5)])
     assert bool(found) is is_told
-    assert all("changed state 8 times" in text for _, text in found)
+    assert all(sign == StateChanges(8, 20) for _, sign in found)
 
 
 def test_without_a_period_nothing_is_expected() -> None:
@@ -78,7 +88,7 @@ def twice(
 def test_the_third_request_that_is_answered_twice_is_told_and_then_each_third() -> None:
     one = DuplicateCheck()
     said = [twice(one, 1.0 * n, 0.01) for n in range(9)]
-    assert said == [None, None, "3 SDO requests were answered twice"] * 3
+    assert said == [None, None, AnsweredTwice(3)] * 3
 
 
 @pytest.mark.parametrize(

@@ -8,13 +8,14 @@ from bridge.command import Action
 from bridge.command.stop_check.state import LastStop
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import Watch
+from bridge.text import Text
 from tests.support.judged_plant import JudgedPlant
 from tests.support.leg_words import NORD_TU4, VELOCITY, LegWords
 
 OFF = Action.DISABLE_VOLTAGE
 STAYS = "; it stays stopped until an operator starts or resets it"
 SAYS = "the drive says 0B37h, operation enabled"
-WHY = "the bridge: conveyor/fu1 ignores its stop"
+WHY = Text.of("stopped_by.plant", name="conveyor/fu1")
 
 
 def ignoring(*slots: str, more: str = "") -> JudgedPlant:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from bridge.condition.causes import KEPT_MS
 from bridge.condition.findings import Rank
 from bridge.image import Quality
+from bridge.text import Text
 from tests.support import sites
 from tests.support.condition import Watched
 from tests.support.nightly import examples
@@ -253,6 +254,11 @@ def test_drives_that_lost_the_same_controller_at_other_times_are_two_troubles(pl
     assert {kind for kind, _ in top(plant)} == {"controller_silent"}
 
 
+def failing(*fronts: str) -> Text:
+    how = Text.of("front.ended_by_itself", how="SIGKILL")
+    return Text.of("front.failing", parts=tuple(Text.of("front.fails", front=one, how=how) for one in fronts))
+
+
 @pytest.mark.parametrize(("front", "owner"), [("opcua", "opcua:scada"), ("page", "local:anna#12ab")])
 def test_a_dead_front_explains_the_silence_of_whom_it_serves(plant: Watched, front: str, owner: str) -> None:
     own(plant, DRIVES[0], owner)
@@ -260,7 +266,7 @@ def test_a_dead_front_explains_the_silence_of_whom_it_serves(plant: Watched, fro
     plant.later()
     trip(plant, DRIVES[0])
     plant.later(2000.0)
-    plant.set("bridge/fronts_failing", f"{front}: ended (SIGKILL)")
+    plant.say("bridge/fronts_failing", failing("zenoh", front))
     assert top(plant) == [("fronts_failing", "bridge")]
     assert below(plant) == {("controller_silent", DRIVES[0])}
     trip(plant, DRIVES[1])

@@ -18,6 +18,7 @@ from bridge.condition.findings import (
 )
 from bridge.drive import Explained
 from bridge.image import Image, Quality, Value
+from bridge.text import Text
 from tests.support import sites
 from tests.support.condition import Watched
 
@@ -228,3 +229,9 @@ def test_fronts_that_fail_are_a_warning_of_the_bridge(case: Watched) -> None:
     case.set("bridge/fronts_failing", "opcua")
     found = Trouble(Rank.WARNING, "fronts_failing", "bridge", (("fronts", "opcua"),))
     assert list(of_bridge(ImageReader(case.image))) == [found]
+    ended = Text.of("front.has_ended")
+    parts = tuple(Text.of("front.fails", front=one, how=ended) for one in ("modbus", "page"))
+    case.say("bridge/fronts_failing", Text.of("front.failing", parts=parts))
+    (trouble,) = of_bridge(ImageReader(case.image))
+    assert trouble.fronts == {"modbus", "page"}
+    assert str(dict(trouble.facts)["fronts"]) == "modbus: has ended; page: has ended"

@@ -239,7 +239,7 @@ def test_what_shows_that_another_bridge_is_in_charge(
     ],
 )
 def test_each_is_called_by_its_name(make: Any, can_id: int, name: str) -> None:
-    assert make(Node(5, [0x205])).core.name(Frame(can_id, b"")) == name
+    assert str(make(Node(5, [0x205])).core.name(Frame(can_id, b""))) == name
 
 
 # what comes
@@ -248,7 +248,9 @@ def test_each_is_called_by_its_name(make: Any, can_id: int, name: str) -> None:
 def test_an_rpdo_stops_its_node(make: Any) -> None:
     bus = make(Node(5, [0x205]), Node(6, [0x206]))
     bus.sees(0x206, STOP)
-    assert bus.stopped == [(["n6"], "the bridge, because of an intruder: RPDO 206 (206h): stop")]
+    [(nodes, why)] = bus.stopped
+    assert nodes == ["n6"]
+    assert render(why) == "the bridge, because of an intruder: RPDO 206 (206h): stop"
     assert bus.said == "intruder: RPDO 206 (206h): stop, from somebody else; NMT stop of n6"
     assert (bus.core.count, render(bus.core.last)) == (1, bus.said.removeprefix("intruder: "))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.canopen.duplicate import AnsweredTwice, StateChanges, TooManyHeartbeats
 from bridge.canopen.frame import Frame
 from bridge.command import Event
 from bridge.master.watch import BusWatch
@@ -76,14 +77,16 @@ def test_strangers_are_listed_by_number_for_a_minute() -> None:
 
 def test_a_number_that_is_used_twice_is_told_with_its_sign() -> None:
     case = Case()
-    case.watch.on_duplicate(5, "two answers to one request", 10.0)
-    case.watch.on_duplicate(5, "two answers to one request", 11.0)
-    case.watch.on_duplicate(6, "a heartbeat too many", 11.0)
+    case.watch.on_duplicate(5, AnsweredTwice(3), 10.0)
+    case.watch.on_duplicate(5, AnsweredTwice(3), 11.0)
+    case.watch.on_duplicate(6, TooManyHeartbeats(20, 0.5, 1.0), 11.0)
+    case.watch.on_duplicate(7, StateChanges(8, 20), 11.0)
     assert [event.message for event in case.told] == [
-        "node id 5 (conveyor) seems to be used twice: two answers to one request",
-        "node id 6 (unknown) seems to be used twice: a heartbeat too many",
+        "node id 5 (conveyor) seems to be used twice: 3 SDO requests were answered twice",
+        "node id 6 (unknown) seems to be used twice: 20 heartbeats came within 0.50 s, 1.00 s were expected",
+        "node id 7 (unknown) seems to be used twice: its heartbeat changed state 8 times within 20 messages",
     ]
-    assert case.point("duplicate_ids", 11.0) == "5, 6"
+    assert case.point("duplicate_ids", 11.0) == "5, 6, 7"
 
 
 @pytest.mark.parametrize(("own_id", "shown"), [(127, "127"), (None, "")])

@@ -89,6 +89,8 @@ def test_another_device_is_told_with_what_is_another(case: Case, other: Identifi
 
 def test_habits_stand_behind_the_success_and_are_told_when_they_are_new(case: Case) -> None:
     case.view.succeeded("no errors", 10.0)
-    case.view.shows_habits(["3 heartbeats of 2 bytes"], ["3 heartbeats of 2 bytes"], 11.0)
+    case.view.shows_habits(
+        [Text.plain("3 heartbeats of 2 bytes")], [Text.plain("3 heartbeats of 2 bytes")], 11.0
+    )
     assert case.told() == ["3 heartbeats of 2 bytes"]
     assert case.point("boot_status") == "no errors; 3 heartbeats of 2 bytes"

@@ -9,12 +9,13 @@ import pytest
 from bridge.parameter import Ledger, ParameterError, Why
 from bridge.parameter.ledger import DAY_S, MOST_A_DAY, MOST_WRITES, WINDOW_S, Saved
 from bridge.parameter.ledger_file import LedgerFile
+from bridge.text import Text
 
 KEY = ("conveyor/fu1", "2066:01")
 EPOCH_S = 1_795_000_000.0
 
 
-def write(ledger: Ledger, now: float, cycles: int | None = 100_000) -> str:
+def write(ledger: Ledger, now: float, cycles: int | None = 100_000) -> Text | str:
     ledger.check(KEY, "P102", now)
     return ledger.count(KEY, "P102", cycles, now)
 
@@ -43,7 +44,7 @@ def test_each_tenth_of_what_the_eeprom_stands_is_told_once() -> None:
     told = [ledger.count(KEY, "P102", 100, float(one)) for one in range(1, 101)]
     warned = [number for number, warning in enumerate(told, 1) if warning]
     assert warned == [10, 20, 30, 40, 50, 60, 70, 80, 90, 100]
-    assert told[9] == "P102 of conveyor/fu1 was written 10 times: its EEPROM endures 100 writes"
+    assert str(told[9]) == "P102 of conveyor/fu1 was written 10 times: its EEPROM endures 100 writes"
 
 
 def test_where_no_limit_is_known_nothing_is_told() -> None:

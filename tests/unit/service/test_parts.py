@@ -11,19 +11,20 @@ from bridge.base.errors import OperationFailed, Unavailable
 from bridge.base.notify import Notifier
 from bridge.command import Event
 from bridge.service.parts import Ports, SupervisedServer, Supervisor
+from bridge.text import Text
 from tests.support import sites
 
 
 class Part:
     """Does what ``turns`` say, one after the other, and then serves for ever."""
 
-    name, title = "modbus", "the Modbus server"
+    name, title = "modbus", Text.of("front.modbus")
 
-    def __init__(self, *turns: str | Exception) -> None:
+    def __init__(self, *turns: Text | Exception) -> None:
         self.turns = list(turns)
         self.serving = asyncio.Event()
 
-    async def run_once(self, serves: Callable[[], None]) -> str:
+    async def run_once(self, serves: Callable[[], None]) -> Text:
         if not self.turns:
             serves()
             self.serving.set()
@@ -103,7 +104,7 @@ async def test_all_are_known_when_each_has_served_or_failed(case: Case) -> None:
 
 async def test_one_that_ends_is_started_again(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("bridge.service.parts._FIRST_PAUSE_S", 0.0)
-    part = Part("has ended", OperationFailed("no"))
+    part = Part(Text.of("front.has_ended"), OperationFailed("no"))
     keeping = asyncio.create_task(case.supervisor.keep(part))
     await asyncio.wait_for(part.serving.wait(), 5)
     assert part.turns == []
@@ -124,12 +125,12 @@ class Server:
 
 async def test_a_server_that_is_started_already_is_started_from_the_second_time_on() -> None:
     server, served = Server(), list[int]()
-    part = SupervisedServer("modbus", "the Modbus server", server)
-    assert await part.run_once(lambda: served.append(server.starts)) == "has ended"
+    part = SupervisedServer("modbus", Text.of("front.modbus"), server)
+    assert await part.run_once(lambda: served.append(server.starts)) == Text.of("front.has_ended")
     await part.run_once(lambda: served.append(server.starts))
     assert served == [0, 1]
     other = Server()
-    await SupervisedServer("x", "x", other, is_started=False).run_once(lambda: None)
+    await SupervisedServer("x", Text.of("front.link"), other, is_started=False).run_once(lambda: None)
     assert other.starts == 1
 
 

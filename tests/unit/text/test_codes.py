@@ -13,6 +13,7 @@ from typing import Final, NamedTuple, get_args
 import pytest
 
 from bridge.can.interface import ControllerState
+from bridge.canopen.nmt import NmtCommand, NmtState, command_name
 from bridge.command.link import NodeState
 from bridge.command.messages.request import Action
 from bridge.config import DriveTable, NodeTable
@@ -24,6 +25,8 @@ GROUPS: Final[Mapping[str, Iterable[str]]] = {
     "action": list(Action),
     "controller_state": [state.name.lower() for state in ControllerState],
     "drive_state": [state.label for state in DriveState],
+    "nmt_command": [command_name(command) for command in NmtCommand],
+    "nmt_state": [state.words for state in NmtState],
     "node_state": [state.value for state in NodeState],
     "reaction": get_args(DriveTable.model_fields["on_expiry"].annotation),
     "supervision": get_args(NodeTable.model_fields["supervision"].annotation),

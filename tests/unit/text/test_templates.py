@@ -116,7 +116,7 @@ def test_an_unknown_code_and_a_missing_fact_are_errors() -> None:
         render(Text("owner.controls"))
 
 
-FORMATS: Final = [".0f", ".1f", ".2f", ".3f", "g", ".3g", "X", "02X", "04X", "08X"]
+FORMATS: Final = [".0f", ".1f", ".2f", ".3f", "g", ".3g", "X", "02X", "03X", "04X", "08X"]
 _NUMBERS: Final = [0, 1, -1, 12, 255, 65535, 1_000_000, 123456789, 0.5, 1.5, 2.5, 0.125, 0.375, 8.345, 1.005]
 _NUMBERS_TOO: Final = [-0.5, -2.5, 1e-5, 0.0001, 1234567.0, 99999.95, 999999.5, 1e21, 3.14159265, 100.0, 0.1]
 

@@ -25,11 +25,11 @@ def frame(word: int, length: int = 8) -> bytes:
 
 
 def test_a_drive_that_is_not_connected_may_listen_as_the_factory_has_it(found: dict[int, Command]) -> None:
-    assert found[0x205].label == "RPDO of conveyor/fu1"
+    assert str(found[0x205].label) == "RPDO of conveyor/fu1"
 
 
 def test_drives_that_the_site_leaves_out_are_there_too(found: dict[int, Command]) -> None:
-    labels = {command.label for command in found.values()}
+    labels = {str(command.label) for command in found.values()}
     others = {slot.name for slot in sites.family(sites.FAMILY).slot} - {"fu1"}
     assert {f"RPDO of conveyor, {name}" for name in others} <= labels
 
@@ -39,7 +39,7 @@ def test_a_frame_says_whether_it_enables(found: dict[int, Command], word: int, e
     command = found[0x205]
     assert command.enables(frame(word)) is enables
     does = "enables" if enables else "does not enable"
-    assert command.said(frame(word)).endswith(f"control word {word:04X}h, which {does}")
+    assert str(command.said(frame(word))).endswith(f"control word {word:04X}h, which {does}")
 
 
 def test_one_without_a_control_word_is_its_bytes(found: dict[int, Command]) -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from bridge.command import Code, Event, Kind, Outcome
 from bridge.image import Columns, DataType, Point, Quality, Reading
 from bridge.northbound.zenoh.keys import KeySpace, event_json, outcome_json
+from bridge.text import Text
 
 POINTS = (
     Point(name="conveyor/fu1/status/state", data_type=DataType.UINT8, states=((4, "operation_enabled"),)),
@@ -138,3 +139,7 @@ def test_events() -> None:
         "severity": 900,
         "message": "silent",
     }
+    says = Event(5.0, Kind.BUS, "conveyor", 200, Text.of("node.is_lost", node="conveyor"))
+    told = json.loads(event_json(says, 1_500_000_000))
+    assert told["message"] == "conveyor is lost"
+    assert (told["code"], told["facts"]) == ("node.is_lost", {"node": "conveyor"})

@@ -6,7 +6,7 @@ import { address } from "./route.js";
 import { clock, span } from "./format.js";
 import { drives, nodes } from "./site.js";
 import { ownerName } from "./owner.js";
-import { faultIn, many, maybe, t, worded } from "./texts.js";
+import { faultIn, inWords as wordsOf, many, maybe, t, worded } from "./texts.js";
 
 const TICK_MS = 10_000;
 const now = signal(boxNow());
@@ -42,13 +42,14 @@ export function headline(trouble) {
 /** The present fault of a drive in the reader's language, with its number; empty where it has none of its own. */
 export function faultText(drive) {
   const found = everything.value.find((one) => one.kind === "drive_fault" && one.place === drive);
-  return found ? inWords(driveAt(drive), found.facts.text, found.facts.number) : "";
+  return found ? inWords(driveAt(drive), found.facts.number, found.texts?.text, found.facts.text) : "";
 }
 
-/** A fault in the reader's language with its number, as its maker writes it: "E003/3.0 overcurrent". */
-export function inWords(drive, text, number) {
+/** A fault in the reader's language with its number, as its maker writes it: "E003/3.0 overcurrent". `text` is what the
+ * bridge says of it, and `english` the words of that. */
+export function inWords(drive, number, text, english) {
   const own = faultIn(drive?.mapping, number).text;
-  return own ? `${number} ${withoutNumber(own, number)}` : text;
+  return own ? `${number} ${capital(own)}` : worded(text, english);
 }
 
 const RANKS = ["danger", "alarm", "warning"];
@@ -120,17 +121,19 @@ const driveAt = (place) => drives.value.find((one) => one.name === place);
 // The facts in the reader's language, as far as the drive's family has its faults in it.
 function said(trouble) {
   const { number, value } = trouble.facts;
-  const facts = { ...trouble.facts, ...faultIn(driveAt(trouble.place)?.mapping, number) };
+  const own = faultIn(driveAt(trouble.place)?.mapping, number);
+  const facts = { ...trouble.facts, ...own };
   if (value) facts.value = t(`point.${value}`);
-  if (facts.text) facts.text = withoutNumber(facts.text, number);
+  if (facts.text) facts.text = capital(own.text ?? withoutNumber(trouble));
   return facts;
 }
 
 // The headline has the number already.
-function withoutNumber(text, number) {
-  const words = number && text.startsWith(`${number} `) ? text.slice(number.length + 1) : text;
-  return words.charAt(0).toUpperCase() + words.slice(1);
+function withoutNumber({ facts, texts }) {
+  return texts?.text?.code === "fault.numbered" ? wordsOf(texts.text.facts.text) : worded(texts?.text, facts.text);
 }
+
+const capital = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 
 /** The address of the page that shows the place. */
 export function pageOfPlace(place) {

@@ -51,7 +51,7 @@ function Node({ node }) {
       <ol class="stages" aria-label=${t("bus.boot")}>
         ${STAGES.map((stage, place) => html`<${Stage} stage=${stage} is=${standing(place, state, status, error)} />`)}
       </ol>
-      ${error ? html`<p class="is-alarm"><strong>${error.letter}</strong> ${withoutLetter(words(point("boot_status")))}</p>` : html`<${Found} status=${status} name=${point("boot_status")} />`}
+      ${error ? html`<p class="is-alarm"><strong>${error.letter}</strong> ${failing(status)}</p>` : html`<${Found} status=${status} name=${point("boot_status")} />`}
       ${good(point("device_errors")) && html`<p><span class="label">${t("bus.device_errors")}</span> ${words(point("device_errors"))}</p>`}
       ${may("engineer") && html`<${Commands} node=${node.name} />`}
     </li>
@@ -65,7 +65,12 @@ function failureOf(status) {
   return outcome?.code === "boot.left_out" ? { letter: "J", what: status } : null;
 }
 
-const withoutLetter = (failure) => failure.slice(failure.indexOf(" ") + 1);
+// What failed and what helps, without the letter.
+function failing({ code, facts }) {
+  if (code === "boot.noted") return [failing(facts.outcome), ...facts.notes.map((note) => inWords(note))].join("; ");
+  if (code === "boot.left_out") return facts.drives.map((one) => inWords(one.facts.what)).join(", ");
+  return [facts.what, facts.hint].filter(Boolean).map((part) => inWords(part)).join(": ");
+}
 
 // The present step; after the boot-up what was found and set, one line each.
 function Found({ status, name }) {

@@ -6,6 +6,7 @@ import { number } from "../format.js";
 import { faultIn, t } from "../texts.js";
 import { good, goodLabel } from "../drivestate.js";
 import { inWords } from "../trouble.js";
+import { texts } from "../values.js";
 import { Memory } from "./memory.js";
 
 export function Faults({ drive }) {
@@ -17,7 +18,7 @@ export function Faults({ drive }) {
       <h2 id="faults">${t("faults.title")}</h2>
       <dl class="facts">
         <dt>${t("faults.present")}</dt>
-        <dd>${text ? html`<strong class="is-alarm">${inWords(drive, text, status("fault_number"))}</strong>` : text === null ? "–" : t("faults.none")}</dd>
+        <dd>${text ? html`<strong class="is-alarm">${inWords(drive, status("fault_number"), texts(`${drive.name}/status/fault_text`).value, text)}</strong>` : text === null ? "–" : t("faults.none")}</dd>
         ${text && cause && html`<dt>${t("faults.cause")}</dt><dd>${cause}</dd>`}
         ${text && remedy && html`<dt>${t("plant.what_to_do")}</dt><dd>${remedy}</dd>`}
         <${Before} drive=${drive} />
@@ -37,12 +38,16 @@ function reasons(drive) {
   return { cause: own.cause || status("fault_cause"), remedy: own.remedy || status("fault_remedy") };
 }
 
-// The text of the last fault begins with its number.
 const BEFORE = {
-  last_fault_text: (text, drive) => (text ? inWords(drive, text, text.split(" ", 1)[0]) : t("faults.none")),
+  last_fault_text: lastFault,
   trips: (count) => number(count),
   last_stop: (code, drive) => t(`stop.${label(`${drive.name}/supervision/last_stop`, code)}`),
 };
+
+function lastFault(english, drive) {
+  const text = texts(`${drive.name}/supervision/last_fault_text`).value;
+  return english ? inWords(drive, text?.facts.number, text, english) : t("faults.none");
+}
 
 function Before({ drive }) {
   const point = (leaf) => `${drive.name}/supervision/${leaf}`;

@@ -49,7 +49,7 @@ async function remembered(drive) {
 // The error code, and beside it 16 bits of the maker's.
 function inWords(drive, value) {
   const code = word(value & 0xffff);
-  return [faultIn(drive.mapping, code).text || code, `(${word(value >>> 16)})`].filter(Boolean).join(" ");
+  return [code, faultIn(drive.mapping, code).text, `(${word(value >>> 16)})`].filter(Boolean).join(" ");
 }
 
 // A point of a parameter is described by the parameter's name and title: "P701[1] last fault".

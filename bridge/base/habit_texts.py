@@ -31,6 +31,6 @@ _MANY: Final[Mapping[Odd, Callable[[int, int, int], Text]]] = {
 
 
 def text_of_habit(shown: Shown) -> Text:
-    """How often it has shown, and what is right."""
+    """Number of times it has shown, and what is right."""
     texts = _ONE if shown.count == 1 else _MANY
     return texts[shown.odd](shown.count, shown.has, shown.due)

@@ -83,7 +83,7 @@ HABITS: Final[Mapping[Odd, Habit]] = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """How often one has shown, and the numbers of the last frame; ``str()`` is the sentence."""
+    """Number of times that one has shown, and the numbers of the last frame; ``str()`` is the sentence."""
 
     odd: Odd
     count: int
@@ -122,12 +122,11 @@ class HabitCounter:
         return [_shown(odd, one) for odd, one in self._counts.items() if one.count >= least]
 
     def habits(self) -> list[Shown]:
-        """As ``said``, those that are too frequent for a disturbance."""
+        """Habits of ``said`` that are too frequent for a disturbance."""
         return self.said(_NAMED_FROM)
 
     def take_news(self) -> list[Shown]:
-        """As ``habits``, those that have become habits since the last call, or ten times as
-        frequent."""
+        """New ones of ``habits`` since the last call, and those that are ten times as frequent."""
         self.has_news = False
         news: list[Shown] = []
         for odd, one in self._counts.items():

@@ -16,7 +16,7 @@ _ASYNCHRONOUS: Final = 255
 
 
 class StopCheck(Protocol):
-    """How the last stop of something that is commanded has ended, as far as that is known."""
+    """Outcome of the last stop of something that is commanded, as far as it is known."""
 
     @property
     def follows(self) -> bool:
@@ -62,12 +62,12 @@ class Commanded(Protocol):
 
     @property
     def burst_s(self) -> float:
-        """How far ahead the bus may have been told what to send."""
+        """Time in seconds for which the bus may have been told in advance what to send."""
         ...
 
     @property
     def takeover_s(self) -> float:
-        """How long a stopped word may wait for SYNC."""
+        """Longest time in seconds that a stopped word waits for SYNC."""
         ...
 
     @property
@@ -90,11 +90,11 @@ class Commanded(Protocol):
         ...
 
     def on_wire(self, wire: Wire, now: float) -> None:
-        """What is predicted of its bus."""
+        """Take over the figures that are predicted of its bus."""
         ...
 
     def on_handed_over(self, now: float) -> None:
-        """What the channel puts out has been handed to the bus."""
+        """Begin the bound of its stop: the output of the channel has been handed to the bus."""
         ...
 
     def on_time(self, now: float) -> Sequence[Verdict]:
@@ -120,14 +120,13 @@ def has_followed(one: Commanded) -> bool:
 
 
 def is_enabling(one: Commanded) -> bool:
-    """What is sent enables it."""
+    """The words that are sent enable it."""
     output = one.channel.output
     return not output.silent and one.channel.words.enables(output.words[0])
 
 
 class WordTiming:
-    """How long the words of something that is commanded take. Times are in seconds unless the name says
-    otherwise."""
+    """Times that the words of something that is commanded take, in seconds unless the name says otherwise."""
 
     def __init__(self, bus: BusTable) -> None:
         self.bus = bus

@@ -345,8 +345,8 @@ class Network:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
     def on_handed_over(self, unsent: set[Commanded], now: float) -> None:
-        """What is to be repeated is on the bus: bounds of stops begin, and outputs are to be read back. Whose
-        stop is sent by that is taken out of ``unsent``."""
+        """Begin the bounds of stops, and have outputs read back: the bus repeats what it is to repeat. Those
+        whose stop is sent by that are taken out of ``unsent``."""
         for node in self.nodes:
             for one in node.node.commanded:
                 is_sent = node.sends_process_data and node.wire.carries(one)

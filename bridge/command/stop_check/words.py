@@ -15,8 +15,8 @@ def drive_says(channel: DriveChannel) -> Text:
 
 
 def ignored_by_drive(channel: DriveChannel, node: str, verdict: Verdict, took_s: float) -> Text:
-    """What the drive was sent and what it says, after ``took_s``. Its node that the bridge has stopped has
-    not said that drives do not run in its state, or does not stop them by it."""
+    """Word that the drive was sent, and what it says after ``took_s``. If the bridge has stopped its node:
+    that it may run on, and why."""
     if verdict.is_cut_off:
         return _cut_off(channel, node, took_s)
     summed, says = verdict.summed, drive_says(channel)
@@ -28,7 +28,7 @@ def ignored_by_drive(channel: DriveChannel, node: str, verdict: Verdict, took_s:
 
 
 def ignored_by_outputs(check: OutputStopCheck, verdict: Verdict, took_s: float) -> Text:
-    """How the outputs differ from what they were sent, after ``took_s``."""
+    """Difference of the outputs from what they were sent, after ``took_s``."""
     differ = verdict.before is LastStop.FOLLOWED
     return Text.of("stop.outputs_differ" if differ else "stop.outputs_ignored", took_s=took_s, why=check.why)
 

@@ -59,8 +59,14 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 ##@ Test
 # What measures times minds when it has to wait for a CPU: one after the other, and never two at a time. Unit tests
 # know no time. A tab of a browser is a controller whose silence stops a drive: beside it nothing else runs.
-test: compiled packages clients ## all tests: unit, foreign, wire, lab, docs, browser, some fuzzing; less of what takes long
+test: compiled packages clients ## unit, foreign, wire, lab, docs, browser, some fuzzing; less of what takes long
 	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab pages fuzz-short" "foreign unit"
+	@$(MAKE) --no-print-directory browser
+
+# What changes seldom break, and what is like what runs already: LANDING=1 make unit runs both, of one part.
+landing: export LANDING := rest
+landing: compiled packages clients ## what make test leaves out, before a change lands: .ci/run has both
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "unit"
 	@$(MAKE) --no-print-directory browser
 
 # One after the other, so that nobody disturbs who measures times; and all of them even if one fails.
@@ -229,5 +235,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
+.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
   check-imports format docs setup lock wheel clean help

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from playwright.sync_api import WebSocketRoute, expect
 
 from tests.browser.hands import (
@@ -76,6 +77,7 @@ def test_a_tab_that_hangs_is_a_controller_that_fell_silent(desk: Desk) -> None:
         state(page).not_to_have_text(re.compile("running"))
 
 
+@pytest.mark.landing
 def test_a_second_browser_takes_no_drive_from_an_operator_and_an_engineer_does(desk: Desk) -> None:
     with desk.sits("operator") as owner, desk.sits("operator") as other, desk.sits("engineer") as engineer:
         for page in (owner, other, engineer):
@@ -117,6 +119,7 @@ def test_nobody_is_said_to_watch_or_to_stop_who_does_not(bench: Desk) -> None:
         expect(page.get_by_role("button", name="Stop", exact=True)).to_be_disabled()
 
 
+@pytest.mark.landing
 def test_a_hold_is_told_as_what_it_is(bench: Desk) -> None:
     with bench.sits("operator") as page, bench.sits("operator") as watcher:
         for one in (page, watcher):
@@ -133,6 +136,7 @@ def test_a_hold_is_told_as_what_it_is(bench: Desk) -> None:
         expect(watcher.locator(".sentence")).to_contain_text("in order")
 
 
+@pytest.mark.landing
 def test_what_a_failed_test_leaves_is_put_in_order(bench: Desk) -> None:
     """Else nothing that failed once could pass when it is tried again."""
     with bench.sits("operator") as watcher:
@@ -150,6 +154,7 @@ def test_what_a_failed_test_leaves_is_put_in_order(bench: Desk) -> None:
         owner(watcher).to_contain_text("nobody")
 
 
+@pytest.mark.landing
 def test_a_refusal_is_not_told_again_on_return(bench: Desk) -> None:
     with bench.sits("operator") as owner, bench.sits("operator") as other:
         for page in (owner, other):
@@ -164,6 +169,7 @@ def test_a_refusal_is_not_told_again_on_return(bench: Desk) -> None:
         expect(other.get_by_role("alert")).to_have_text("")
 
 
+@pytest.mark.landing
 def test_a_refusal_is_forgotten_when_its_reason_has_gone(bench: Desk) -> None:
     with bench.sits("operator") as owner, bench.sits("operator") as other:
         for page in (owner, other):
@@ -175,6 +181,7 @@ def test_a_refusal_is_forgotten_when_its_reason_has_gone(bench: Desk) -> None:
         expect(other.get_by_role("alert")).to_have_text("")
 
 
+@pytest.mark.landing
 def test_who_hid_a_tab_is_told_on_return_what_became_of_its_drive(bench: Desk) -> None:
     with bench.sits("operator") as page:
         to(page, "drive/b/fu2")
@@ -239,6 +246,7 @@ def test_who_leaves_a_drive_that_stands_is_asked_nothing(desk: Desk) -> None:
         expect(page.locator(".tile").first).to_be_visible()
 
 
+@pytest.mark.landing
 def test_a_tab_that_was_cut_off_says_so_itself(desk: Desk) -> None:
     with desk.sits("operator") as page:
         sockets: list[WebSocketRoute] = []
@@ -263,6 +271,7 @@ def test_a_tab_that_was_cut_off_says_so_itself(desk: Desk) -> None:
         desk.complaints.clear()  # the browser's own line on a socket that is closed under it
 
 
+@pytest.mark.landing
 def test_a_screen_reader_is_told_each_state_that_a_drive_comes_to(desk: Desk) -> None:
     with desk.sits("operator") as page:
         to_drive(page)

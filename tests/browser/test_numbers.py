@@ -22,6 +22,7 @@ def take_in(page: Page, button: str) -> None:
     expect(page.locator("#setpoint")).to_be_enabled()
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("locale", ["en-US", "de-DE"])
 def test_a_german_page_reads_a_comma_whatever_the_browser_speaks(desk: Desk, locale: str) -> None:
     with desk.sits("operator", GERMAN, locale=locale) as page:
@@ -48,6 +49,7 @@ def test_what_may_mean_two_numbers_is_sent_neither_by_send_nor_by_start(desk: De
         page.locator(".ownership button").click()
 
 
+@pytest.mark.landing
 def test_the_other_languages_notation_is_shown_in_this_one_before_it_is_sent(desk: Desk) -> None:
     with desk.sits("operator", ENGLISH, locale="de-DE") as page:
         written = asked(page, "write")
@@ -63,6 +65,7 @@ def test_the_other_languages_notation_is_shown_in_this_one_before_it_is_sent(des
         page.locator(".ownership button").click()
 
 
+@pytest.mark.landing
 def test_a_german_page_writes_a_parameter_as_it_was_typed(desk: Desk) -> None:
     with desk.sits("engineer", GERMAN, locale="en-US") as page:
         written = asked(page, "write_parameter")

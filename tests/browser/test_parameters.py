@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.hands import (
@@ -82,6 +83,7 @@ def test_a_parameter_is_found_changed_and_put_back_from_a_backup(desk: Desk, tmp
         expect(parameter(page, "P102.1")).to_contain_text("2\u202fs")
 
 
+@pytest.mark.landing
 def test_a_drive_is_compared_with_a_makers_file_and_a_wrong_file_is_told_by_line(
     desk: Desk, tmp_path: Path
 ) -> None:
@@ -101,6 +103,7 @@ def test_a_drive_is_compared_with_a_makers_file_and_a_wrong_file_is_told_by_line
         desk.complaints.remove(desk.complaints[-1])  # the browser's own line on the answer 422
 
 
+@pytest.mark.landing
 def test_a_drive_is_compared_with_its_like_until_that_is_stopped_or_left(bench: Desk) -> None:
     with bench.sits("engineer") as page:
         read = asked(page, "read_parameter")

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import expect
 
 from tests.bench.processes import children
@@ -71,6 +72,7 @@ def test_another_page_gives_the_drive_back_and_the_skip_link_does_not(desk: Desk
         owner(page).to_contain_text("nobody")
 
 
+@pytest.mark.landing
 def test_a_front_that_hangs_is_seen_and_its_tab_is_a_silent_controller(
     desk: Desk, bridge: tuple[Process, int]
 ) -> None:
@@ -88,6 +90,7 @@ def test_a_front_that_hangs_is_seen_and_its_tab_is_a_silent_controller(
         expect(page.locator(".sentence")).to_contain_text("Everything is in order")
 
 
+@pytest.mark.landing
 def test_whoever_comes_back_after_the_session_is_over_logs_in_again(desk: Desk) -> None:
     with desk.sits("operator") as page:
         expect(page.locator(".sentence")).to_contain_text(re.compile("in order|since"))
@@ -100,6 +103,7 @@ def test_whoever_comes_back_after_the_session_is_over_logs_in_again(desk: Desk) 
     desk.complaints.clear()  # the browser's own, on what did not answer
 
 
+@pytest.mark.landing
 def test_a_trend_is_paused_zoomed_and_kept_as_a_file(desk: Desk, tmp_path: Path) -> None:
     with desk.sits("operator") as page:
         to_drive(page)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.browser.hands import SHOTS, start, take
@@ -80,6 +81,7 @@ def broken(
         assert not desk.complaints
 
 
+@pytest.mark.landing
 def test_a_cable_is_pulled(tmp_path: Path, chromium: Browser) -> None:
     with broken(tmp_path, chromium) as plant:
         plant.tell("cut_cable")
@@ -92,6 +94,7 @@ def test_a_cable_is_pulled(tmp_path: Path, chromium: Browser) -> None:
         expect(plant.page.locator(".sentence")).to_contain_text("Everything is in order")
 
 
+@pytest.mark.landing
 def test_a_bus_is_pulled_while_a_drive_runs_on_it(tmp_path: Path, chromium: Browser) -> None:
     with broken(tmp_path, chromium) as plant:
         page = plant.page
@@ -110,6 +113,7 @@ def test_a_bus_is_pulled_while_a_drive_runs_on_it(tmp_path: Path, chromium: Brow
         expect(page.locator(".tile", has_text=DRIVE)).not_to_contain_text("running")
 
 
+@pytest.mark.landing
 def test_a_drive_has_a_fault_and_is_acknowledged(tmp_path: Path, chromium: Browser) -> None:
     with broken(tmp_path, chromium) as plant:
         page = plant.page
@@ -156,6 +160,7 @@ def test_a_plc_falls_silent(tmp_path: Path, chromium: Browser) -> None:
         plant.shot("silent-plc")
 
 
+@pytest.mark.landing
 def test_somebody_else_commands_a_drive(tmp_path: Path, chromium: Browser) -> None:
     with broken(tmp_path, chromium) as plant:
         plant.tell("intrude")
@@ -163,6 +168,7 @@ def test_somebody_else_commands_a_drive(tmp_path: Path, chromium: Browser) -> No
         plant.shot("intruder")
 
 
+@pytest.mark.landing
 def test_a_drive_has_another_parameter_set(tmp_path: Path, chromium: Browser) -> None:
     with broken(tmp_path, chromium) as plant:
         plant.tell("set_otherwise")
@@ -175,6 +181,7 @@ def test_a_drive_has_another_parameter_set(tmp_path: Path, chromium: Browser) ->
         plant.shot("parameter-set")
 
 
+@pytest.mark.landing
 def test_the_disk_is_full(tmp_path: Path, chromium: Browser) -> None:
     what = "the audit log cannot be written"
     with broken(tmp_path, chromium, '[audit]\nfile = "/dev/full"', at_first=what) as plant:

@@ -66,6 +66,7 @@ def test_what_is_not_there_is_told(desk: Desk) -> None:
         expect(page.locator(".search")).to_contain_text("No row matches “xyzzy”.")
 
 
+@pytest.mark.landing
 def test_a_bus_is_listened_to_filtered_counted_and_captured(desk: Desk) -> None:
     with desk.sits("observer") as page:
         to(page, "bus/can0")
@@ -104,6 +105,7 @@ def test_texts_of_others_are_shown_as_texts(desk: Desk, bridge: tuple[Process, i
         assert "owned" not in page.title()
 
 
+@pytest.mark.landing
 def test_what_the_bridge_says_of_a_drive_that_may_run_on_is_german_on_the_german_page(
     tmp_path: Path, chromium: Browser
 ) -> None:
@@ -129,6 +131,7 @@ def test_what_the_bridge_says_of_a_drive_that_may_run_on_is_german_on_the_german
         assert not desk.complaints
 
 
+@pytest.mark.landing
 def test_a_drive_that_may_run_on_by_agreement_is_said_to_in_both_languages(desk: Desk) -> None:
     with desk.sits("operator") as page:
         to_drive(page)
@@ -139,6 +142,7 @@ def test_a_drive_that_may_run_on_by_agreement_is_said_to_in_both_languages(desk:
         expect(page.locator(".chain")).to_contain_text("It runs on.")
 
 
+@pytest.mark.landing
 def test_a_tile_draws_no_share_of_a_range_that_nobody_knows(tmp_path: Path, chromium: Browser) -> None:
     fan = sites.node(
         sites.drive("drive", "lease", 1000, sites.ACCEPTED), name="fan", node_id=8, mapping="cia402/velocity"
@@ -168,6 +172,7 @@ def test_the_system_shows_the_file_without_its_secrets(desk: Desk) -> None:
         expect(page.get_by_role("heading", name="Audit log")).to_be_visible()
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(
     ("place", "api"),
     [
@@ -193,6 +198,7 @@ def test_what_fails_to_load_is_told_and_tried_again(bench: Desk, place: str, api
         bench.complaints[:] = [one for one in bench.complaints if "503" not in one]
 
 
+@pytest.mark.landing
 def test_without_its_bridge_a_page_knows_nothing(tmp_path: Path, chromium: Browser) -> None:
     with ExitStack() as site:
         desk = Desk(chromium, site.enter_context(serving(tmp_path, pair("a", 5))))

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import pytest
+
 from tests.lab.sites import lab_site
 from tests.support.process import Process, drivebridge, peer, until
 from tests.support.sniffer import Sniffer, sniffing
@@ -33,6 +35,7 @@ def bridge_on(folder: Path, node: str, *, slave: bool) -> Iterator[tuple[Sniffer
         yield bus, bridge
 
 
+@pytest.mark.landing
 def test_another_device_is_named_and_not_started(tmp_path: Path) -> None:
     identity = "[bus.node.identity]\nvendor_id = 0xB9\n"
     with bridge_on(tmp_path, identity, slave=True) as (bus, bridge):
@@ -41,6 +44,7 @@ def test_another_device_is_named_and_not_started(tmp_path: Path) -> None:
         assert START not in [frame.data for frame in bus.of(0)]
 
 
+@pytest.mark.landing
 def test_a_mask_lets_a_device_of_the_same_kind_in(tmp_path: Path) -> None:
     identity = "[bus.node.identity]\nproduct_code = 0xFF02\nproduct_code_mask = 0xFF\n"
     with bridge_on(tmp_path, identity, slave=True) as (bus, bridge):
@@ -57,6 +61,7 @@ def test_a_missing_node_is_named_and_booted_when_it_comes(tmp_path: Path) -> Non
             bridge.wait_output("node operational")
 
 
+@pytest.mark.landing
 def test_a_node_that_boots_in_a_loop_is_told_once_and_left_in_peace(tmp_path: Path) -> None:
     with bridge_on(tmp_path, "", slave=True) as (bus, bridge):
         bridge.wait_output("node operational")
@@ -75,6 +80,7 @@ def test_a_node_that_boots_in_a_loop_is_told_once_and_left_in_peace(tmp_path: Pa
         )
 
 
+@pytest.mark.landing
 def test_another_master_and_a_foreign_node_are_reported(tmp_path: Path) -> None:
     with bridge_on(tmp_path, "", slave=True) as (bus, bridge):
         bridge.wait_output("node operational")

@@ -6,6 +6,8 @@ import signal
 import time
 from pathlib import Path
 
+import pytest
+
 from tests.lab.sites import ask, lab_site
 from tests.support.process import drivebridge, peer, until
 from tests.support.sniffer import sniffing
@@ -16,6 +18,7 @@ STOP = 0x047E
 OWN_TIMEOUT_S = 3.0
 
 
+@pytest.mark.landing
 def test_a_stop_while_the_drive_gets_nothing_goes_out_as_one_burst(tmp_path: Path) -> None:
     own = f"own_timeout_ms = {round(1000 * OWN_TIMEOUT_S)}\nenforce = true"
     site = lab_site(

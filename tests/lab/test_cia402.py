@@ -186,6 +186,7 @@ def test_vl_killing_the_master_stops_the_drive_by_its_heartbeat(make_lab) -> Non
     lab.wait(stands_still, "the motor stands still")
 
 
+@pytest.mark.landing
 def test_pp_a_position_is_handed_over_by_the_bridge(make_lab) -> None:
     lab = make_lab("profile-position")
     lab.owner.words = [SHUTDOWN]
@@ -200,6 +201,7 @@ def test_pp_a_position_is_handed_over_by_the_bridge(make_lab) -> None:
     assert edges == 2, "one new set-point each, however often it was written"
 
 
+@pytest.mark.landing
 def test_hm_finds_its_place(make_lab) -> None:
     lab = make_lab("homing")
     lab.owner.words = [SHUTDOWN]
@@ -210,6 +212,7 @@ def test_hm_finds_its_place(make_lab) -> None:
     lab.wait(lambda: lab.bus.of(TPDO)[-1].word & 0x3400 == 0x1400, "homing attained")
 
 
+@pytest.mark.landing
 def test_csp_follows_with_sync_and_enabling_moves_nothing(make_lab) -> None:
     lab = make_lab("cyclic-position")
     lab.enable(RUN, 4000)  # written too early: it must not jump there
@@ -228,6 +231,7 @@ def test_csp_follows_with_sync_and_enabling_moves_nothing(make_lab) -> None:
     lab.wait(lambda: lab.state == DISABLED, "quick stop")
 
 
+@pytest.mark.landing
 def test_csv_follows_with_sync(make_lab) -> None:
     lab = make_lab("cyclic-velocity")
     lab.enable(RUN)

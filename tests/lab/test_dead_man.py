@@ -97,6 +97,7 @@ def test_a_stopped_controller_stops_its_drive_in_time(lab: Lab) -> None:
     lab.bridge.wait_output("E010/10.3", 5.0)
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("deadman_ms", [100, 400])
 def test_a_bridge_that_pauses_across_the_deadline_publishes_no_less(tmp_path: Path, deadman_ms: int) -> None:
     """No margin for a busy machine, so one try of three may be held up by it: a bridge that does not look for
@@ -193,6 +194,7 @@ def test_after_the_interface_was_down_the_first_rpdos_are_stopped_ones(lab: Lab)
     assert not [frame for frame in lab.bus.of(RPDO1, up) if enabling(frame.word)]
 
 
+@pytest.mark.landing
 def test_a_restarted_bridge_starts_with_stopped_words(lab: Lab) -> None:
     owner = lab.run_drive()
     lab.bridge.signal(signal.SIGKILL)
@@ -206,6 +208,7 @@ def test_a_restarted_bridge_starts_with_stopped_words(lab: Lab) -> None:
     until(lambda: lab.turns_at(0), 5.0, "the drive that ran on is stopped")
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize(("role", "ready"), [("opcua", "INFO    OPC UA on"), ("zenoh", "INFO    zenoh on")])
 def test_a_killed_front_changes_nothing_on_the_bus(tmp_path: Path, role: str, ready: str) -> None:
     site = lab_site(tmp_path, timeout_ms=5000, bus="deadman_ms = 400")

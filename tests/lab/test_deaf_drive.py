@@ -56,6 +56,7 @@ def test_a_drive_made_deaf_is_named_and_its_node_stopped(lab: Lab) -> None:
     assert lab.state == ENABLED, "it did run on"
 
 
+@pytest.mark.landing
 def test_the_end_names_a_deaf_drive(lab: Lab) -> None:
     make_deaf(lab)
     since = time.time()
@@ -68,6 +69,7 @@ def test_the_end_names_a_deaf_drive(lab: Lab) -> None:
     assert "all drives are stopped" not in lab.bridge.output()
 
 
+@pytest.mark.landing
 def test_the_end_waits_for_the_ramp(lab: Lab) -> None:
     lab.wait(lambda: lab.value == 100_000, "the speed")
     lab.bridge.signal(signal.SIGTERM)
@@ -77,6 +79,7 @@ def test_the_end_waits_for_the_ramp(lab: Lab) -> None:
     assert lab.bridge.output().splitlines()[-2].endswith("all drives are stopped")
 
 
+@pytest.mark.landing
 def test_a_drive_that_another_master_runs_is_named(lab: Lab) -> None:
     lab.owner.words = words(0)
     lab.wait(lambda: lab.state != ENABLED, "off")

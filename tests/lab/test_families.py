@@ -70,6 +70,7 @@ def lab(tmp_path: Path) -> Iterator[Lab]:
         yield Lab(tmp_path, stack)
 
 
+@pytest.mark.landing
 def test_each_family_is_moved_and_stops_when_the_bridge_is_gone(lab: Lab) -> None:
     for drive, value, most in MOVES:
         controller = lab.controller(drive, value, most)

@@ -77,6 +77,7 @@ def test_it_is_booted_supervised_read_written_and_exchanges_pdos(foreign: Foreig
     within(5.0, lambda: foreign.inputs(0, 2) == [READY, 0], "stands")
 
 
+@pytest.mark.landing
 def test_one_that_keeps_an_error_is_back_by_itself(tmp_path: Path) -> None:
     """One SYNC of two bytes, and it refuses Operational until its communication is reset."""
     site = lab_site(tmp_path, timeout_ms=2000, controls=("modbus",), bus='on_intruder = "report"')
@@ -102,6 +103,7 @@ def test_one_that_keeps_an_error_is_back_by_itself(tmp_path: Path) -> None:
         assert [frame.data for frame in resets(bus, begun)] == [b"\x82\x05"], "once, and this node alone"
 
 
+@pytest.mark.landing
 def test_it_is_lost_when_it_dies_and_back_when_it_is_back(foreign: Foreign, tmp_path: Path) -> None:
     foreign.write(0x047E, 0, 0, 0)
     within(5.0, lambda: foreign.inputs(11) == [GOOD], "good")

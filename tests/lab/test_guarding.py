@@ -8,6 +8,8 @@ from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 
+import pytest
+
 from tests.lab.sites import lab_site
 from tests.support.process import drivebridge, until
 from tests.support.sniffer import sniffing
@@ -25,6 +27,7 @@ life_time_factor = {FACTOR}
 """
 
 
+@pytest.mark.landing
 def test_both_sides_watch_each_other(tmp_path: Path) -> None:
     site = lab_site(tmp_path, timeout_ms=5000, controls=("modbus",), node=NODE)
     with ExitStack() as stack:

@@ -115,6 +115,7 @@ def actual_speed(tpdo1: Seen) -> int:
     return abs(int.from_bytes(tpdo1.data[2:4], "little", signed=True))
 
 
+@pytest.mark.landing
 def test_own_frames_are_never_an_intruders_however_the_words_change(make_lab) -> None:
     """Setpoints that change at full speed, starts and stops, and a hang."""
     lab = make_lab()
@@ -147,6 +148,7 @@ def test_who_enables_a_drive_is_told_and_its_node_is_stopped_at_once(make_lab) -
     assert not lab.bus.of(TPDO1, quiet), "a stopped node has no process data"
 
 
+@pytest.mark.landing
 def test_with_report_it_is_only_told(make_lab) -> None:
     lab = make_lab('on_intruder = "report"')
     first = lab.send(RPDO1, ENABLE, count=20)
@@ -155,6 +157,7 @@ def test_with_report_it_is_only_told(make_lab) -> None:
     assert not stops(lab.bus, first)
 
 
+@pytest.mark.landing
 def test_who_goes_on_with_what_was_right_before_is_found(make_lab) -> None:
     """The intruder repeats the owner's own frame; when the owner has stopped, it is an enabling one."""
     lab = make_lab()
@@ -164,6 +167,7 @@ def test_who_goes_on_with_what_was_right_before_is_found(make_lab) -> None:
     until(lambda: bool(stops(lab.bus, begin)), 10.0, "the NMT stop")
 
 
+@pytest.mark.landing
 def test_a_frame_from_the_wire_that_is_like_ours_is_found_at_once(make_lab) -> None:
     """Through the kernel's gateway, frames come as from another machine."""
     lab = make_lab('on_intruder = "report"')
@@ -178,6 +182,7 @@ def test_a_frame_from_the_wire_that_is_like_ours_is_found_at_once(make_lab) -> N
     lab.wait_intruders(lambda count: count == 1)
 
 
+@pytest.mark.landing
 def test_a_tool_that_writes_is_an_intruder_and_one_that_reads_is_told(make_lab) -> None:
     lab = make_lab()
     begin = time.time()
@@ -195,6 +200,7 @@ def test_a_tool_that_writes_is_an_intruder_and_one_that_reads_is_told(make_lab) 
     until(lambda: bool(stops(lab.bus, begin)), 5.0, "the NMT stop")
 
 
+@pytest.mark.landing
 def test_a_second_bridge_stays_passive_and_takes_over_when_the_first_is_gone(make_lab) -> None:
     lab = make_lab()
     lab.run_drive()
@@ -246,6 +252,7 @@ def test_a_hang_with_a_frame_of_a_second_bridge_waiting_stops_the_drive_before_t
     assert not lab.bus.of(OWN, left + 0.05), "then the bus is left"
 
 
+@pytest.mark.landing
 def test_an_intruder_that_is_a_master_is_answered_as_often_as_it_starts_the_node(make_lab) -> None:
     lab = make_lab()
     lab.run_drive()

@@ -128,6 +128,7 @@ def test_boot_up_start_setpoint_fault_acknowledge_stop(make_lab) -> None:
     lab.wait_for(SWITCHED_ON, 0)
 
 
+@pytest.mark.landing
 def test_a_dead_bridge_stops_the_drive_where_its_heartbeat_is_watched(make_lab) -> None:
     lab = make_lab(_SUPERVISED)
     lab.run_drive()
@@ -142,6 +143,7 @@ def test_a_dead_bridge_stops_the_drive_where_its_heartbeat_is_watched(make_lab) 
     assert any(frame.data[:2] == b"\x00\xf0" for frame in lab.bus.of(EMCY, killed))
 
 
+@pytest.mark.landing
 def test_a_dead_bridge_lets_the_drive_run_where_nothing_is_configured(make_lab) -> None:
     lab = make_lab()
     lab.run_drive()
@@ -153,6 +155,7 @@ def test_a_dead_bridge_lets_the_drive_run_where_nothing_is_configured(make_lab) 
     assert lab.bus.of(TPDO1)[-1].word >> 8 & 0x0F == ENABLED
 
 
+@pytest.mark.landing
 def test_a_bridge_that_cannot_boot_it_again_stops_the_drive(make_lab, tmp_path: Path) -> None:
     """Killed and started anew, with a site file that expects another maker and does not know where the
     drive listens: 1400h:01 is no factory's identifier."""

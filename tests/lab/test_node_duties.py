@@ -99,6 +99,7 @@ def test_a_stopped_node_gets_stopped_words_and_is_woken(lab: Lab) -> None:
     assert first(commands, START) > woken
 
 
+@pytest.mark.landing
 def test_its_configuration_is_written_where_it_differs_and_stored_once(lab: Lab) -> None:
     asked = lab.asked()
     assert [asked.count(request) for request in (WRITE_1015, WRITE_P151, SAVE)] == [1, 1, 1]
@@ -132,6 +133,7 @@ def test_synchronous_pdos_come_with_sync_and_within_the_window(lab: Lab) -> None
     assert now > before + 5
 
 
+@pytest.mark.landing
 def test_an_emergency_is_told_of_its_drive_in_the_words_of_its_family(lab: Lab) -> None:
     """BU 2500 §8.3: code 2310h, byte 3 the drive, 1 for FU2. Its text is that of the fault for as long as the
     drive says that it is in fault."""
@@ -154,6 +156,7 @@ def test_an_emergency_is_told_of_its_drive_in_the_words_of_its_family(lab: Lab) 
         assert text in asking.output()
 
 
+@pytest.mark.landing
 def test_a_bridge_that_starts_anew_writes_nothing_that_is_there_already(lab: Lab) -> None:
     """The last one: it ends the bridge of the others."""
     lab.bridge.stop()

@@ -108,6 +108,7 @@ def test_a_stop_is_read_back_once(opened: Open) -> None:
     assert "ignores its stop" not in block.bridge.output()
 
 
+@pytest.mark.landing
 def test_a_valve_that_sticks_is_named_and_its_node_stopped(opened: Open) -> None:
     block = opened("deaf")
     since = time.time()
@@ -119,6 +120,7 @@ def test_a_valve_that_sticks_is_named_and_its_node_stopped(opened: Open) -> None
     assert BOUND_S <= took_s <= BOUND_S + NOISE_S
 
 
+@pytest.mark.landing
 def test_a_node_that_does_not_let_them_be_read_is_not_accused_and_named_at_the_end(opened: Open) -> None:
     block = opened("secret")
     since = time.time()

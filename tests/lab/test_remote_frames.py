@@ -21,6 +21,7 @@ GOOD, STALE = 1, 2
 READY, RUNNING = 0x0B31, 0x0B37
 
 
+@pytest.mark.landing
 def test_a_tpdo_of_type_253_is_asked_for_and_read_and_stale_where_no_answer_comes(tmp_path: Path) -> None:
     site = lab_site(
         tmp_path, timeout_ms=2000, controls=("modbus",), node='supervision = "none"\nhold_ms = 60000'

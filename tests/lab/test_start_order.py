@@ -7,6 +7,8 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
+import pytest
+
 from tests.lab.sites import lab_site
 from tests.support import sites
 from tests.support.process import drivebridge, until
@@ -18,6 +20,7 @@ STOPS = (b"\x02\x00", b"\x02\x05")
 """NMT stop for all, or for the one that is there."""
 
 
+@pytest.mark.landing
 def test_the_mandatory_node_comes_first_and_its_loss_stops_all(tmp_path: Path) -> None:
     pump = sites.node(
         sites.drive("fu1", "none", 0),

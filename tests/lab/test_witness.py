@@ -101,6 +101,7 @@ def test_the_stop_after_a_silent_controller_is_recorded_with_its_time(
     assert not alarms, alarms
 
 
+@pytest.mark.landing
 def test_a_killed_bridge_and_a_drive_that_trips_by_itself_are_recorded(
     tmp_path: Path, stack: ExitStack
 ) -> None:
@@ -113,6 +114,7 @@ def test_a_killed_bridge_and_a_drive_that_trips_by_itself_are_recorded(
     assert isinstance(stop["drive_ms"], int) and stop["drive_ms"] >= 400
 
 
+@pytest.mark.landing
 def test_who_breaks_the_promise_is_told_and_the_command_runs(tmp_path: Path, stack: ExitStack) -> None:
     """Frames of a drive that runs on without its bridge, and a witness that has nothing but the bus."""
     watched = Watched(tmp_path, stack, "--frames-only")
@@ -127,6 +129,7 @@ def test_who_breaks_the_promise_is_told_and_the_command_runs(tmp_path: Path, sta
     assert watched.end() == 1
 
 
+@pytest.mark.landing
 def test_a_bridge_that_never_answers_is_told_and_the_command_runs(tmp_path: Path, stack: ExitStack) -> None:
     watched = Watched(tmp_path, stack)
     alarm = watched.recorded(lambda line: line.get("alarm") == "blind", "blindness is recorded")
@@ -138,6 +141,7 @@ def test_a_bridge_that_never_answers_is_told_and_the_command_runs(tmp_path: Path
     assert watched.end() == 1
 
 
+@pytest.mark.landing
 def test_a_second_sender_is_told(tmp_path: Path, stack: ExitStack) -> None:
     watched = Watched(tmp_path, stack, "--frames-only")
     with sniffing() as bus:  # a process for each frame would be too slow for two senders
@@ -168,6 +172,7 @@ def with_outputs(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.landing
 def test_outputs_that_a_silent_controller_leaves_active_are_recorded_when_they_are_safe(
     with_outputs: Path, stack: ExitStack
 ) -> None:
@@ -184,6 +189,7 @@ def test_outputs_that_a_silent_controller_leaves_active_are_recorded_when_they_a
     assert not alarms, alarms
 
 
+@pytest.mark.landing
 def test_a_killed_bridge_and_a_node_that_makes_its_outputs_safe_are_recorded(
     with_outputs: Path, stack: ExitStack
 ) -> None:
@@ -196,6 +202,7 @@ def test_a_killed_bridge_and_a_node_that_makes_its_outputs_safe_are_recorded(
     assert isinstance(stop["drive_ms"], int) and stop["drive_ms"] >= 300
 
 
+@pytest.mark.landing
 def test_outputs_that_stay_active_without_a_bridge_are_told(with_outputs: Path, stack: ExitStack) -> None:
     watched = Watched(with_outputs, stack, "--frames-only", more=IO)
     send(OUTPUT_RPDO, ACTIVE)
@@ -207,6 +214,7 @@ def test_outputs_that_stay_active_without_a_bridge_are_told(with_outputs: Path, 
     assert watched.end() == 1
 
 
+@pytest.mark.landing
 def test_a_second_sender_of_outputs_is_told(with_outputs: Path, stack: ExitStack) -> None:
     watched = Watched(with_outputs, stack, "--frames-only", more=IO)
     with sniffing() as bus:

@@ -153,6 +153,7 @@ def late_process_data(hall: Hall, number: int) -> None:
     hall.plant.on_time(hall.now + 5)
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(
     ("provoke", "most"),
     [
@@ -266,6 +267,7 @@ _LINES: Final = 30
 """A node that is not asked for a minute is lost, the round was late, and so on; hangs take four minutes."""
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("provoke", ON_THE_BUS)
 def test_a_bus_says_a_line_of_each_kind_and_source(
     tmp_path: Path, log: QuietLog, provoke: Callable[[Line, int], None]

@@ -98,6 +98,7 @@ def test_of_a_file_that_only_an_import_runs_those_are_asked_that_run_its_folder(
     assert not suite.tests_of(Mutant(types, 3, 3, 0, "1", "2"))
 
 
+@pytest.mark.landing
 def test_what_no_test_notices_is_told_and_the_rest_is_not():
     options = ("--jobs", "1", "--tests", "tests/unit/command/messages/test_event.py")
     files = ("bridge/command/messages/event.py", "bridge/canopen/abort.py")

@@ -1,4 +1,4 @@
-"""Long trials: left out by day, they run by night, with all that runs by day."""
+"""Long trials: left out by day, they run where a change lands or by night, with all that runs by day."""
 
 from __future__ import annotations
 
@@ -26,11 +26,20 @@ def test_always():
 def test_long():
     pass
 
-@pytest.mark.parametrize("seed", by_night_of(range(3), 1))
+@pytest.mark.landing
+def test_rather_long():
+    pass
+
+@pytest.mark.landing(2)
+@pytest.mark.parametrize("place", range(5))
+def test_each_second(place):
+    pass
+
+@pytest.mark.parametrize("seed", by_night_of(range(3), 2))
 def test_seeds(seed):
     pass
 
-@pytest.mark.parametrize(("one", "other"), by_night(((a, b) for a in range(3) for b in range(3)), 1))
+@pytest.mark.parametrize(("one", "other"), by_night((a, b) for a in range(3) for b in range(3)))
 def test_rows(one, other):
     pass
 
@@ -39,8 +48,8 @@ def test_examples():
 """
 
 
-def ran(folder: Path, night: str, expected: int) -> set[str]:
-    """The tests that passed of a run by day or by night; none may fail."""
+def ran(folder: Path, expected: int, **extent: str) -> set[str]:
+    """The tests that passed of a run with these variables; none may fail."""
     (folder / "test_it.py").write_text(TESTS.replace("EXAMPLES", str(expected)), encoding="utf-8")
     options = ("-v", "-p", "tests.support.nightly", "-p", "no:cacheprovider", "--strict-markers")
     command = [
@@ -56,7 +65,7 @@ def ran(folder: Path, night: str, expected: int) -> set[str]:
     done = subprocess.run(
         command,
         cwd=REPOSITORY,
-        env={"PYTHONPATH": str(REPOSITORY), "NIGHTLY": night},
+        env={"PYTHONPATH": str(REPOSITORY), **extent},
         capture_output=True,
         text=True,
         check=False,
@@ -66,17 +75,40 @@ def ran(folder: Path, night: str, expected: int) -> set[str]:
 
 
 def test_by_night_all_is_tried_and_by_day_a_part_of_it(tmp_path: Path) -> None:
-    day, night = ran(tmp_path, "0", 7), ran(tmp_path, "1", 100)
+    day, night = ran(tmp_path, 7), ran(tmp_path, 100, NIGHTLY="1", LANDING="rest")
     rows = {f"test_rows[{one}-{other}]" for one in range(3) for other in range(3)}
+    places = {f"test_each_second[{place}]" for place in range(5)}
     seeds = {f"test_seeds[{seed}]" for seed in range(3)}
-    assert night == {"test_always", "test_long", "test_examples"} | rows | seeds
-    assert day - rows == {"test_always", "test_examples", "test_seeds[0]"}
+    assert night == {"test_always", "test_long", "test_rather_long", "test_examples"} | rows | places | seeds
+    assert day - rows == {
+        *("test_always", "test_examples", "test_seeds[0]"),
+        *(f"test_each_second[{place}]" for place in (0, 2, 4)),
+    }
     assert day & rows < rows
+
+
+def test_what_has_to_pass_before_a_change_lands_is_what_day_takes_and_leaves_out(tmp_path: Path) -> None:
+    day, rest = ran(tmp_path, 7, LANDING="0"), ran(tmp_path, 7, LANDING="rest")
+    assert ran(tmp_path, 7, LANDING="1") == day | rest
+    assert not day & rest
+    assert {"test_rather_long", "test_seeds[1]", "test_each_second[1]", "test_each_second[3]"} < rest
+    assert not rest & {"test_long", "test_seeds[2]"}
 
 
 def test_no_test_of_this_run_is_one_that_should_not_be_in_it(request: pytest.FixtureRequest) -> None:
     marked = [item.nodeid for item in request.session.items if item.get_closest_marker("nightly")]
     assert IS_NIGHTLY or not marked
+
+
+def test_what_runs_before_a_change_lands_is_make_test_and_what_that_leaves_out() -> None:
+    runs = (REPOSITORY / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    assert [line for line in runs if line.startswith("make")] == ["make check", "make test", "make landing"]
+    assert re.search(r"^landing: export LANDING := rest$", MAKEFILE, re.MULTILINE)
+    mark = re.compile(r"pytest\.mark\.landing|\bby_night")
+    tests = REPOSITORY / "tests"
+    files = [path for path in tests.rglob("test_*.py") if mark.search(path.read_text(encoding="utf-8"))]
+    marked = {path.relative_to(tests).parts[0] for path in files}
+    assert marked == lanes("landing")
 
 
 def test_nothing_is_left_out_by_night() -> None:
@@ -112,12 +144,12 @@ def test_each_value_of_a_column_is_there_by_day() -> None:
     assert len(by_day) < len(rows) / 2
     for column in range(3):
         told = [row[column] for row in by_day]
-        assert all(told.count(row[column]) >= 2 for row in rows)
+        assert {*told} == {row[column] for row in rows}
 
 
 def test_who_is_there_once_is_there_by_day() -> None:
     assert by_night([("a", 1), ("b", 2)]) == [("a", 1), ("b", 2)]
-    assert by_night_of("ab", 2) == ["a", "b"]
+    assert by_night_of("a", 2) == ["a"]
 
 
 def test_by_day_there_are_fewer_examples_and_never_more(monkeypatch: pytest.MonkeyPatch) -> None:

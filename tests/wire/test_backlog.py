@@ -102,6 +102,7 @@ async def enabled_after_it_hung(plant: Plant, peer: str, *arguments: object) -> 
         await process.wait()
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("connections", "seconds"), [(1, 0.0005), (1, 1.0), (8, 1.0)])
 async def test_a_backlog_of_modbus_does_not_keep_a_drive_moving(connections: int, seconds: float) -> None:
     plant = plant_for("modbus")
@@ -136,6 +137,7 @@ class BusyView(LocalView):
             super().submit(request, reply)
 
 
+@pytest.mark.landing
 async def test_a_backlog_of_opcua_does_not_keep_a_drive_moving(tmp_path: Path) -> None:
     view = BusyView(plant_for("opcua"))
     server = OpcUaServer(view, OPEN, tmp_path, "hall")
@@ -148,6 +150,7 @@ async def test_a_backlog_of_opcua_does_not_keep_a_drive_moving(tmp_path: Path) -
     assert after < TIMEOUT_S + MARGIN_S
 
 
+@pytest.mark.landing(2)
 async def test_a_backlog_of_zenoh_does_not_keep_a_drive_moving(monkeypatch: pytest.MonkeyPatch) -> None:
     """In a bus process that is busy with other things."""
     plant = plant_for("zenoh")

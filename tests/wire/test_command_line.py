@@ -132,6 +132,7 @@ def test_a_site_file_that_is_not_there(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.landing
 def test_a_bus_that_is_missing_is_exit_3(tmp_path: Path) -> None:
     done = call("run", str(write_site(tmp_path, interface="socketcan")))
     assert done.returncode == 3
@@ -139,6 +140,7 @@ def test_a_bus_that_is_missing_is_exit_3(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.landing
 def test_all_buses_that_are_missing_are_named_at_once(tmp_path: Path) -> None:
     drive = sites.drive("fu1", "none", 0)
     buses = [
@@ -187,6 +189,7 @@ def test_run_serves_until_it_is_told_to_stop(tmp_path: Path) -> None:
         assert lines[-2].endswith("INFO    all drives are stopped")
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize("what", ["modbus", "opcua"])
 def test_exports_are_tables(tmp_path: Path, what: str) -> None:
     path = str(write_site(tmp_path))
@@ -203,6 +206,7 @@ def test_what_is_not_served_is_not_exported(tmp_path: Path) -> None:
     assert "[zenoh]" in done.stderr
 
 
+@pytest.mark.landing
 def test_of_several_buses_one_is_exported_as_dbc(tmp_path: Path) -> None:
     buses = [
         sites.bus(sites.node(sites.drive("fu1", "none", 0), name=f"n{k}"), name=f"can{k}") for k in (0, 1)

@@ -106,6 +106,7 @@ def points(recording: Recording, *options: str) -> Image:
     return told
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("options", [(), ("--words",)], ids=["values", "words"])
 def test_a_log_says_what_the_bridge_says(recording: Recording, options: tuple[str, ...]) -> None:
     told = points(recording, *options)
@@ -128,6 +129,7 @@ def test_every_word_and_value_of_a_drive_is_in_the_file(recording: Recording) ->
     assert carried <= told.keys()
 
 
+@pytest.mark.landing
 def test_heartbeats_and_emergencies_are_told(recording: Recording) -> None:
     decoded = recording.decoded()
     # SDO is in no DBC file, nor are PDOs that a node sends and the bridge does not use.

@@ -131,11 +131,13 @@ def test_they_are_looked_at_like_any_node(hall: Hall) -> None:
     assert {"digital_inputs_1_to_8", "analogue_input_1"} & {name for one in frames for name in one["values"]}
 
 
+@pytest.mark.landing
 def test_they_are_tried_for_what_cia_301_asks(hall: Hall) -> None:
     facts = json.loads(hall.said("conformance", "SITE", "shaft_25", "--yes", "--json"))
     assert facts["ok"], facts
 
 
+@pytest.mark.landing
 def test_outputs_are_audited_and_the_node_proves_that_it_notices(hall: Hall) -> None:
     own_outputs(hall)
     assert "io_16 would keep its outputs" in hall.said("audit", "SITE", code=1)

@@ -221,6 +221,7 @@ def controllers(
         yield bridge, stack.enter_context(CLIENTS[request.param](bridge))
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("mapping", SIMULATED)
 def test_it_starts_follows_faults_is_acknowledged_and_stops(controllers: Controllers, mapping: str) -> None:
     bridge, make = controllers

@@ -190,6 +190,7 @@ def test_a_hung_front_is_killed_and_comes_back(tmp_path: Path, ports: tuple[int,
         assert bridge.output().count("gave no sign of life for 5 s and was killed") == 1
 
 
+@pytest.mark.landing
 def test_a_front_is_not_killed_for_a_pause_of_the_bus_process(tmp_path: Path, ports: tuple[int, int]) -> None:
     path = start(tmp_path, ports)
     with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:
@@ -267,6 +268,7 @@ def test_a_state_folder_that_cannot_be_written_ends_run_before_the_bus_is_opened
     assert not (tmp_path / "words").read_text()
 
 
+@pytest.mark.landing
 def test_ready_is_who_serves_and_a_front_that_fails_later_is_in_the_status_line(
     tmp_path: Path, ports: tuple[int, int], notices: Notices
 ) -> None:
@@ -293,6 +295,7 @@ def test_ready_is_who_serves_and_a_front_that_fails_later_is_in_the_status_line(
         assert "hung" not in run.output()
 
 
+@pytest.mark.landing
 def test_a_port_is_ours_while_its_front_is_away(tmp_path: Path, ports: tuple[int, int]) -> None:
     path = start(tmp_path, ports)
     with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:

@@ -83,6 +83,7 @@ async def test_a_killed_front_is_back_and_the_drive_never_noticed(
         assert "hung" not in bridge.output()
 
 
+@pytest.mark.landing
 async def test_after_good_nobody_reads_the_value_of_before(tmp_path: Path, ports: tuple[int, int]) -> None:
     node = sites.node(sites.drive("fu1", "lease", 5000))
     path = sites.write(tmp_path, sites.bus(node, more="deadman_ms = 500"), sites.opcua(ports[1]))
@@ -115,6 +116,7 @@ async def test_after_good_nobody_reads_the_value_of_before(tmp_path: Path, ports
             assert await shown("supervision/owner") == ""
 
 
+@pytest.mark.landing
 def test_a_front_does_not_outlive_the_bus_process(tmp_path: Path, ports: tuple[int, int]) -> None:
     path = start(tmp_path, ports)
     with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:
@@ -126,6 +128,7 @@ def test_a_front_does_not_outlive_the_bus_process(tmp_path: Path, ports: tuple[i
         until(lambda: not Path(f"/proc/{front}").exists(), 10.0, "the front ends too")
 
 
+@pytest.mark.landing
 @pytest.mark.timeout(300)  # the tests of the documentation may have the demo
 def test_the_demo_stops_without_leaving_anything_behind(tmp_path: Path) -> None:
     with only_demo(), drivebridge(tmp_path, "demo", "demo", notify=True) as demo:

@@ -319,6 +319,7 @@ def read_by_modbus(shop: Shop, times: int) -> None:
             assert not client.read_input_registers(0, count=8, device_id=1).isError()
 
 
+@pytest.mark.landing
 async def test_no_transfer_is_lost_on_either_side(shop: Shop) -> None:
     over = asyncio.Event()
     sessions = (session, canopen_session)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 from pathlib import Path
 
+import pytest
+
 from tests.support.load import TIMEOUT_S, loaded
 from tests.support.process import peer
 
@@ -22,6 +24,7 @@ async def test_5000_pdos_a_second_lose_nothing(tmp_path: Path) -> None:
         assert load.service.plant.image.read("bus/can0/frames_lost").value == 0
 
 
+@pytest.mark.landing
 async def test_ten_thousand_monitored_items_delay_neither_sync_nor_watchdog(tmp_path: Path) -> None:
     async with loaded(tmp_path) as load:
         with peer(tmp_path, "opcua_flood", load.opcua_url, "10000") as client:

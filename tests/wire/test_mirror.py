@@ -366,6 +366,7 @@ async def test_a_second_publisher_is_told_that_the_site_is_run_already(endpoint:
         await second.close()
 
 
+@pytest.mark.landing
 async def test_a_killed_bus_process_leaves_every_point_dead_until_it_is_back(endpoint: str) -> None:
     async with bus_process(endpoint) as first, front(endpoint) as client:
         frequency = "conveyor/fu1/actual/frequency"
@@ -400,6 +401,7 @@ async def test_a_hung_bus_process_counts_as_gone_after_a_second(endpoint: str) -
         await until(lambda: client.image.read(frequency).quality is Quality.GOOD, "good again", 5)
 
 
+@pytest.mark.landing
 async def test_what_is_asked_of_a_bus_process_that_stands_still_is_answered_when_it_goes_on(
     endpoint: str,
 ) -> None:
@@ -471,6 +473,7 @@ async def test_a_front_that_is_never_answered_connects_anew(
     await publisher.close()
 
 
+@pytest.mark.landing
 async def test_another_site_ends_the_front(endpoint: str) -> None:
     async with bus_process(endpoint):
         client = MirrorClient(endpoint)

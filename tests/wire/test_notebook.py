@@ -26,6 +26,7 @@ def stored(cell: dict[str, Any]) -> dict[str, str | None]:
     return told
 
 
+@pytest.mark.landing
 def test_the_notebook_runs_and_says_what_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (site,) = [block for block in page("how-to/compare-drives-in-a-notebook.md").blocks if block.file_name]
     (tmp_path / "hall.toml").write_text(site.text, encoding="utf-8")

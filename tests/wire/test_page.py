@@ -469,6 +469,7 @@ def test_the_system_is_for_everybody_and_its_files_for_engineers(browser: Browse
     tab.socket.close()
 
 
+@pytest.mark.landing
 def test_a_bus_process_that_hangs_is_told_alone(tmp_path: Path) -> None:
     port = free_port()
     with drivebridge(tmp_path, "run", "run", str(write_site(tmp_path, port)), notify=True) as process:
@@ -492,6 +493,7 @@ def test_a_bus_process_that_hangs_is_told_alone(tmp_path: Path) -> None:
         tab.socket.close()
 
 
+@pytest.mark.landing
 def test_by_tls_the_cookie_is_bound_to_it(tmp_path: Path) -> None:
     key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
     made = [

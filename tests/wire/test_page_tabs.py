@@ -46,6 +46,7 @@ def given_back(served: Served) -> bool:
     return "release_control" in [str(one.action) for one in served.view.requests]
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("how", ["logout", "expiry"])
 async def test_a_client_that_takes_nothing_holds_up_no_other_tab(served: Served, how: str) -> None:
     cookie, token = await served.login("operator")
@@ -152,6 +153,7 @@ async def test_four_logins_of_an_observer_leave_room_for_the_engineer(served: Se
         await message(tab, "you")
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("says", [b"", b"GET / HTTP/1.1\r\n", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"])
 async def test_idle_connections_keep_nobody_out(served: Served, says: bytes) -> None:
     """Those that say nothing, half a head, or nothing more; the log has one line."""

@@ -217,6 +217,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
         yield Rig(PosiconSite(tmp_path_factory.mktemp("posicon")), stack)
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize("slot", DRIVES.values())
 def test_steps_5_and_6_the_words_and_p151(rig: Rig, slot: str) -> None:
     assert [rig.parameter(slot, f"P543[{n}]") for n in (1, 2, 3)] == [1, 10, 15]
@@ -224,6 +225,7 @@ def test_steps_5_and_6_the_words_and_p151(rig: Rig, slot: str) -> None:
     assert rig.parameter("fu1", "P151") == 200
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("protocol", DRIVES)
 def test_steps_8_and_9_what_the_parameters_show(rig: Rig, protocol: str) -> None:
     axis, slot = rig.axes[protocol], DRIVES[protocol]
@@ -239,6 +241,7 @@ def test_steps_8_and_9_what_the_parameters_show(rig: Rig, protocol: str) -> None
     assert rig.parameter("fu1", f"P177[{2 + 4 * place}]") == READY_TOLD
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("protocol", DRIVES)
 def test_an_axis_goes_where_it_is_told(rig: Rig, protocol: str) -> None:
     """37h is *enabled*, and bit 8 says that the position is reached. The others stay where they are."""
@@ -255,6 +258,7 @@ def test_an_axis_goes_where_it_is_told(rig: Rig, protocol: str) -> None:
     assert [other.position() for other in others] == were
 
 
+@pytest.mark.landing
 def test_all_three_at_once_each_to_its_own(rig: Rig) -> None:
     """§5.4: independently of each other."""
     goals = {"modbus": 5.0, "opcua": -7.5, "zenoh": 2.125}

@@ -39,6 +39,7 @@ def many_nodes(folder: Path, port: int) -> Path:
     return sites.write(folder, sites.bus(*nodes), zenoh, name="demo")
 
 
+@pytest.mark.landing
 def test_the_service_ends_though_its_zenoh_clients_hang(tmp_path: Path) -> None:
     port = free_port()
     with drivebridge(tmp_path, "run", "run", str(many_nodes(tmp_path, port)), notify=True) as bridge:
@@ -52,6 +53,7 @@ def test_the_service_ends_though_its_zenoh_clients_hang(tmp_path: Path) -> None:
         assert is_quiet(bridge.output()), bridge.output()
 
 
+@pytest.mark.landing(9)
 @pytest.mark.parametrize("after_s", [0.0, 0.1, 0.4])
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command[0])
 def test_ctrl_c_while_a_command_starts_prints_no_traceback(

@@ -124,6 +124,7 @@ def test_each_task_is_tried(tmp_path: Path) -> None:
     asyncio.run(look())
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("name", sorted(TASKS - PARTS))
 async def test_drives_stop_first_when_a_task_fails(tmp_path: Path, name: str) -> None:
     async with moving(tmp_path) as move:
@@ -132,6 +133,7 @@ async def test_drives_stop_first_when_a_task_fails(tmp_path: Path, name: str) ->
         assert move.ends() == ["stopped", "front ends"]
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("name", sorted(TASKS))
 async def test_drives_stop_first_when_a_task_is_lost(tmp_path: Path, name: str) -> None:
     async with moving(tmp_path) as move:
@@ -144,6 +146,7 @@ async def test_drives_stop_first_when_a_task_is_lost(tmp_path: Path, name: str) 
             assert move.ends() == ["stopped", "front ends"]
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("name", sorted(PARTS))
 async def test_no_drive_stops_when_a_part_fails(tmp_path: Path, name: str) -> None:
     async with moving(tmp_path) as move:

@@ -7,6 +7,7 @@ import threading
 import time
 from pathlib import Path
 
+import pytest
 import zenoh
 
 from bridge.sim.controller import Controller, Move, Times
@@ -27,6 +28,7 @@ def session_to(port: int) -> zenoh.Session:
     return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
 
 
+@pytest.mark.landing
 def test_the_demos_controller_never_trips_its_own_watchdog(tmp_path: Path) -> None:
     port = free_port()
     bus = sites.bus(sites.node(sites.drive("fu4", "lease", TIMEOUT_MS), more="sdo_channels = [4]"))
@@ -80,6 +82,7 @@ def test_the_demos_controller_asks_nothing_of_a_node_that_is_not_operational(tmp
         assert all("on its way" in line for line in refused), refused
 
 
+@pytest.mark.landing
 def test_the_demos_controller_leaves_a_drive_to_who_has_stopped_it(tmp_path: Path) -> None:
     port = free_port()
     bus = sites.bus(sites.node(sites.drive("fu4", "lease", TIMEOUT_MS), more="sdo_channels = [4]"))

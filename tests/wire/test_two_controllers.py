@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import pytest
 from asyncua import Client, ua
 from pymodbus.client import AsyncModbusTcpClient
 
@@ -172,6 +173,7 @@ async def _connected(url: str) -> Client:
     raise AssertionError("the OPC UA front does not serve")
 
 
+@pytest.mark.landing
 async def test_a_drive_never_sees_a_mix(tmp_path: Path) -> None:
     async with arena(tmp_path) as a:
         assert (await a.modbus.write_register(999, 1, device_id=1)).isError()

@@ -45,6 +45,7 @@ def call(installed: Path, *command: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.landing
 def test_the_families_come_along(installed: Path) -> None:
     code = "import bridge; from bridge.mapping import family_names; print(bridge.__file__, *family_names())"
     done = call(installed, "-c", code)

@@ -99,6 +99,7 @@ async def test_who_does_not_own_the_drive_is_refused() -> None:
         assert abs(event["t"] - time.time()) < 20
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(
     ("key", "payload", "code"),
     [

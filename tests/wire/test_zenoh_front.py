@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+import pytest
 from pymodbus.client import AsyncModbusTcpClient
 
 from tests.support import sites
@@ -116,6 +117,7 @@ async def attack(plant: Plant, *what: str) -> None:
             await attacking.wait()
 
 
+@pytest.mark.landing
 async def test_a_key_of_8000_words_stops_no_drive_whatever_is_done_with_it(tmp_path: Path) -> None:
     doings = ("token", "queryable", "subscriber", "alias", "publisher", "get", "put")
     async with plant(tmp_path) as it:
@@ -125,6 +127,7 @@ async def test_a_key_of_8000_words_stops_no_drive_whatever_is_done_with_it(tmp_p
         assert it.ends_of_the_front() == [], "not even the front ends"
 
 
+@pytest.mark.landing
 async def test_names_without_end_end_the_front_and_no_drive(tmp_path: Path) -> None:
     """zenoh keeps each key for ever, and takes two megabytes for one of 2,000 words."""
     async with plant(tmp_path, "front_memory_mb = 200") as it:

@@ -51,6 +51,7 @@ async def lies(liar: Peer) -> None:
         await liar.do("token", key)
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("mode", ["client", "peer"])
 @pytest.mark.parametrize("login", [(), ("plc", "geheim")], ids=["open", "users"])
 async def test_nobody_else_publishes_or_holds_tokens(
@@ -70,6 +71,7 @@ async def test_nobody_else_publishes_or_holds_tokens(
         assert set(r.peer.tokens) <= {(f"{TOP}/@/bridge", True), (f"{TOP}/@/conveyor", True)}
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("target", [None, "all"])
 @pytest.mark.parametrize("mode", ["client", "peer"])
 @pytest.mark.parametrize("login", [(), ("plc", "geheim")], ids=["open", "users"])

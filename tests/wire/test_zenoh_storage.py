@@ -27,6 +27,7 @@ async def behind(where: str) -> AsyncIterator[Rig]:
             yield r
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("complete", ["no", "yes"])
 @pytest.mark.parametrize("where", ["bridge", "router"])
 async def test_a_command_is_answered_by_the_bridge_and_not_with_what_is_stored(

@@ -48,6 +48,7 @@ def scan(monkeypatch: pytest.MonkeyPatch, bus: CountingBus, *more: str) -> Resul
     return CliRunner().invoke(make_app("scan"), ["scan", *BUS, "--timeout-ms", "10", *more])
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("takes", [1, 40, 10_000])
 def test_how_many_requests_went_out_is_said(monkeypatch: pytest.MonkeyPatch, takes: int) -> None:
     done = scan(monkeypatch, CountingBus(takes, (HEARTBEAT,)), "--json")

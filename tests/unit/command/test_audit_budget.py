@@ -128,6 +128,7 @@ def new_names(hall: Hall, number: int) -> None:
     hall.plant.submit(Request(who, FU1, Do(Action.RELEASE_CONTROL)), hall.now, lambda outcome: None)
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(
     ("act", "requests"), [(write_and_release, 2), (write_on_and_release, 4), (take_turns, 1), (new_names, 2)]
 )

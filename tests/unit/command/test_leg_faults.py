@@ -131,6 +131,7 @@ CELLS: Final[dict[str, tuple[str, Stage, Stimulus, Cell]]] = {
 }
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("profile", PROFILES)
 def test_without_a_fault_nothing_is_found(profile: str) -> None:
     space(**PROFILES[profile]).explore(MOST)

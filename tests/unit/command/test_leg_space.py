@@ -56,7 +56,8 @@ _EVERY_CELL: Final = {
 """A quarter of what happens at night, with every cell."""
 
 
-def test_every_cell_that_can_by_day() -> None:
+@pytest.mark.landing
+def test_every_cell_that_can_where_a_change_lands() -> None:
     reached = {cell for row, profiles in _EVERY_CELL.items() for cell in explored(row, profiles).cells}
     assert not reached & NEVER.keys()
     assert not TABLE.keys() - NEVER.keys() - reached, "name a profile that reaches them: _EVERY_CELL"

@@ -15,6 +15,7 @@ BLOCKS = [(0, 0), (0, "hold"), ("hold", "hold"), (5, "hold")]
 """What two outputs of a block get when nobody commands them."""
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("on_expiry", BLOCKS)
 def test_whatever_happens_to_outputs(on_expiry: Any) -> None:
     space = OutputSpace(on_expiry)

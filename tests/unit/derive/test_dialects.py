@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from bridge.eds.model import Report
 from bridge.eds.text import decode
 from bridge.mapping.loader import mappings_dir
@@ -32,6 +34,7 @@ FILES = {
 }
 
 
+@pytest.mark.landing
 def test_every_dialect_is_understood(tmp_path: Path) -> None:
     results: list[Result] = []
     for seed, (name, content) in enumerate(FILES.items()):

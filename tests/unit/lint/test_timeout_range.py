@@ -70,6 +70,7 @@ def test_a_range_that_cannot_be_meant_so(
         assert any(message in one for one in found)
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("mapping", FAMILIES)
 def test_the_longest_time_is_published_beside_the_sites(tmp_path: Path, mapping: str) -> None:
     def case(more: str, timeout_ms: int = SITE_MS):

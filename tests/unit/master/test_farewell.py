@@ -210,6 +210,7 @@ def test_a_deaf_drive_stops_by_the_command_or_is_named(
     assert len(worst(bench)) <= 1
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("kind", TYPES)
 @pytest.mark.parametrize("mapping", FAMILIES)
 def test_who_says_in_time_that_it_follows_is_not_named(tmp_path: Path, mapping: str, kind: int) -> None:

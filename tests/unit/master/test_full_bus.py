@@ -85,6 +85,7 @@ def test_a_stop_waits_for_one_frame_and_for_no_more(bench: BusyBench) -> None:
     assert first.time - stopped < 5 * FRAME_S + 0.002
 
 
+@pytest.mark.landing(2)
 def test_where_nothing_gets_through_the_node_is_told_lost_and_is_not_forgotten(bench: BusyBench) -> None:
     keep_running(bench, 1.0)
     assert bench.plant.drives["conveyor/fu1"].quality.label == "good"

@@ -179,6 +179,7 @@ OFF = [
 ]
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("drive", [SILENCE, THEN_SILENCE])
 @pytest.mark.parametrize(("mapping", "slot", "parameter", "value", "held"), OFF)
 def test_the_watch_is_not_switched_off_while_silence_is_to_stop_the_drive(

@@ -81,6 +81,7 @@ def test_a_value_that_is_not_kept_is_written_once_in_an_hour(tmp_path: Path) -> 
     assert quick.core(1).state is NodeState.CONFIG_ERROR
 
 
+@pytest.mark.landing
 def test_a_node_that_cannot_be_used_is_asked_every_five_minutes_in_the_end(tmp_path: Path) -> None:
     quick = quick_with(tmp_path, Rounding(1, 0x2097, lambda value: min(value, 495)), CONFIGURE)
     quick.run(1800.0)

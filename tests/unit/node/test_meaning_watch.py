@@ -179,6 +179,7 @@ def test_a_setting_that_is_written_through_the_bridge_counts_at_once(tmp_path: P
     assert "P105 of parameter set 1 is 100, it was 50" in bench.events[-1].message
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("answer_s", [0.2, 0.25, 0.4])
 def test_a_change_is_found_within_10_s_where_answers_are_slow(tmp_path: Path, answer_s: float) -> None:
     """Codes and scales of the set in use are asked before everything that is polled."""

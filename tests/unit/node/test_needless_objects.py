@@ -63,6 +63,7 @@ def asked(folder: Path) -> list[tuple[int, int]]:
     return list(dict.fromkeys((int.from_bytes(data[1:3], "little"), data[3]) for data in reads))
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("fault", [silent, misread])
 def test_what_no_rule_needs_keeps_no_node_out(tmp_path: Path, fault: Fault) -> None:
     objects = asked(tmp_path / "whole")

@@ -112,6 +112,7 @@ def test_it_goes_to_the_position_that_is_written(bench: Bench) -> None:
     assert position(bench) == pytest.approx(-4.321)
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("action", [Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE])
 def test_after_a_stop_it_stays_until_a_position_is_written(bench: Bench, action: Action) -> None:
     enable(bench)
@@ -220,6 +221,7 @@ def test_with_position_control_off_no_target_is_reached_and_none_is_taken(tmp_pa
     assert bench.node.drives[0].position_increments == 7_250.0
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("number", "raw", "element"), [(600, 0, 1), (SETPOINT, 4, 2), (SETPOINT, 23, 1)])
 def test_what_is_changed_on_the_way_leaves_no_target_reached(
     bench: Bench, number: int, raw: int, element: int

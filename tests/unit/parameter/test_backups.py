@@ -396,6 +396,7 @@ def test_a_scan_finds_what_the_mapping_file_does_not_list_under_the_makers_names
     assert all(names.resolve(name).name == name for name in (*found.objects, *found.unreadable))
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("answers", [0, 1, 350, 400, 500, 520, 540])
 def test_a_scan_that_broke_off_goes_on_where_it_was(answers: int) -> None:
     found, access = backups.Backup(), _access()

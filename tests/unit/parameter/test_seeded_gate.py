@@ -21,6 +21,7 @@ def test_a_fault_has_one_place_in_the_program_and_compiles(fault: Seeded) -> Non
     compile(fault.source(), fault.edit.file, "exec")
 
 
+@pytest.mark.landing
 def test_every_fault_is_found_by_the_tests_that_are_named_for_it() -> None:
     command = [sys.executable, "-m", "tests.support.seeded", str(TABLE)]
     done = subprocess.run(

@@ -26,6 +26,7 @@ def test_a_mutant_has_one_place_in_the_program_and_compiles(mutant: Mutant) -> N
     assert mutant.first in {fault.name for fault in FAULTS}
 
 
+@pytest.mark.landing
 def test_no_mutant_uses_a_name_that_is_not_there() -> None:
     """It would not even start, and nothing be proven by that."""
     texts = [(mutant.name, file, text) for mutant in MUTANTS for file, text in files_of(mutant).items()]

@@ -25,6 +25,7 @@ def test_each_fault_is_another() -> None:
     assert len({fault.name for fault in FAULTS}) == len({fault.edit for fault in FAULTS}) == len(FAULTS)
 
 
+@pytest.mark.landing
 @pytest.mark.timeout(1600)
 def test_every_fault_is_found_by_the_tests_that_are_named_for_it() -> None:
     command = [sys.executable, "-m", "tests.support.seeded", str(TABLE)]

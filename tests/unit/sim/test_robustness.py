@@ -287,6 +287,7 @@ KINDS: Final[Mapping[str, Kind]] = {
 }
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("name", KINDS)
 @settings(max_examples=EXAMPLES, deadline=None)
 @given(data=st.data())
@@ -356,6 +357,7 @@ LONG_RUNS: Final = {
 }
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize("name", LONG_RUNS)
 def test_a_node_that_runs_for_long_needs_no_more_memory(name: str) -> None:
     run = LONG_RUNS[name]

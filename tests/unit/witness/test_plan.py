@@ -38,6 +38,7 @@ _FULL_PERCENT = 75
 FAMILIES = [(mapping, slot.name) for mapping in family_names() for slot in load_family(mapping).slot]
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("mapping", "slot"), FAMILIES)
 def test_both_say_the_same_of_every_word(tmp_path: Path, mapping: str, slot: str) -> None:
     family = load_family(mapping)
@@ -78,6 +79,7 @@ def test_only_the_pdo_with_the_word_is_looked_for(
     assert drive.tpdo == (0x2C5 if says.number == number else says.cob_id + 5)
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize(("mapping", "slot"), LIGHT_TO_HEAVY)
 @pytest.mark.parametrize("rate", [50_000, 125_000, 250_000, 1_000_000])
 @pytest.mark.parametrize("nodes", [1, 3, 9])

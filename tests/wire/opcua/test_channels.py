@@ -35,6 +35,7 @@ class Deprecated(SecurityPolicyNone):
     URI = "http://opcfoundation.org/UA/SecurityPolicy#Basic128Rsa15"
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(
     ("policy", "mode", "code", "what"),
     [

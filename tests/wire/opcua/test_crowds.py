@@ -54,6 +54,7 @@ async def reads(server: OpcUaServer) -> float:
     return time.monotonic() - began
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize("says", [b"", HELLO], ids=["nothing", "hello"])
 async def test_idle_sockets_keep_nobody_out(tmp_path: Path, says: bytes) -> None:
     async with serving(OPEN, tmp_path) as (server, _):
@@ -66,6 +67,7 @@ async def test_idle_sockets_keep_nobody_out(tmp_path: Path, says: bytes) -> None
     assert "made room" in told[0]
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize(("says", "stage"), [(b"", Stage.CONNECTED), (HELLO, Stage.GREETED)])
 async def test_who_comes_no_further_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, says: bytes, stage: Stage
@@ -120,6 +122,7 @@ async def test_one_address_has_its_share_of_sessions(tmp_path: Path, monkeypatch
             await client.disconnect()
 
 
+@pytest.mark.landing
 async def test_wrong_passwords_hold_up_no_right_one(tmp_path: Path) -> None:
     line = hash_password("swordfish")
     user = UserTable(name="anna", role="operator", password_hash=line)
@@ -165,6 +168,7 @@ class TestSubscriptions:
                 with pytest.raises(ua.uaerrors.BadTooManySubscriptions):
                     await second.create_subscription(1000, None)
 
+    @pytest.mark.landing
     async def test_what_a_client_left_behind_makes_room(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

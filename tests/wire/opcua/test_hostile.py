@@ -136,6 +136,7 @@ def doubles_in(answer: Any) -> Iterator[float]:
             yield from doubles_in(getattr(answer, field.name))
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize("kind", WITH_DOUBLES, ids=lambda kind: kind.__name__)
 @pytest.mark.parametrize("hostile", DOUBLES)
 async def test_every_double_of_every_service(

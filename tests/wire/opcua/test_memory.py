@@ -78,6 +78,7 @@ async def test_a_message_without_end_before_a_session_ends_soon(tmp_path: Path) 
         await other.nodes.server_state.read_value()
 
 
+@pytest.mark.landing
 async def test_messages_that_wait_before_a_session_are_few(tmp_path: Path) -> None:
     """All at once: nobody looks at them in between."""
     async with serving(OPEN, tmp_path) as (server, view), channel(server) as client:
@@ -89,6 +90,7 @@ async def test_messages_that_wait_before_a_session_are_few(tmp_path: Path) -> No
         assert ended(view) == before + 1, "one connection, whatever is left of its messages"
 
 
+@pytest.mark.landing
 async def test_with_a_session_a_large_message_may_come(tmp_path: Path) -> None:
     async with serving(OPEN, tmp_path) as (server, _), connected(server) as client:
         request = ua.ReadRequest()
@@ -97,6 +99,7 @@ async def test_with_a_session_a_large_message_may_come(tmp_path: Path) -> None:
             await client.uaclient.protocol.send_request(request)
 
 
+@pytest.mark.landing
 async def test_all_together_hold_a_fixed_sum(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(admission, "MOST_HELD", 1_000_000)
     monkeypatch.setattr(listener, "_UNWEIGHED", 100_000)

@@ -71,6 +71,7 @@ def settings_for(*, encrypted: bool) -> OpcUaTable:
     )
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("encrypted", [False, True])
 async def test_node_opcua_browses_reads_writes_subscribes_and_calls(encrypted: bool, tmp_path: Path) -> None:
     async with serving(settings_for(encrypted=encrypted), tmp_path) as (server, _):
@@ -108,6 +109,7 @@ async def test_node_opcua_walks_through_the_services(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.landing
 async def test_node_opcua_goes_on_after_lost_connections(tmp_path: Path) -> None:
     """First its session is still there, then only its subscription is: it is transferred."""
     said: list[dict[str, Any]] = []
@@ -150,6 +152,7 @@ async def test_node_opcua_goes_on_after_lost_connections(tmp_path: Path) -> None
     assert 3 <= sent["RepublishRequest"] <= 12
 
 
+@pytest.mark.landing
 async def test_node_opcua_works_in_the_middle_of_a_crowd(tmp_path: Path) -> None:
     """Of its own address three hundred sockets that say nothing."""
     async with serving(settings_for(encrypted=True), tmp_path) as (server, _):

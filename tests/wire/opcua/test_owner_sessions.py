@@ -66,6 +66,7 @@ async def test_the_second_one_may_stop_the_drive(hall: Hall) -> None:
         assert not hall.runs()
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("is_killed", [False, True])
 async def test_the_next_session_goes_on_where_the_first_one_has_ended(hall: Hall, is_killed: bool) -> None:
     one = Client(hall.url)

@@ -176,6 +176,7 @@ class TestTrust:
             async with logged_in(served, stranger, "anna", PASSWORD) as client:
                 assert await control_word(client) == Codes.Good
 
+    @pytest.mark.landing
     async def test_certificates_that_an_address_makes_up_are_one_line(
         self, users: list[UserTable], tmp_path: Path
     ) -> None:
@@ -194,6 +195,7 @@ class TestTrust:
         assert "refused certificates from 127.0.0.1: SHA-256 " in told[0]
         assert "made-up-0" in told[0]
 
+    @pytest.mark.landing
     async def test_the_server_s_identity_stays_over_a_restart_under_another_host_name(
         self, users: list[UserTable], scada: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

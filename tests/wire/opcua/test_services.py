@@ -181,6 +181,7 @@ class TestBrowse:
     ) -> None:
         assert (await self.browse(client, **asked)).StatusCode.value == code
 
+    @pytest.mark.landing
     async def test_a_response_is_not_without_end(self, client: Client) -> None:
         wide = ua.BrowseDescription(ua.NodeId(Ids.BaseObjectType), ua.BrowseDirection.Both)
         with pytest.raises(Errors.BadResponseTooLarge):

@@ -170,6 +170,7 @@ async def test_a_deadband_counts_from_what_was_told(client: Client, view: LocalV
     ]
 
 
+@pytest.mark.landing
 async def test_two_thousand_items_are_made_at_once(client: Client, view: LocalView) -> None:
     told = Told()
     subscription = await subscribe(client, told, 100)

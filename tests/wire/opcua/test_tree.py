@@ -44,6 +44,7 @@ async def look(client: Client, ids: Sequence[ua.NodeId], points: set[ua.NodeId])
     return seen
 
 
+@pytest.mark.landing
 async def test_two_who_look_at_once_from_both_ends_see_what_asyncua_would_have_held(
     served: tuple[OpcUaServer, LocalView], client: Client
 ) -> None:

@@ -80,6 +80,7 @@ def _wrong_outcomes() -> Iterator[Any]:
             yield pytest.param(_OUTCOMES, cell, (outcome, deeds), id=f"{label}: outcome")
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize(("table", "cell", "wrong"), [*_wrong_places(), *_wrong_outcomes()])
 def test_a_fault_in_any_cell_is_found(table: str, cell: object, wrong: object) -> None:
     with patch.dict(getattr(judge, table), {cell: wrong}):

@@ -182,6 +182,7 @@ def test_a_start_that_the_node_follows_is_no_reason_whatever_it_says_of_errors(t
     assert not bench.nmt(RESET_COMMUNICATION, RESET_NODE)
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("codes", [(), (0x8240,) * 9], ids=["once", "for good"])
 @pytest.mark.parametrize("mapping", SOME)
 def test_no_family_is_reset_while_a_drive_is_running(

@@ -74,6 +74,7 @@ def tree(space: AddressSpace, image: Image) -> Tree:
     return tree_in(space, image)
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("name", PLANTS)
 def test_clients_see_what_asyncua_would_have_held(name: str, standard: AddressSpace, tmp_path: Path) -> None:
     image = PLANTS[name](tmp_path).image
@@ -201,6 +202,7 @@ class TestWhatIsHeld:
             assert drive[kind] <= 2, "its name"
         assert drive.total() <= 2.5 * drive["_TreeNode"], drive
 
+    @pytest.mark.landing
     def test_who_browses_leaves_the_references_downwards_and_who_reads_leaves_nothing(
         self, space: AddressSpace
     ) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from bridge.northbound.page.throttle import FORGOTTEN_S, FREE, FREE_OF_ADDRESS, LONGEST_PAUSE_S, Throttle
 
 HERE = "1.2.3.4"
@@ -67,6 +69,7 @@ def test_wrong_passwords_are_forgotten_after_an_hour() -> None:
     assert fail(throttle, "ann", FREE, FORGOTTEN_S + 1) == FREE
 
 
+@pytest.mark.landing
 def test_a_flood_of_addresses_takes_no_more_than_its_room() -> None:
     throttle = Throttle()
     for number in range(10_000):

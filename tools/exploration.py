@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Explore the controller leg and print the figures into docs/explanation/dead-man-chain.md.
+"""Explore the controller leg and print the figures into docs/reference/decision-tables.md.
 
     .venv/bin/python -m tools.exploration
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draw the tables of the controller leg and of the judge of stops into docs/explanation/dead-man-chain.md.
+"""Draw the tables of the controller leg and of the judge of stops into docs/reference/decision-tables.md.
 
     .venv/bin/python -m tools.state_table
 
@@ -19,7 +19,7 @@ from bridge.command.stop_check import table as judge
 from bridge.command.stop_check.state import PLACES, LastStop, Place
 from tools.marks import replaced
 
-PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "explanation" / "dead-man-chain.md"
+PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "reference" / "decision-tables.md"
 BEGIN: Final = "<!-- drawn by tools/state_table.py: begin -->"
 END: Final = "<!-- drawn by tools/state_table.py: end -->"
 WORDS_BEGIN: Final = "<!-- words drawn by tools/state_table.py: begin -->"

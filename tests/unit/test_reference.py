@@ -300,8 +300,8 @@ def test_every_command_and_option_is_described() -> None:
 def test_the_tables_of_the_controller_leg_are_those_of_the_code() -> None:
     text = state_table.PAGE.read_text(encoding="utf-8")
     assert text == state_table.drawn(text), "draw it anew: python -m tools.state_table"
-    shown = page("explanation/dead-man-chain.md")
-    stages = shown.column("The controller leg as a table", "stage")
+    shown = page("reference/decision-tables.md")
+    stages = shown.column("The controller leg", "stage")
     assert [stage.strip("*") for stage in stages] == list(Stage)
     cells = {
         (stage, row["event"]): cell

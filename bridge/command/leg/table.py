@@ -1,7 +1,7 @@
 """The leg as a table: what each event makes of each stage, and what is done about it.
 
 The next stage and the deed come from this table and from nowhere else (``bridge.command.leg.deeds``);
-``docs/explanation/dead-man-chain.md`` has it printed. What an event is, and what has to hold for it, is
+``docs/reference/decision-tables.md`` has it printed. What an event is, and what has to hold for it, is
 decided where it comes in. Which word a drive gets then is a table of its own (``bridge.command.leg.words``).
 """
 

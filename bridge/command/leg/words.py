@@ -1,6 +1,6 @@
 """Words that the drive gets: a table of the leg's stage and of the drive's motion.
 
-It stands beside the table of what happens, and ``docs/explanation/dead-man-chain.md`` has both printed.
+It stands beside the table of what happens, and ``docs/reference/decision-tables.md`` has both printed.
 Nothing that enables a drive gets past it while the watchdog has tripped, the restart interlock is set or the
 way to the drive is closed. A stop always does.
 """

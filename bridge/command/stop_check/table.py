@@ -1,6 +1,6 @@
 """The judgement as two tables: what becomes of a stop on its way to the drive, and what is said of it then.
 
-The code asks these tables for what is next and for what is done; ``docs/explanation/dead-man-chain.md`` has
+The code asks these tables for what is next and for what is done; ``docs/reference/decision-tables.md`` has
 them printed. What has to hold for a finding is decided in ``step``.
 """
 

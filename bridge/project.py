@@ -52,7 +52,7 @@ def _refuse_vain_silence(project: Project) -> None:
         raise FileFaults(file.faults)
 
 
-def _vain_silences(project: Project) -> Iterator[tuple[Key, Text | str, str]]:
+def _vain_silences(project: Project) -> Iterator[tuple[Key, Text, str]]:
     """Keys of the site file that ask for silence, why it would not stop the drive, and what would."""
     for b, bus in enumerate(project.site.bus):
         for n, node in enumerate(bus.node):
@@ -79,7 +79,7 @@ def _vain_silences(project: Project) -> Iterator[tuple[Key, Text | str, str]]:
                     yield (*table, "then_silence_ms"), why, f"0 (never); or {watch}"
 
 
-_NEVER_SILENT: Final = 'has no effect with on_expiry = "hold": what it goes on with never ends'
+_NEVER_SILENT: Final = Text.of("check.never_silent")
 
 
 def _own_watch(family: Family, node: NodeTable, slot: Slot) -> str:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Final
 
 ROOT: Final = Path(__file__).resolve().parents[1]
-_PHRASES: Final = "bridge/northbound/page/static/js/texts/said-de.json"
+_PHRASES: Final = "bridge/northbound/page/static/js/texts/said-*.json"
 _OWN_FILES: Final = ("__init__", "__main__")
 _LOOKED_FOR: Final = frozenset(("device", "outputs", "is_device"))
 _TELLS: Final = ("set", "report", "count")
@@ -65,7 +65,8 @@ class House:
 
     def phrases(self) -> tuple[int, int]:
         """How many there are, and how many of them have slots."""
-        pairs = json.loads((self._root / _PHRASES).read_text(encoding="utf-8"))
+        books = [json.loads(file.read_text(encoding="utf-8")) for file in self._root.glob(_PHRASES)]
+        pairs = [pair for book in books for pair in book]
         return len(pairs), sum("{" in pair[0] for pair in pairs)
 
     def attributes(self, name: str) -> int | None:

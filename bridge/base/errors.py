@@ -9,7 +9,7 @@ import errno
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.text import Text, render
+from bridge.text import Text, Words, render
 
 _EXHAUSTED: Final = frozenset((errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM))
 
@@ -46,8 +46,8 @@ class Fault:
     file: str
     line: int
     key: str
-    said: Text | str
-    advice: Text | str = ""
+    said: Words
+    advice: Words = ""
 
     @property
     def message(self) -> str:

@@ -7,6 +7,7 @@ from typing import Final
 
 from bridge.canopen import abort
 from bridge.canopen.decode_sdo import SdoSaid, shown
+from bridge.canopen.sdo_block import Learned
 from bridge.canopen.sdo_transfer import SdoError
 from bridge.text import Text
 
@@ -44,7 +45,19 @@ _ABORTS: Final[Mapping[int, Text]] = {
     0x0800_0024: Text.of("abort.no_data"),
 }
 _UNKNOWN: Final = Text.of("abort.unknown")
-
+_WAYS: Final[Mapping[str, Text]] = {
+    "refused": Text.of("sdo_way.refused"),
+    "no_answer": Text.of("sdo_way.no_answer"),
+    "segments": Text.of("sdo_way.segments"),
+    "aborted": Text.of("sdo_way.aborted"),
+    "silent": Text.of("sdo_way.silent"),
+    "out_of_step": Text.of("sdo_way.out_of_step"),
+    "aborted_at_end": Text.of("sdo_way.aborted_at_end"),
+    "silent_at_end": Text.of("sdo_way.silent_at_end"),
+    "crc": Text.of("sdo_way.crc"),
+    "length": Text.of("sdo_way.length"),
+    "end_refused": Text.of("sdo_way.end_refused"),
+}
 
 _REQUESTS: Final[Mapping[str, Callable[[str, int], Text]]] = {
     "length": lambda _, count: Text.of("sdo_request.length", count=count),
@@ -92,3 +105,8 @@ def text_of(error: SdoError) -> Text:
     if code == abort.BUSY:
         return Text.of("sdo.not_asked", object=name, why=why, code=code)
     return Text.of("sdo.no_answer", object=name, why=why, code=code)
+
+
+def text_of_learned(learned: Learned) -> Text:
+    """The way in which block transfer breaks, and the error that showed it."""
+    return Text.of("sdo_way.shown", way=_WAYS[learned.way.name], why=text_of(learned.failure))

@@ -14,6 +14,7 @@ from bridge.mapping.model import Family, Slot
 from bridge.parameter import Entry, Names, ParameterError, Transfer, TransferFailed, Why
 from bridge.parameter.effect import Verdict, judge
 from bridge.parameter.protection import Gate
+from bridge.text import Text
 
 _WORD_BYTES = 2
 
@@ -86,36 +87,33 @@ class Standstill:
         concerned = ", ".join(entry.name for entry in entries if self.concerns(entry))
         if not concerned and not self._whole:
             return
-        what = concerned or "a set of parameters"
+        what = Text.of("standstill.parameters", names=concerned) if concerned else Text.of("standstill.set")
         if self._words is None:
             yield from self._check_outputs(what, must_tell=bool(concerned) and not self._force)
             return
         word = yield from self._status()
-        rule = f"{what}: not written while the drive is enabled"
         if word is not None and self._words.state(word) in MOVING:
-            raise ParameterError(Why.PROTECTED, f"{rule}, and it is: stop and disable it first")
+            raise ParameterError(Why.PROTECTED, Text.of("standstill.drive_enabled", what=what))
         if word is None and concerned and not self._force:
-            raise ParameterError(
-                Why.PROTECTED, f"{rule}, and it does not tell whether it is; --force writes all the same"
-            )
+            raise ParameterError(Why.PROTECTED, Text.of("standstill.drive_silent", what=what))
 
-    def _check_outputs(self, what: str, *, must_tell: bool) -> Generator[Transfer, tuple[bytes, float], None]:
+    def _check_outputs(
+        self, what: Text, *, must_tell: bool
+    ) -> Generator[Transfer, tuple[bytes, float], None]:
         """Check the outputs. Raises ``ParameterError`` for the first output that the node holds at anything
         but its safe value; one that is to hold its last value is safe at 0."""
         for place in self._places:
             name = place.output.name
-            rule = f"{what}: not written while an output is active"
             try:
                 data, _ = yield Transfer(place.output.object)
             except TransferFailed:
                 if not must_tell:
                     continue
-                raise ParameterError(
-                    Why.PROTECTED,
-                    f"{rule}, and {name} does not tell whether it is; --force writes all the same",
-                ) from None
+                said = Text.of("standstill.output_silent", what=what, output=name)
+                raise ParameterError(Why.PROTECTED, said) from None
             if _is_active(place, data):
-                raise ParameterError(Why.PROTECTED, f"{rule}, and {name} is: make it safe first")
+                said = Text.of("standstill.output_active", what=what, output=name)
+                raise ParameterError(Why.PROTECTED, said)
 
     def _status(self) -> Generator[Transfer, tuple[bytes, float], int | None]:
         """Status word, read by SDO from the objects that make it up in its TPDO."""

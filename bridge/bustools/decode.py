@@ -180,7 +180,7 @@ class Decoder:
         if family:
             text = EmergencyReader(family).read(found.code, found.vendor).text
         else:
-            text = emcy_codes.text(found.code)
+            text = str(emcy_codes.text(found.code))
         vendor = found.vendor.hex(" ").upper()
         values = (
             ("code", f"{found.code:04X}"),

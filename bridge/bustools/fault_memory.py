@@ -11,6 +11,7 @@ from bridge.canopen import width
 from bridge.drive import Explained, FaultWords
 from bridge.mapping.model import Family, ObjectRef
 from bridge.parameter import DriveParameters, Entry, ParameterError, Transfer, TransferFailed, Why
+from bridge.text import Text
 
 _HISTORY: Final = 0x1003
 _MOST: Final = 254
@@ -71,7 +72,8 @@ def _history(words: FaultWords) -> Asks:
                 )
     except TransferFailed as failure:
         if not failure.by_drive:
-            raise ParameterError(Why.NO_ANSWER, f"1003h: {failure}") from None
+            said = Text.of("parameter.of", owner="1003h", what=failure.said)
+            raise ParameterError(Why.NO_ANSWER, said) from None
     return found
 
 

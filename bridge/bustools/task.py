@@ -53,7 +53,7 @@ class SdoTasks(BusTask):
         """Reasons why servers are not asked for block transfer any more, by the COB-ID of their requests:
         each given once, when it was found out."""
         learned = {channel.request_id: channel.take_learned() for channel in self._channels.values()}
-        return {request_id: why for request_id, why in learned.items() if why}
+        return {request_id: str(one) for request_id, one in learned.items() if one}
 
     def on_frame(self, frame: Frame) -> None:
         self._now = max(self._now, frame.time)

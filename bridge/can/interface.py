@@ -10,7 +10,7 @@ from bridge.can.burstend import Burst
 from bridge.can.errorframe import ControllerState as ControllerState
 from bridge.can.errorframe import describe
 from bridge.canopen.frame import Frame
-from bridge.text import Text
+from bridge.text import Said
 
 
 @dataclass(slots=True)
@@ -31,14 +31,14 @@ class BusStatus:
     bursts_refused: str = ""
     """Reason why the kernel takes no bursts at present, so that a timer of ours sends them; empty where it
     does."""
-    _last_error: tuple[int, bytes] | Text | str = ""
+    _last_error: tuple[int, bytes] | Said = ""
 
-    def note_error(self, error: tuple[int, bytes] | Text | str) -> None:
+    def note_error(self, error: tuple[int, bytes] | Said) -> None:
         """The latest trouble: identifier and data of an error frame, or a sentence."""
         self._last_error = error
 
     @property
-    def last_error(self) -> Text | str:
+    def last_error(self) -> Said:
         """The latest trouble, empty where there was none."""
         # Put into words only when somebody looks: a broken wire gives thousands of them a second.
         return describe(*self._last_error) if isinstance(self._last_error, tuple) else self._last_error

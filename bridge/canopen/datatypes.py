@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Final, Literal
 
 TypeName = Literal[
@@ -14,6 +15,37 @@ TypeName = Literal[
     "real32", "real64", "string", "bytes",
 ]  # fmt: skip
 Plain = bool | int | float | str
+
+
+class Misfit(Enum):
+    """Kinds of ``DataTypeError``, each with its English."""
+
+    NO_BOOL = "a bool is true or false"
+    NOT_WHOLE = "a {type} is a whole number"
+    NO_NUMBER = "a {type} is a number"
+    NO_TEXT = "a {type} is a text in quotes"
+    NO_BYTES = "bytes are pairs of hexadecimal digits"
+    OUT_OF_RANGE = "a {type} is {low}…{high}"
+    TOO_LARGE = "{value} is too large for a {type}"
+    NOT_LATIN = "a string has characters of ISO 8859-1 only"
+    TOO_SHORT = "a {type} has {size} bytes, not {value}"
+
+
+class DataTypeError(ValueError):
+    """A value that does not fit data type ``kind``. With ``Misfit.TOO_SHORT`` the value is the number of
+    bytes that came."""
+
+    def __init__(self, misfit: Misfit, kind: str, value: Plain = "") -> None:
+        super().__init__(misfit, kind, value)
+        self.misfit = misfit
+        self.kind = kind
+        self.value = value
+
+    def __str__(self) -> str:
+        number = NUMBERS.get(self.kind)
+        low, high = (number.low, number.high) if isinstance(number, Integer) else ("", "")
+        size = number.size if number else ""
+        return self.misfit.value.format(type=self.kind, value=self.value, size=size, low=low, high=high)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,40 +118,46 @@ NUMBERS: Final[dict[str, Integer | Real]] = {**INTEGERS, **REALS}
 
 
 def encode(kind: str, value: Plain) -> bytes:
-    """``value`` as bytes. Raises ValueError if it does not fit ``kind``."""
+    """``value`` as bytes. Raises DataTypeError if it does not fit ``kind``."""
     if kind == "bool":
         if value not in (0, 1) or isinstance(value, float | str):
-            raise ValueError("a bool is true or false")
+            raise DataTypeError(Misfit.NO_BOOL, kind, value)
         return bytes((int(value),))
     if kind in INTEGERS:
         if isinstance(value, bool | float | str):
-            raise ValueError(f"a {kind} is a whole number")
-        number = INTEGERS[kind]
+            raise DataTypeError(Misfit.NOT_WHOLE, kind, value)
         try:
-            return number.encode(value)
+            return INTEGERS[kind].encode(value)
         except ValueError:
-            raise ValueError(f"a {kind} is {number.low}…{number.high}") from None
+            raise DataTypeError(Misfit.OUT_OF_RANGE, kind, value) from None
     if kind in REALS:
         if isinstance(value, bool | str):
-            raise ValueError(f"a {kind} is a number")
+            raise DataTypeError(Misfit.NO_NUMBER, kind, value)
         try:
             return REALS[kind].encode(value)
         except ValueError:
-            raise ValueError(f"{value} is too large for a {kind}") from None
+            raise DataTypeError(Misfit.TOO_LARGE, kind, value) from None
     if not isinstance(value, str):
-        raise ValueError(f"a {kind} is a text in quotes")
+        raise DataTypeError(Misfit.NO_TEXT, kind, value)
     if kind == "bytes":
-        return bytes.fromhex(value)
+        return _from_hexadecimal(value)
     try:
         return value.encode("latin-1")
     except UnicodeEncodeError:
-        raise ValueError("a string has characters of ISO 8859-1 only") from None
+        raise DataTypeError(Misfit.NOT_LATIN, kind, value) from None
+
+
+def _from_hexadecimal(digits: str) -> bytes:
+    try:
+        return bytes.fromhex(digits)
+    except ValueError:
+        raise DataTypeError(Misfit.NO_BYTES, "bytes", digits) from None
 
 
 def decode(kind: str, data: bytes) -> Plain:
     """The value of these bytes: a string up to its first zero byte, bytes in hexadecimal.
 
-    Raises ValueError if bytes of a number are missing; surplus ones are ignored.
+    Raises DataTypeError if bytes of a number are missing; surplus ones are ignored.
     """
     if kind == "string":
         return text(data)
@@ -127,7 +165,7 @@ def decode(kind: str, data: bytes) -> Plain:
         return data.hex(" ").upper()
     number = NUMBERS[kind]
     if len(data) < number.size:
-        raise ValueError(f"a {kind} has {number.size} bytes, not {len(data)}")
+        raise DataTypeError(Misfit.TOO_SHORT, kind, len(data))
     value = number.decode(data)
     return bool(value) if kind == "bool" else value
 

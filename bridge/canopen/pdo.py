@@ -44,7 +44,13 @@ class PdoEntry:
 
 
 class MappingError(ValueError):
-    """A PDO mapping that cannot be compiled; the message names the entry."""
+    """A PDO mapping that cannot be compiled: of an entry that has no possible number of bits, or of
+    ``length`` bytes, which are too many."""
+
+    def __init__(self, message: object, entry: PdoEntry | None = None, length: int = 0) -> None:
+        super().__init__(message)
+        self.entry = entry
+        self.length = length
 
 
 class PdoCodec:
@@ -55,12 +61,13 @@ class PdoCodec:
         """Raises MappingError if an entry does not have 1…64 bits or the sum exceeds eight bytes."""
         for entry in entries:
             if not 1 <= entry.bits <= MOST_BITS:
-                raise MappingError(f"{entry}: 1…{MOST_BITS} bits can be mapped")
+                raise MappingError(f"{entry}: 1…{MOST_BITS} bits can be mapped", entry)
         total = sum(entry.bits for entry in entries)
         self.entries = entries
         self.length = (total + 7) // 8
         if self.length > MOST_BYTES:
-            raise MappingError(f"{self.length} bytes are mapped, a PDO has {MOST_BYTES}")
+            message = f"{self.length} bytes are mapped, a PDO has {MOST_BYTES}"
+            raise MappingError(message, length=self.length)
         signs = [(entry.index, entry.sub) in signed for entry in entries]
         self.has_signed = any(signs)
         self._masks = tuple((1 << entry.bits) - 1 for entry in entries)

@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 
 from bridge.canopen import abort
 from bridge.canopen.frame import Frame
-from bridge.canopen.sdo_block import BlockUse, read_object, write_object
+from bridge.canopen.sdo_block import BlockUse, Learned, read_object, write_object
 from bridge.canopen.sdo_queue import Priority, SdoJob, SdoQueue
 from bridge.canopen.sdo_transfer import (
     ABORT,
@@ -85,7 +85,7 @@ class SdoChannel:
         """Time from its request to the last of these."""
         self._segment_s = segment_s
         self._queue = SdoQueue()
-        self._block = BlockUse(why_no_block)
+        self._block = BlockUse(bool(why_no_block))
         self._told_of_block = bool(why_no_block)
         self._job: SdoJob | None = None
         self._transfer: Transfer | None = None
@@ -163,17 +163,17 @@ class SdoChannel:
         self._clear()
         self._frames.clear()
         self._hold_until = None
-        self._block = BlockUse(self._block.why_not)
+        self._block = BlockUse(self._block.is_avoided, self._block.learned)
         for job in jobs:
             job.done(SdoError(job.index, job.sub, abort.TIMED_OUT, by_server=False))
 
-    def take_learned(self) -> str:
+    def take_learned(self) -> Learned | None:
         """Reason why the server is not asked for block transfer any more, given once when that was found out;
-        else empty."""
-        if self._told_of_block or not self._block.why_not:
-            return ""
+        else None."""
+        if self._told_of_block or self._block.learned is None:
+            return None
         self._told_of_block = True
-        return self._block.why_not
+        return self._block.learned
 
     def forget_block(self) -> None:
         """Another device is there: it is asked for block transfer again."""

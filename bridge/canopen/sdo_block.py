@@ -52,13 +52,26 @@ def crc16(data: bytes | bytearray) -> int:
     return binascii.crc_hqx(data, 0)
 
 
+@dataclass(frozen=True, slots=True)
+class Learned:
+    """Way in which a server breaks block transfer, and the error by which it showed."""
+
+    way: WayBack
+    failure: SdoError
+
+    def __str__(self) -> str:
+        return f"{self.way.says}: {self.failure}"
+
+
 @dataclass(slots=True)
 class BlockUse:
-    """Lessons of a channel about its server: why it is not asked for block transfer, and how many
+    """Lessons of a channel about its server: whether it is not asked for block transfer, and how many
     segments in a row arrive without loss."""
 
-    why_not: str = ""
-    """Reason in a sentence; empty as long as the server is asked."""
+    is_avoided: bool = False
+    """True once the server is not asked any more."""
+    learned: Learned | None = None
+    """Lesson by which that was found out here; None where it was known before."""
     segments: int = MOST_SEGMENTS
 
     def on_block(self, whole: bool) -> None:
@@ -81,7 +94,7 @@ def read_object(index: int, sub: int, block: BlockUse) -> Transfer:
     value, announced = yield from initiate_upload(index, sub)
     if value is not None:
         return value
-    if block.why_not or announced is None or announced < BLOCK_FROM_BYTES:
+    if block.is_avoided or announced is None or announced < BLOCK_FROM_BYTES:
         return (yield from upload_segments(index, sub, announced))
     progress = _Progress()
     try:
@@ -89,14 +102,14 @@ def read_object(index: int, sub: int, block: BlockUse) -> Transfer:
     except SdoError as error:
         failure, way = error, _way_back(progress, error)
     value = yield from _by_segments(upload(index, sub), failure)
-    block.why_not = f"{way.says}: {failure}"
+    block.is_avoided, block.learned = True, Learned(way, failure)
     return value
 
 
 def write_object(index: int, sub: int, data: bytes, block: BlockUse) -> Transfer:
     """Write an object: by blocks if it is long, and by segments where that breaks before the server can have
     taken the value."""
-    if block.why_not or len(data) < BLOCK_FROM_BYTES:
+    if block.is_avoided or len(data) < BLOCK_FROM_BYTES:
         return (yield from download(index, sub, data))
     progress = _Progress()
     try:
@@ -105,7 +118,7 @@ def write_object(index: int, sub: int, data: bytes, block: BlockUse) -> Transfer
     except SdoError as error:
         failure, way = error, _way_back(progress, error)
     yield from _by_segments(download(index, sub, data), failure)
-    block.why_not = f"{way.says}: {failure}"
+    block.is_avoided, block.learned = True, Learned(way, failure)
     return b""
 
 

@@ -36,6 +36,7 @@ class WayBack:
     stage: Stage
     by_server: bool
     codes: frozenset[int]
+    name: str
     says: str
 
     def fits(self, stage: Stage, error: SdoError) -> bool:
@@ -56,17 +57,17 @@ _OF_THE_PROTOCOL: Final = (
 """Abort codes by which a server refuses the end of a download without having looked at the value."""
 
 WAYS_BACK: Final = (
-    WayBack(Stage.BEGIN, True, _ANY, "the node refuses it"),
-    WayBack(Stage.BEGIN, False, _SILENCE, "the node does not answer when it is asked for it"),
-    WayBack(Stage.BEGIN, False, frozenset((abort.GENERAL,)), "the node answers by segments"),
-    WayBack(Stage.BLOCKS, True, _ANY, "the node aborts it within the blocks"),
-    WayBack(Stage.BLOCKS, False, _SILENCE, "the node falls silent within the blocks"),
-    WayBack(Stage.BLOCKS, False, _OUT_OF_STEP, "the node loses step within the blocks"),
-    WayBack(Stage.END_UPLOAD, True, _ANY, "the node aborts it at its end"),
-    WayBack(Stage.END_UPLOAD, False, _SILENCE, "the node falls silent at its end"),
-    WayBack(Stage.END_UPLOAD, False, frozenset((abort.CRC,)), "the node's CRC is wrong"),
-    WayBack(Stage.END_UPLOAD, False, _LENGTHS, "the node's length is wrong"),
-    WayBack(Stage.END_DOWNLOAD, True, _OF_THE_PROTOCOL, "the node refuses its end"),
+    WayBack(Stage.BEGIN, True, _ANY, "refused", "the node refuses it"),
+    WayBack(Stage.BEGIN, False, _SILENCE, "no_answer", "the node does not answer when it is asked for it"),
+    WayBack(Stage.BEGIN, False, frozenset((abort.GENERAL,)), "segments", "the node answers by segments"),
+    WayBack(Stage.BLOCKS, True, _ANY, "aborted", "the node aborts it within the blocks"),
+    WayBack(Stage.BLOCKS, False, _SILENCE, "silent", "the node falls silent within the blocks"),
+    WayBack(Stage.BLOCKS, False, _OUT_OF_STEP, "out_of_step", "the node loses step within the blocks"),
+    WayBack(Stage.END_UPLOAD, True, _ANY, "aborted_at_end", "the node aborts it at its end"),
+    WayBack(Stage.END_UPLOAD, False, _SILENCE, "silent_at_end", "the node falls silent at its end"),
+    WayBack(Stage.END_UPLOAD, False, frozenset((abort.CRC,)), "crc", "the node's CRC is wrong"),
+    WayBack(Stage.END_UPLOAD, False, _LENGTHS, "length", "the node's length is wrong"),
+    WayBack(Stage.END_DOWNLOAD, True, _OF_THE_PROTOCOL, "end_refused", "the node refuses its end"),
 )
 
 

@@ -24,7 +24,7 @@ from bridge.parameter import DriveParameters, Entry, Ledger, Names, ParameterErr
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.parameter.protection import Gate
 from bridge.project import load_project
-from bridge.text import Text
+from bridge.text import Said
 
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
 DriveArgument = Annotated[
@@ -47,7 +47,7 @@ T = TypeVar("T")
 class Saved:
     """Outcome of a save: the guard's ``warning``, or ``why_not`` where nothing can be saved on command."""
 
-    warning: Text | str = ""
+    warning: Said = ""
     why_not: str = ""
 
 
@@ -71,7 +71,7 @@ class Target:
     def refuse_unforced(self, entries: Iterable[Entry]) -> None:
         """Raises ``BadParameter`` with all that is written with ``--force`` only, if at all."""
         protection = self.access.names.protection
-        reasons = "; ".join(filter(None, map(protection.why_forced, entries)))
+        reasons = "; ".join(str(why) for entry in entries if (why := protection.why_forced(entry)))
         if reasons:
             raise typer.BadParameter(
                 f"{reasons}. Nothing was written. --force writes what decides and supervises, while the "

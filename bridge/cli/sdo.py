@@ -22,6 +22,7 @@ from bridge.cli.terminal import printable, progress
 from bridge.mapping.model import SdoServer
 from bridge.parameter import Names, ObjectRef
 from bridge.parameter.number_text import NumberError, command_line_number
+from bridge.text import Text
 
 app = typer.Typer(help="Read or write an object of a node.", no_args_is_help=True)
 
@@ -98,7 +99,7 @@ def write(
         data = encode(kind, text)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
-    why = "" if force else why_forced(line, node_id, ObjectRef(index, sub))
+    why = None if force else why_forced(line, node_id, ObjectRef(index, sub))
     if why:
         raise typer.BadParameter(f"{why}. --force writes it: not beside a bridge whose drive runs")
     target = _sdo_target(line, node_id, sdo_channel, timeout_ms, retries)
@@ -114,12 +115,12 @@ def write(
     print(f"{where} written: {text}")
 
 
-def why_forced(line: CliBus, node_id: int, address: ObjectRef) -> str:
+def why_forced(line: CliBus, node_id: int, address: ObjectRef) -> Text | None:
     """Reason why this object of a node is written with ``--force`` only. Without a site there is no bridge
     that supervises the node."""
     node = next((node for node in line.table.node if node.id == node_id), None)
     if node is None:
-        return ""
+        return None
     names = Names(line.families[node.mapping_key])
     return names.protection.why_forced(names.resolve(str(address)))
 

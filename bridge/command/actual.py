@@ -12,7 +12,7 @@ from bridge.command.stop_check.drive import DriveStopCheck
 from bridge.drive import DriveState, Lack, ParameterSet, ValueCodec, codecs
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Meaning, Slot
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _GOOD: Final = (Quality.GOOD, "")
 _SPEEDS: Final = ("frequency", "velocity")
@@ -86,7 +86,7 @@ class ActualData:
         leaves = [f"actual/{word}" for word in self._carried]
         leaves += [codec.model.leaf for codec in self._codecs]
         self._indices = [image.index[f"{drive}/{leaf}"] for leaf in leaves]
-        self._shown: tuple[Quality, Text | str] | None = None
+        self._shown: tuple[Quality, Said] | None = None
         """Quality and reason as the image has them for the process data."""
         self.compile()
 
@@ -257,7 +257,7 @@ class ActualData:
             own, why = self._quality_of(point, quality)
             self._image.judge((point.index,), own, now, why or reason)
 
-    def _quality_of(self, point: _Judged, quality: Quality) -> tuple[Quality, Text | str]:
+    def _quality_of(self, point: _Judged, quality: Quality) -> tuple[Quality, Said]:
         """A point's quality, and the reason where that is not the one of the drive's ``quality``."""
         if not quality.has_value:
             return quality, ""
@@ -267,7 +267,7 @@ class ActualData:
             # Waiting goes first, then stale.
             is_worse = quality is Quality.GOOD or pdo.quality is Quality.WAITING
             if pdo.quality is not Quality.GOOD and is_worse:
-                return pdo.quality, f"no {pdo.name} from the drive"
+                return pdo.quality, Text.of("quality.no_pdo", pdo=pdo.name)
         return point.lack if point.lack and quality is Quality.GOOD else (quality, "")
 
 

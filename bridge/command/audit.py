@@ -29,7 +29,7 @@ from bridge.command.messages.request import (
     WriteParameter,
 )
 from bridge.image import Image, Value
-from bridge.text import Text, render
+from bridge.text import Said, Text, render
 
 Values = dict[str, Value]
 
@@ -67,7 +67,7 @@ class Rejection:
     target: str
     action: str
     code: str
-    message: str
+    said: Said
     values: Values = field(default_factory=dict[str, Value])
 
 
@@ -75,7 +75,7 @@ class Ending(NamedTuple):
     """An outcome, or what a protocol says that it has refused by itself."""
 
     code: str
-    said: Text | str = ""
+    said: Said = ""
     forwarded: bool = False
 
     @property
@@ -218,7 +218,7 @@ class AuditTrail:
     def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
         """``count`` of this kind, the last of them ``now``."""
         if self._listener is not None:
-            who, ending = rejection.identity, Ending(rejection.code, rejection.message)
+            who, ending = rejection.identity, Ending(rejection.code, rejection.said)
             new = rejection.values
             self._note(AuditEntry(now, who, rejection.target, rejection.action, ending, new=new, count=count))
 

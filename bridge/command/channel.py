@@ -33,7 +33,7 @@ from bridge.command.link import Link, NodeState
 from bridge.command.messages.event import Event, Kind
 from bridge.command.messages.request import Identity, Outcome, Reply, Request
 from bridge.image import Quality
-from bridge.text import Text
+from bridge.text import Said, Text
 
 
 class Channel:
@@ -161,7 +161,7 @@ class Channel:
 
     def _way(self, now: float) -> Way:
         link = self.link
-        why: Text | str = ""
+        why: Said = ""
         if link.is_expired:
             why = link.reason(Quality.LOST)
         elif not link.may_enable:
@@ -170,7 +170,7 @@ class Channel:
         is_heard = link.is_heard and self.leg.way.is_heard
         return Way(link.may_enable, why, self._why_unplaced(now), is_heard, link.why_unsent)
 
-    def on_sending(self, why_not: Text | str, now: float) -> None:
+    def on_sending(self, why_not: Said, now: float) -> None:
         """Whether ``output`` is repeated on the bus: ``why_not``, or an empty text."""
         if why_not != self.link.why_unsent:
             self.link.why_unsent = why_not
@@ -296,6 +296,6 @@ class Channel:
     def _is_silent(self, now: float) -> None:
         """It has been silent for longer than it may."""
 
-    def _why_unplaced(self, now: float) -> Text | str:
+    def _why_unplaced(self, now: float) -> Said:
         """Why the position is not known that setpoints have to follow; empty where it is."""
         return ""

@@ -10,7 +10,7 @@ from bridge.command.stop_check.state import LastStop, Verdict
 from bridge.command.worst_case import Wire, sync_wait_ms, takeover_ms
 from bridge.config import BusTable
 from bridge.config.model import StoppedTable
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _ASYNCHRONOUS: Final = 255
 
@@ -76,7 +76,7 @@ class Commanded(Protocol):
         ...
 
     @property
-    def unproven(self) -> Text | str | None:
+    def unproven(self) -> Said | None:
         """Reason why nothing more will be known of its last stop; None while that may be."""
         ...
 

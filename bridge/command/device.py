@@ -14,7 +14,7 @@ from bridge.command.outputs import Outputs, Telling
 from bridge.image import Image, Quality, Value
 from bridge.mapping.device import Signal
 from bridge.mapping.fields import ObjectRef
-from bridge.text import Text
+from bridge.text import Said, Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class _InputTpdo:
     link: Link
     shown: list[tuple[int, Signal, int]] = field(default_factory=list[tuple[int, Signal, int]])
     """Entry, what it is, and its point."""
-    quality: tuple[Quality, Text | str] | None = None
+    quality: tuple[Quality, Said] | None = None
     told: tuple[tuple[int, ObjectRef, int], ...] = ()
     """Entries that are outputs: the entry, its object, and the mask that takes its sign away."""
     told_values: list[tuple[ObjectRef, int]] = field(default_factory=list[tuple[ObjectRef, int]])
@@ -72,7 +72,7 @@ class Device:
         self._heard: list[_InputTpdo] = []
         self._unserved: dict[int, Text] = {}
         """Points that no TPDO carries, with the reason."""
-        self._state: tuple[Quality, Text | str] = (Quality.WAITING, "")
+        self._state: tuple[Quality, Said] = (Quality.WAITING, "")
         """How good those inputs are of which no TPDO is known."""
 
     def begin(self, now: float) -> None:
@@ -207,7 +207,7 @@ class Device:
             if index in known:
                 continue
             quality, reason = state
-            why = self._unserved.get(index, "")
+            why = self._unserved.get(index)
             if why and quality in (Quality.GOOD, Quality.STALE, Quality.LOST):
                 quality, reason = Quality.CONFIG_ERROR, why
             self._image.judge((index,), quality, now, reason)
@@ -224,7 +224,7 @@ class Device:
             heard.quality = quality, reason
             self._image.judge(heard.points, quality, now, reason)
 
-    def _state_of_node(self) -> tuple[Quality, Text | str]:
+    def _state_of_node(self) -> tuple[Quality, Said]:
         match self._node:
             case NodeState.OPERATIONAL:
                 return Quality.GOOD, ""

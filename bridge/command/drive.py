@@ -25,7 +25,7 @@ from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, Paramete
 from bridge.drive.own_supervision import why_silence_does_not_stop
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Meaning
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
 _FAULT: Final = ("fault_number", "fault_cause", "fault_remedy")
@@ -224,7 +224,7 @@ class Drive(WordTiming):
         def compiled(codec: ValueCodec, in_set: int) -> _Command:
             found, lack = meanings.codec(codec, in_set)
             carried = [codec.model.leaf, *(f"command/{words[place]}" for place in found.places)]
-            why = next((why for leaf in carried if (why := self.channel.unserved.get(leaf))), "")
+            why = next((why for leaf in carried if (why := self.channel.unserved.get(leaf))), None)
             return _Command(found, Lack(Quality.CONFIG_ERROR, why) if why else lack)
 
         return {in_set: [compiled(codec, in_set) for codec in self._commands] for in_set in meanings.sets}
@@ -235,7 +235,8 @@ class Drive(WordTiming):
         self.channel.on_own_watch(why_silence_does_not_stop(self.family, own, self.spec.node), now)
         self._refresh_supervision(now)
         if own.verdict is OwnVerdict.STOPS or own.accepted:
-            self._image.set(self._bridge_ms, own.bridge_ms, now, Quality.GOOD, own.accepted)
+            accepted = Text.plain(own.accepted) if own.accepted else ""
+            self._image.set(self._bridge_ms, own.bridge_ms, now, Quality.GOOD, accepted)
             return
         runs_on = own.verdict is OwnVerdict.RUNS_ON
         why = Text.of("own.drive_runs_on" if runs_on else "own.drive_not_known", why=own.because)
@@ -309,7 +310,7 @@ class Drive(WordTiming):
         return self.quality is Quality.GOOD
 
     @property
-    def unproven(self) -> Text | str | None:
+    def unproven(self) -> Said | None:
         """None: a drive that is heard says whether it follows."""
         return None
 
@@ -344,9 +345,9 @@ class Drive(WordTiming):
         setpoints, unserved = channel.setpoints, channel.unserved
         image.set(self._control_word, channel.control_word, now)
         for index, (place, leaf) in zip(self._setpoint_indices, self._setpoints, strict=True):
-            why = unserved.get(leaf, "")
+            why = unserved.get(leaf)
             quality = Quality.CONFIG_ERROR if why else Quality.GOOD
-            image.set(index, setpoints[place], now, quality, why)
+            image.set(index, setpoints[place], now, quality, why or "")
         in_set = self._set.of(channel.control_word)
         for index, codec in zip(self._value_indices, self._commands_in[in_set], strict=True):
             value = codec.codec.from_words(setpoints)

@@ -19,7 +19,7 @@ from bridge.config import DriveTable
 from bridge.drive import FAULTED, DriveState, EmergencyMeaning, Explained, Meanings
 from bridge.image import Quality
 from bridge.mapping.model import Family
-from bridge.text import Text, render
+from bridge.text import Said, Text, Words, render
 
 
 class DriveChannel(Channel):
@@ -112,7 +112,7 @@ class DriveChannel(Channel):
         return self.family.faults.controller_silent if self.is_tripped else self._status.link_fault
 
     @property
-    def fault_said(self) -> Text | str:
+    def fault_said(self) -> Words:
         """The present fault with its number; empty where there is none."""
         return self._status.fault_said(self._bridge_fault, self.state)
 
@@ -127,13 +127,13 @@ class DriveChannel(Channel):
         return self._status.fault(self._bridge_fault, self.state)
 
     @property
-    def last_fault_said(self) -> Text | str:
+    def last_fault_said(self) -> Words:
         """The last fault with its number; empty where there was none."""
         return self._status.last_fault_said
 
     # from the drive
 
-    def on_own_watch(self, why_not: Text | str, now: float) -> None:
+    def on_own_watch(self, why_not: Said, now: float) -> None:
         """Whether the drive stops by itself when it gets no RPDO any more: ``why_not``, or an empty text."""
         stops = not why_not
         if stops is self.leg.silence_stops:
@@ -203,7 +203,7 @@ class DriveChannel(Channel):
         said = Text.of("watchdog.link_fault", prefix=self.family.faults.prefix, fault=fault, why=why)
         self._tell(now, Kind.WATCHDOG, 700, said)
 
-    def _why_unplaced(self, now: float) -> Text | str:
+    def _why_unplaced(self, now: float) -> Said:
         if not self._followed:
             return ""
         quality = self.link.quality(now)

@@ -12,7 +12,7 @@ from typing import Final
 from bridge.catalogue.codes import NodeState as NodeState
 from bridge.config import IGNORE_ALL_S
 from bridge.image import Quality
-from bridge.text import Text
+from bridge.text import Said, Text
 
 REASONS: Final = {
     state: Text.of("quality.node", state=Text.word("node_state", state.value)) for state in NodeState
@@ -67,7 +67,7 @@ class Link:
         self._downtime_s = telegram_downtime_s
         self._hold_s = hold_ms / 1000
         self.node = NodeState.ABSENT
-        self.why_unsent: Text | str = ""
+        self.why_unsent: Said = ""
         """Why nothing that belongs on the bus is repeated there; empty where it is."""
         self.pdo_deadline_s: float | None = None
         self.further: Sequence[FurtherTpdo] = ()
@@ -172,13 +172,13 @@ class Link:
             return Quality.DEAD if now >= self._expired_at + self._hold_s else Quality.LOST
         return Quality.STALE
 
-    def why_lacking(self, places: frozenset[int], now: float) -> Text | str:
+    def why_lacking(self, places: frozenset[int], now: float) -> Said:
         """Why these words, by their places in ``process.tpdo``, are not known; empty where they are. The TPDO
         with the status word is judged by ``quality``."""
         late = [pdo.name for pdo in self.further if not (pdo.places.isdisjoint(places) or pdo.is_fresh(now))]
         return Text.of("quality.no_pdo", pdo=late[0]) if late else ""
 
-    def reason(self, quality: Quality) -> Text | str:
+    def reason(self, quality: Quality) -> Said:
         """Why the data have this quality, in a few words; empty where they are good."""
         if quality is Quality.GOOD:
             return ""

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 from bridge.command.messages.request import Code
-from bridge.command.messages.telegram import Refusal, Telegram
+from bridge.command.messages.telegram import Refusal, Telegram, not_taken
 from bridge.config import SafeValue
 from bridge.image import Value
+from bridge.image.limits import ValueNotTaken
 from bridge.mapping.device import Output
 from bridge.text import Text
 
@@ -116,17 +117,17 @@ class OutputWords:
                 raise Refusal(Code.UNKNOWN_POINT, said)
             try:
                 raw = self._with_bit(words, place, bit, value) if bit else place.output.encode(value)
-            except ValueError as error:
-                message = f"{leaf} {error} {place.output.unit}".rstrip()
-                raise Refusal(Code.OUT_OF_RANGE, message) from None
+            except ValueNotTaken as error:
+                raise not_taken(leaf, error, place.output.unit) from None
             self.put(words, place, raw)
         return Telegram(0 if tuple(words) == self.safe(self.held) else ACTIVE, tuple(words))
 
     def _with_bit(self, words: Sequence[int], place: Place, bit: str, value: Value) -> int:
         if not bit.isdecimal() or int(bit) >= place.output.size:
-            raise ValueError(f"is none of its {place.output.size} bits")
+            said = Text.of("telegram.no_bit", leaf=f"{place.output.name}.{bit}", bits=place.output.size)
+            raise Refusal(Code.OUT_OF_RANGE, said)
         if value not in (0, 1):
-            raise ValueError(f"takes true or false, not {value!r}")
+            raise ValueNotTaken(Text.of("takes.bool", value=repr(value)))
         mask = 1 << int(bit)
         raw = self.raw(words, place)
         return raw | mask if value else raw & ~mask
@@ -138,6 +139,6 @@ def _off(output: Output) -> int:
     value = max(0.0 if low is None else low, min(0.0 if high is None else high, 0.0))
     try:
         return output.encode(value)
-    except ValueError:
+    except ValueNotTaken:
         # Its scale has an offset that leaves 0 out.
         return 0

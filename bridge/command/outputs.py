@@ -30,7 +30,7 @@ from bridge.drive import ControlWords, OwnJudgement
 from bridge.image import Image, Quality, Value
 from bridge.mapping.fields import ObjectRef
 from bridge.mapping.model import ControlWord
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _SAFE: Final = {"mask": ACTIVE, "value": 0}
 _CONTROL_WORD: Final = ControlWord.model_validate(
@@ -164,7 +164,7 @@ class Outputs(WordTiming):
         """Outputs that a TPDO of the node carries, too."""
         self.unserved: dict[ObjectRef, Text] = {}
         """Outputs that no RPDO carries, with the reason."""
-        self.bridge_stop: tuple[int, Text | str] = (0, Text.of("meaning.not_read_yet"))
+        self.bridge_stop: tuple[int, Said] = (0, Text.of("meaning.not_read_yet"))
         """Longest time in ms from the bridge's hang to outputs that the node itself has made safe, or why
         there is none."""
         self.own: OwnJudgement | None = None
@@ -208,7 +208,7 @@ class Outputs(WordTiming):
         rpdo_type: int,
         unserved: Mapping[ObjectRef, Text],
         held: Mapping[str, int],
-        bridge_stop: tuple[int, Text | str],
+        bridge_stop: tuple[int, Said],
         now: float,
     ) -> None:
         """What the boot-up has found: the transmission type of its RPDOs, what none of them carries, what
@@ -246,7 +246,7 @@ class Outputs(WordTiming):
         return False
 
     @property
-    def unproven(self) -> Text | str | None:
+    def unproven(self) -> Said | None:
         return self.stop_check.why if self.stop_check.is_stuck else None
 
     @property
@@ -325,7 +325,7 @@ class Outputs(WordTiming):
         self._refresh_follows(now)
         quality = channel.link.quality(now)
         for place, index in self._points:
-            why = self.unserved.get(place.output.object, "")
+            why = self.unserved.get(place.output.object)
             value = self.words.value(sent, place)
             if why:
                 self._image.set(index, value, now, Quality.CONFIG_ERROR, why)

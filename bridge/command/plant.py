@@ -40,7 +40,7 @@ from bridge.command.stop_check.state import Verdict
 from bridge.config import BusTable, Site
 from bridge.image import Image, Quality, Value
 from bridge.parameter import Ledger
-from bridge.text import Text
+from bridge.text import Said, Text
 
 CarryOut = Callable[[Request, float, Reply], bool]
 """Takes a command on a node or a bus, or a request for a parameter; False where there is nobody to do it."""
@@ -74,7 +74,7 @@ class Plant:
         """Events of nodes and buses that nobody has been told of yet."""
         self.unsent_stops: set[Commanded] = set()
         """Drives and outputs with a stop that has not been handed to the bus yet."""
-        self.because: Callable[[Event], Text | str] = lambda event: ""
+        self.because: Callable[[Event], Said] = lambda event: ""
         """Finds what has caused an event."""
         self._stop_due: float | None = None
         self._changed: dict[str, set[str]] = {bus.name: set() for bus in catalogue.site.bus}
@@ -206,7 +206,7 @@ class Plant:
                 listener(event)
 
     def set(
-        self, name: str, value: Value, now: float, quality: Quality = Quality.GOOD, why: Text | str = ""
+        self, name: str, value: Value, now: float, quality: Quality = Quality.GOOD, why: Said = ""
     ) -> None:
         """Set a point by its full name."""
         self.image.put(name, value, now, quality, why)
@@ -282,11 +282,11 @@ class Plant:
         as what a drive refuses."""
         self.audit.rejected(rejection, now, count)
         self._report_refusal(
-            rejection.action, rejection.identity, rejection.target, rejection.message, now, count
+            rejection.action, rejection.identity, rejection.target, rejection.said, now, count
         )
 
     def _report_refusal(
-        self, what: str, identity: Identity, target: str, why: Text | str, now: float, count: int = 1
+        self, what: str, identity: Identity, target: str, why: Said, now: float, count: int = 1
     ) -> None:
         is_bus = target.removeprefix("bus/") in self._changed and target.startswith("bus/")
         is_known = is_bus or target in self.drives or target in self.nodes
@@ -447,17 +447,16 @@ class PlantView:
         self._plant.on_connection(identity, self._clock(), is_there=is_there, has_others=has_others)
 
 
-def _refused(what: str, target: str, who: str, why: Text | str) -> Text:
+def _refused(what: str, target: str, who: str, why: Said) -> Text:
     """``what`` is empty where several requests that differ in it are told as one, ``target`` where the event
     is of it."""
     action = Text.plain(what) if what else Text.of("request.several")
     if what in Action.__members__.values():
         action = Text.word("action", what)
-    reason = Text.plain(why)
     if target and why:
-        return Text.of("request.refused_on", action=action, target=target, who=who, why=reason)
+        return Text.of("request.refused_on", action=action, target=target, who=who, why=why)
     if target:
         return Text.of("request.refused_on_unsaid", action=action, target=target, who=who)
     if why:
-        return Text.of("request.refused", action=action, who=who, why=reason)
+        return Text.of("request.refused", action=action, who=who, why=why)
     return Text.of("request.refused_unsaid", action=action, who=who)

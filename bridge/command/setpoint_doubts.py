@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from bridge.drive import ValueCodec
-from bridge.text import Text
+from bridge.text import Said, Text
 
 
 class InForce(NamedTuple):
@@ -29,7 +29,7 @@ class SetpointDoubts:
     def __init__(self) -> None:
         self._doubts: dict[str, tuple[InForce, Text]] = {}
 
-    def note(self, name: str, before: InForce, after: InForce) -> Text | str:
+    def note(self, name: str, before: InForce, after: InForce) -> Said:
         """``name`` of the command group means another value; what there is to say, empty where nobody would
         notice."""
         if before.words != after.words or before.value == after.value:
@@ -40,7 +40,7 @@ class SetpointDoubts:
         self._doubts[name] = (written, why)
         return why
 
-    def why(self, name: str, setpoints: Sequence[int]) -> Text | str:
+    def why(self, name: str, setpoints: Sequence[int]) -> Said:
         """Why a command is in doubt, with these words in force; empty where it is not."""
         if not self._doubts or name not in self._doubts:
             return ""

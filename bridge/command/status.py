@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bridge.drive import FAULTED, DriveState, EmergencyMeaning, Explained, FaultWords, StatusWords
 from bridge.mapping.model import Family
-from bridge.text import Text
+from bridge.text import Text, Words
 
 
 class DriveStatus:
@@ -42,7 +42,7 @@ class DriveStatus:
             self._drive_last = last
         return (self.drive_fault, self.last_fault) != before
 
-    def fault_said(self, bridge_fault: float, state: DriveState) -> Text | str:
+    def fault_said(self, bridge_fault: float, state: DriveState) -> Words:
         """The present fault, the bridge's own before the drive's; empty where there is none."""
         if not (bridge_fault or self.drive_fault) and state in FAULTED:
             return self._told.said if self._told else Text.word("drive_state", "fault")
@@ -61,6 +61,6 @@ class DriveStatus:
         return words.of_code(told.code) if told.number is None else words.of_drive(told.number, told.cause)
 
     @property
-    def last_fault_said(self) -> Text | str:
+    def last_fault_said(self) -> Words:
         """The last fault in the maker's form; empty where there was none."""
         return self._fault_words.of_drive(self.last_fault).said if self.last_fault else ""

@@ -12,7 +12,7 @@ from typing import Final
 
 from bridge.command.messages.freshness import way_ms
 from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, OutputsTable
-from bridge.text import Text, render
+from bridge.text import Said, Text, render
 
 REACTION_BOUND_MS: Final = 20
 """How late the bridge may be itself, or the kernel's timer in its place."""
@@ -43,7 +43,7 @@ class StopTime:
     given."""
 
     terms: tuple[Term, ...] = ()
-    unknown: Text | str = ""
+    unknown: Said = ""
 
     @property
     def ms(self) -> int:

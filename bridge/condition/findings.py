@@ -9,7 +9,7 @@ from typing import Final
 
 from bridge.drive import Explained
 from bridge.image import Image, Quality, Value
-from bridge.text import Text
+from bridge.text import Said, Text, Words
 
 OwnFault = Callable[[int, int], Explained | None]
 """The fault that a drive's own status word and its last emergency code tell; None where there is none."""
@@ -57,7 +57,7 @@ class ImageReader:
         code = self(name)
         return self._labels[name].get(code, "") if isinstance(code, int) else ""
 
-    def words(self, name: str) -> Text | str:
+    def words(self, name: str) -> Words:
         """Words of a point: its text with code and facts where it has one, else the plain words; empty where
         none."""
         words = self(name)
@@ -65,7 +65,7 @@ class ImageReader:
             return ""
         return self._image.said(self._places[name]) or words
 
-    def quality(self, name: str) -> tuple[Quality, Text | str]:
+    def quality(self, name: str) -> tuple[Quality, Said]:
         place = self._places.get(name)
         if place is None:
             return Quality.GOOD, ""
@@ -195,7 +195,7 @@ def of_bridge(reader: ImageReader) -> Iterator[Trouble]:
         yield Trouble(Rank.WARNING, "fronts_failing", "bridge", facts, fronts=_fronts_in(failing))
 
 
-def _fronts_in(failing: Text | str) -> frozenset[str]:
+def _fronts_in(failing: Words) -> frozenset[str]:
     parts = () if isinstance(failing, str) else dict(failing.facts)["parts"]
     texts = [one for one in parts if isinstance(one, Text)] if isinstance(parts, tuple) else []
     return frozenset(str(dict(one.facts)["front"]) for one in texts)

@@ -10,6 +10,7 @@ from bridge.condition.findings import OwnFault
 from bridge.condition.layout import Layout
 from bridge.drive import FAULTED, Explained, FaultWords, StatusWords
 from bridge.mapping import Family
+from bridge.text import Text
 
 
 def with_faults(layout: Layout, catalogue: Catalogue) -> Layout:
@@ -31,7 +32,7 @@ def _own_fault(family: Family) -> OwnFault:
     def own_fault(status_word: int, emcy_code: int) -> Explained | None:
         if status.state(status_word) not in FAULTED:
             return None
-        return faults.of_code(emcy_code) if emcy_code else Explained(text="fault")
+        return faults.of_code(emcy_code) if emcy_code else Explained(text=Text.word("drive_state", "fault"))
 
     return own_fault
 

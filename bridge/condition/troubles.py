@@ -159,7 +159,7 @@ class Troubles:
         is_down = reader.label(f"bus/{bus}/state") in DOWN
         yield from of_bus(reader, bus, is_down=is_down)
         if self._has_risen(f"bus/{bus}/intruders", now_ms):
-            who = reader(f"bus/{bus}/last_intruder") or ""
+            who = reader.words(f"bus/{bus}/last_intruder")
             yield Trouble(Rank.ALARM, "intruder", f"bus/{bus}", (("who", who),))
         is_looking = now_ms - self._began_ms < _FOUND_MS
         if not is_down and not is_looking and not reader(f"bus/{bus}/passive"):

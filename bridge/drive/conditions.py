@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from bridge.image import Quality
 from bridge.mapping.model import Family, ProcessValue
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _FIRST: Final = 1
 
@@ -19,7 +19,7 @@ class Lack(NamedTuple):
     """Why a value is not served, or with the quality *stale*, why it is in doubt."""
 
     quality: Quality
-    why: Text | str
+    why: Said
 
 
 class Conditions:
@@ -65,7 +65,7 @@ class Conditions:
                 return Lack(unread.quality, unread_in((name,), self._set_of(name, in_set), unread.why))
             if setting not in settings:
                 shown = (self._shown(name, setting),)
-                why = otherwise_in((value.otherwise,), self._set_of(name, in_set), shown)
+                why = otherwise_in((value.said_otherwise,), self._set_of(name, in_set), shown)
                 return Lack(Quality.DISABLED, why)
         for name in self._family.steady_of(value):
             key = self.key(name, in_set)
@@ -85,19 +85,18 @@ class Conditions:
         return in_set if self._family.parameter_named(name).sets else None
 
 
-def unread_in(parameters: tuple[str, ...], in_set: int | None, why: Text | str) -> Text:
+def unread_in(parameters: tuple[str, ...], in_set: int | None, why: Said) -> Text:
     """What there is to say of parameters that the drive has not told."""
     if in_set is None:
         return Text.of("meaning.unread", parameters=parameters, why=why)
     return Text.of("meaning.unread_in_set", parameters=parameters, in_set=in_set, why=why)
 
 
-def otherwise_in(otherwise: tuple[str, ...], in_set: int | None, settings: tuple[Text, ...]) -> Text:
+def otherwise_in(otherwise: tuple[Text, ...], in_set: int | None, settings: tuple[Text, ...]) -> Text:
     """What the mapping file says of values with these settings."""
-    said = tuple(Text.plain(one) for one in otherwise)
     if in_set is None:
-        return Text.of("meaning.otherwise", otherwise=said, settings=settings)
-    return Text.of("meaning.otherwise_in_set", otherwise=said, in_set=in_set, settings=settings)
+        return Text.of("meaning.otherwise", otherwise=otherwise, settings=settings)
+    return Text.of("meaning.otherwise_in_set", otherwise=otherwise, in_set=in_set, settings=settings)
 
 
 def _was_changed(name: str, first: float, setting: float) -> Text:

@@ -7,7 +7,7 @@ from typing import Final
 
 from bridge.drive.fault_words import FaultWords
 from bridge.mapping.model import Family
-from bridge.text import Text, render
+from bridge.text import Text, Words, render
 
 _VENDOR_BYTE: Final = 3
 """The manufacturer's bytes begin here (CiA 301 §7.2.7.3.1)."""
@@ -20,7 +20,7 @@ class EmergencyMeaning:
     event."""
 
     code: int
-    said: Text | str
+    said: Words
     is_gone: bool
     number: int | None = None
     cause: int | None = None
@@ -57,14 +57,14 @@ class EmergencyReader:
         names = (f"{code:04X}", f"{code >> 8:02X}xx")
         return any(name in names for name in self._model.number.codes) if self._model.number else False
 
-    def _event(self, event: int, code: int, cause: int | None) -> Text | str:
+    def _event(self, event: int, code: int, cause: int | None) -> Words:
         found = self._words.of_drive(event, cause)
         if self._words.knows(event):
             return found.said
         said = Text.of("fault.unknown_event", number=found.number, text=self._model.text(code))
         return Text.of("fault.with_cause", text=said, cause=cause) if cause else said
 
-    def _error(self, number: int, code: int) -> Text | str:
+    def _error(self, number: int, code: int) -> Words:
         found = self._words.of_drive(number)
         if self._words.knows(number):
             return found.said

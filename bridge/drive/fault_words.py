@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 from bridge.mapping.faults import FORM_FIELD, Explanation
 from bridge.mapping.model import Family
-from bridge.text import Text, render
+from bridge.text import Text, Words, render
 
 Language = Literal["en", "de"]
 _DECIMAL: Final = ("number", "group")
@@ -33,7 +33,7 @@ class Explained:
     """``number`` is in the maker's form; a text is empty where nobody says anything."""
 
     number: str = ""
-    text: Text | str = ""
+    text: Words = ""
     cause: str = ""
     remedy: str = ""
 
@@ -41,7 +41,7 @@ class Explained:
         return render(self.said)
 
     @property
-    def said(self) -> Text | str:
+    def said(self) -> Words:
         """Number and text, as far as they are there."""
         if not self.number:
             return self.text
@@ -70,7 +70,7 @@ class FaultWords:
         name = f"{fault:.1f}"
         return self._explained(f"{self._faults.prefix}{name}", name, self._text(name))
 
-    def of_drive(self, fault: float, cause: int | None = None, text: str = "") -> Explained:
+    def of_drive(self, fault: float, cause: int | None = None, text: Words = "") -> Explained:
         """What the drive tells: the number of its fault, or that of an event and the ``cause`` that came with
         it. ``text`` is that of the emergency code, for numbers that have none."""
         name = self._name(fault)
@@ -92,7 +92,7 @@ class FaultWords:
         name = f"{code:04X}h"
         return self._explained(name, name, self._text(name))
 
-    def code_text(self, code: int) -> str:
+    def code_text(self, code: int) -> Words:
         """Text of an emergency code."""
         return self._text(f"{code:04X}h")
 
@@ -113,7 +113,7 @@ class FaultWords:
             return f"{whole:04X}h"
         return str(whole & self._mask if self._mask else whole)
 
-    def _text(self, name: str) -> str:
+    def _text(self, name: str) -> Words:
         if german := self._german.get(name):
             return german
         if name.endswith("h"):
@@ -156,7 +156,7 @@ class FaultWords:
 
         return FORM_FIELD.sub(digits, form)
 
-    def _explained(self, number: str, name: str, text: str) -> Explained:
+    def _explained(self, number: str, name: str, text: Words) -> Explained:
         if name in self._no_faults:
             return Explained(number, text)
         names = _from_exact_to_group(name)

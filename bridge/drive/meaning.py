@@ -12,7 +12,7 @@ from bridge.drive.scaling import LinearScale, is_scale, no_scale, scale_of
 from bridge.drive.values import ValueCodec, scales_of
 from bridge.image import Quality
 from bridge.mapping.model import Family, Meaning, Parameter, ProcessValue, Slot
-from bridge.text import Text
+from bridge.text import Said, Text
 
 Codes = Mapping[str, Sequence[int | None]]
 """By the word's leaf, such as ``actual/value_1``, the code in each parameter set; None: it cannot be read."""
@@ -116,7 +116,7 @@ class Meanings:
         self._overdue = overdue
         return is_news
 
-    def doubt(self, model: ProcessValue, in_set: int) -> Text | str:
+    def doubt(self, model: ProcessValue, in_set: int) -> Said:
         """Why it is not certain that this value still means what it meant; empty where it is."""
         if not self._overdue:
             return ""
@@ -209,7 +209,7 @@ class Meanings:
         if unread:
             return Lack(self._unread.quality, unread_in(tuple(unread), which, self._unread.why))
         found = tuple(dict.fromkeys(self._shown(one, in_set) for one in asked))
-        otherwise = tuple(dict.fromkeys(one.otherwise for one in asked))
+        otherwise = tuple(dict.fromkeys(one.said_otherwise for one in asked))
         return Lack(Quality.DISABLED, otherwise_in(otherwise, which, found))
 
     def _named_twice(self, model: ProcessValue, asked: Sequence[Meaning], in_set: int) -> Text | None:

@@ -13,7 +13,7 @@ from enum import StrEnum
 from bridge.config import BusTable, NodeTable
 from bridge.mapping.model import Family, OwnReaction, OwnSupervision
 from bridge.mapping.own_places import LIFE_TIME_FACTOR, OwnPlace, Raw, place_of
-from bridge.text import Text, render
+from bridge.text import Said, Text, render
 
 
 class OwnVerdict(StrEnum):
@@ -33,7 +33,7 @@ class Watch:
     """None where it is not known, 0 where nothing is watched."""
     reaction: str
     verdict: OwnVerdict | None
-    because: Text | str = ""
+    because: Said = ""
     """Why the drive would not stop by it."""
     silent_ms: int = 0
     """How long after a hang of the bridge its last frame may come."""
@@ -105,7 +105,7 @@ class OwnJudgement:
         return " + ".join(f"{name} {ms:g}" for name, ms in self.terms)
 
     @property
-    def because(self) -> Text | str:
+    def because(self) -> Said:
         """Why it would not stop, or why that is not known; empty where it would."""
         wanted = self.verdict
         if wanted is OwnVerdict.STOPS:
@@ -120,7 +120,7 @@ class OwnJudgement:
         return render(self.because)
 
 
-def _together(reasons: Iterable[Text | str]) -> Text | str:
+def _together(reasons: Iterable[Said]) -> Said:
     """Each of them once."""
     each = tuple(dict.fromkeys(reasons))
     return each[0] if len(each) == 1 else Text.of("own.several", reasons=each)
@@ -136,7 +136,7 @@ def judge(family: Family, raw: Raw, bus: BusTable, node: NodeTable, accepted: st
     return OwnJudgement(tuple(watches), accepted)
 
 
-def why_silence_does_not_stop(family: Family, own: OwnJudgement, node: NodeTable) -> Text | str:
+def why_silence_does_not_stop(family: Family, own: OwnJudgement, node: NodeTable) -> Said:
     """Why a drive of this node would run on if only its RPDOs ended, or an empty text.
 
     Heartbeat, guarding and SYNC go on then, and so do the RPDOs of the node's other drives.
@@ -181,7 +181,7 @@ def _watch(family: Family, entry: OwnSupervision, raw: Raw, bus: BusTable, node:
 
 def _time(
     entry: OwnSupervision, place: OwnPlace, value: int, raw: Raw, bus: BusTable, node: NodeTable
-) -> tuple[float | None, str, Text | str]:
+) -> tuple[float | None, str, Said]:
     """Time-out in ms (0: nothing is watched, None: not known), the setting in words, and why it is off."""
     if entry.watches == "guarding":
         factor = raw.get(LIFE_TIME_FACTOR) if value else 0
@@ -210,7 +210,7 @@ def _time(
     return time_ms, f"{place.name} = {time_ms:g} ms", ""
 
 
-def _reaction(family: Family, one: OwnReaction | None, raw: Raw) -> tuple[str, OwnVerdict, Text | str]:
+def _reaction(family: Family, one: OwnReaction | None, raw: Raw) -> tuple[str, OwnVerdict, Said]:
     """The reaction in words, what the drive does then, and why that is not to stop."""
     if one is None:
         return "stops", OwnVerdict.STOPS, ""

@@ -9,7 +9,7 @@ from typing import Final
 
 from bridge.canopen.datatypes import INTEGERS
 from bridge.image import DataType
-from bridge.image.limits import shown_range
+from bridge.image.limits import out_of_range
 from bridge.mapping.model import ProcessValue
 from bridge.text import Text
 
@@ -53,9 +53,9 @@ class LinearScale:
         return INTEGERS[self.raw].from_word(word) * self.full / self.at + self.offset
 
     def to_word(self, value: float) -> int:
-        """The nearest word. Raises ValueError where ``value`` is out of range."""
+        """The nearest word. Raises ValueNotTaken where ``value`` is out of range."""
         if not self.low <= value <= self.high:
-            raise ValueError(f"takes {shown_range(self.low, self.high)}, not {value:.10g}")
+            raise out_of_range(self.low, self.high, value)
         return INTEGERS[self.raw].to_word(round((value - self.offset) * self.at / self.full))
 
 

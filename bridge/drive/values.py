@@ -10,9 +10,9 @@ from typing import Final
 from bridge.canopen.datatypes import INTEGERS, REALS
 from bridge.drive.scaling import LinearScale, scale_of
 from bridge.image import DataType
-from bridge.image.limits import shown_range
+from bridge.image.limits import ValueNotTaken, out_of_range
 from bridge.mapping.model import Family, ProcessValue
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _WORD_BITS: Final = 16
 _WORD_MASK: Final = 0xFFFF
@@ -65,7 +65,7 @@ class ValueCodec:
         return self.scale is None and self.model.scale is not None
 
     @property
-    def why_unknown(self) -> Text | str:
+    def why_unknown(self) -> Said:
         if not self.is_unknown:
             return ""
         return Text.of("meaning.scale_unknown", parameters=tuple(self.model.scaled_by))
@@ -108,11 +108,11 @@ class ValueCodec:
         return float(number) if self.model.scale is not None else number
 
     def to_words(self, value: bool | int | float) -> tuple[Written, ...]:
-        """What writing ``value`` sets. Raises ValueError, with a sentence that begins with "takes", where
-        it is out of range. The scale must be known."""
+        """Bits that writing ``value`` sets. Raises ValueNotTaken where it is out of range. The scale must be
+        known."""
         if self._bit is not None:
             if value not in (0, 1):
-                raise ValueError(f"takes true or false, not {value:g}")
+                raise ValueNotTaken(Text.of("takes.bool", value=f"{value:g}"))
             mask = 1 << self._bit
             return (Written(self.places[0], mask, mask if value else 0),)
         word = self.scale.to_word(value) if self.scale is not None else self._whole(value)
@@ -123,15 +123,15 @@ class ValueCodec:
 
     def _whole(self, value: float) -> int:
         if not self._low <= value <= self._high:
-            raise ValueError(f"takes {shown_range(self._low, self._high)}, not {value:.10g}")
+            raise out_of_range(self._low, self._high, value)
         if self._number is None:
             return int.from_bytes(_REAL.encode(value), "little")
         number = int(value)
         if number != value:
-            raise ValueError(f"takes a whole number, not {value:g}")
+            raise ValueNotTaken(Text.of("takes.whole_number", value=f"{value:g}"))
         if self._states and number not in self._states:
-            known = ", ".join(f"{state} {text}" for state, text in sorted(self._states.items()))
-            raise ValueError(f"takes {known}, not {number}")
+            known = tuple(f"{state} {text}" for state, text in sorted(self._states.items()))
+            raise ValueNotTaken(Text.of("takes.choices", choices=known, value=str(number)))
         return number
 
 

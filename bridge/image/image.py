@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from bridge.image.point import Point, Value
 from bridge.image.quality import Quality
-from bridge.text import Text, render
+from bridge.text import Said, Text, render
 
 
 class Reading(NamedTuple):
@@ -17,7 +17,7 @@ class Reading(NamedTuple):
     value: Value
     quality: Quality
     time: float
-    why: Text | str
+    why: Said
 
     @property
     def reason(self) -> str:
@@ -31,7 +31,7 @@ class Columns(NamedTuple):
     values: list[Value]
     qualities: list[Quality]
     times: list[float]
-    whys: list[Text | str]
+    whys: list[Said]
 
 
 class Feed:
@@ -93,7 +93,7 @@ class Image:
         self._values: list[Value] = [point.data_type.zero for point in self.points]
         self._qualities = [Quality.WAITING] * count
         self._times = [0.0] * count
-        self._whys: list[Text | str] = [""] * count
+        self._whys: list[Said] = [""] * count
         self._said: dict[int, tuple[Value, Text]] = {}
         """Latest texts of points, with their words."""
         self._feeds: list[Feed] = []
@@ -136,13 +136,13 @@ class Image:
         return self[self.index[name]]
 
     def put(
-        self, name: str, value: Value, now: float, quality: Quality = Quality.GOOD, why: Text | str = ""
+        self, name: str, value: Value, now: float, quality: Quality = Quality.GOOD, why: Said = ""
     ) -> None:
         """Store a value of the named point, as ``set``. Raises KeyError where there is none."""
         self.set(self.index[name], value, now, quality, why)
 
     def set(
-        self, index: int, value: Value, now: float, quality: Quality = Quality.GOOD, why: Text | str = ""
+        self, index: int, value: Value, now: float, quality: Quality = Quality.GOOD, why: Said = ""
     ) -> None:
         """Store a value with its source time. Storing what is there already changes nothing."""
         if (
@@ -164,7 +164,7 @@ class Image:
         said: Text | Value,
         now: float,
         quality: Quality = Quality.GOOD,
-        why: Text | str = "",
+        why: Said = "",
     ) -> None:
         """Store a value, or the words of a text; ``said`` tells what they are the words of."""
         if isinstance(said, Text):
@@ -224,7 +224,7 @@ class Image:
             for feed in self._feeds:
                 feed.mark_all(changed)
 
-    def judge(self, indices: Sequence[int], quality: Quality, now: float, why: Text | str = "") -> None:
+    def judge(self, indices: Sequence[int], quality: Quality, now: float, why: Said = "") -> None:
         """Give these points another quality and keep their values."""
         for index in indices:
             self.set(index, self._values[index], now, quality, why)

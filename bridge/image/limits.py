@@ -5,17 +5,34 @@ from __future__ import annotations
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Final
 
+from bridge.text import Text
+
 _DIGITS: Final = 6
 
 
-def shown_range(low: float | None, high: float | None) -> str:
+class ValueNotTaken(ValueError):
+    """A value that is not taken. ``said`` begins with "takes"."""
+
+    def __init__(self, said: Text) -> None:
+        super().__init__(said)
+        self.said = said
+
+
+def out_of_range(low: float | None, high: float | None, value: float) -> ValueNotTaken:
+    """Refusal of ``value``, which is beyond these limits."""
+    return ValueNotTaken(Text.of("takes.range", range=shown_range(low, high), value=f"{value:.10g}"))
+
+
+def shown_range(low: float | None, high: float | None) -> Text:
     """``-100…99.9969``: each end with six digits at most, rounded towards the inside; whole numbers have all
     their digits."""
     least = "" if low is None else _shown(low, ROUND_CEILING)
     most = "" if high is None else _shown(high, ROUND_FLOOR)
     if high is None:
-        return f"{least} and more"
-    return f"{least}…{most}" if least else f"up to {most}"
+        return Text.of("range.from", low=least)
+    if low is None:
+        return Text.of("range.up_to", high=most)
+    return Text.of("range.between", low=least, high=most)
 
 
 def _shown(value: float, inwards: str) -> str:

@@ -12,7 +12,7 @@ from bridge.lint.bus import BusView, NodeView
 from bridge.lint.report import LintReport
 from bridge.lint.settings import RPDO, TPDO, pdo_cob_id
 from bridge.node.boot import heartbeat_period_ms
-from bridge.text import Text
+from bridge.text import Text, Words
 
 _CONSUMER: Final = 0x1016
 _SYNC: Final = (0x1005, 0)
@@ -53,7 +53,7 @@ def _is_cob_id(index: int, sub: int) -> bool:
     return index >= RPDO[0] and sub == _COB_ID
 
 
-def _own_settings(node: NodeView) -> Iterator[tuple[tuple[int, int], int, Text | str]]:
+def _own_settings(node: NodeView) -> Iterator[tuple[tuple[int, int], int, Words]]:
     """Settings of the boot-up after the configuration: object, value, and the key that causes it."""
     for index, value in _error_control(node.table).items():
         yield (index, 0), value, "supervision"

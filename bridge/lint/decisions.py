@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from bridge.config import IGNORE_ALL_S, DriveTable, NodeTable, Site
 from bridge.lint.report import LintReport
 from bridge.mapping import Family
+from bridge.text import Text
 from bridge.tomlfile import Key
 
 
@@ -18,13 +19,9 @@ def check_decisions(site: Site, families: Mapping[str, Family], report: LintRepo
                 name = f"{node.name}/{families[node.mapping_key].leaf_of(drive)}"
                 _check_drive(drive, name, ("bus", b, "node", n, "drive", d), report)
     if site.opcua and site.opcua.no_security:
-        report.warning(
-            ("opcua", "no_security"), "is true: anyone who reaches the port reads everything in clear text"
-        )
+        report.warning(("opcua", "no_security"), Text.of("check.anyone_reads"))
     if site.zenoh and site.zenoh.no_security:
-        report.warning(
-            ("zenoh", "no_security"), "is true: anyone who reaches the port commands, under any name"
-        )
+        report.warning(("zenoh", "no_security"), Text.of("check.anyone_commands"))
 
 
 def _check_commands(node: NodeTable, key: Key, report: LintReport) -> None:
@@ -32,15 +29,15 @@ def _check_commands(node: NodeTable, key: Key, report: LintReport) -> None:
         if entry.download.is_command and entry.read_back:
             report.warning(
                 (*key, "configure", c),
-                f"{entry.download.name} is a command: it never reads back as it was written",
-                'read_back = false; "save" after a download is configuration_store = true',
+                Text.of("check.is_command", object=entry.download.name),
+                Text.of("check.is_command.hint"),
             )
 
 
 def _check_drive(drive: DriveTable, name: str, key: Key, report: LintReport) -> None:
     if drive.control != "none" and drive.fieldbus_timeout_ms == 0:
-        report.warning((*key, "fieldbus_timeout_ms"), f"is 0: a silent controller will not stop {name}")
+        report.warning((*key, "fieldbus_timeout_ms"), Text.of("check.silence_stops_nothing", drive=name))
     if drive.telegram_downtime_s == IGNORE_ALL_S:
-        report.warning((*key, "telegram_downtime_s"), f"is -0.1: no communication error will stop {name}")
+        report.warning((*key, "telegram_downtime_s"), Text.of("check.errors_stop_nothing", drive=name))
     if drive.on_expiry == "hold" and drive.control != "none":
-        report.warning((*key, "on_expiry"), f'is "hold": a silent controller of {name} is only reported')
+        report.warning((*key, "on_expiry"), Text.of("check.silence_is_reported", drive=name))

@@ -9,7 +9,7 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.lint.bus import BusView, NodeView
 from bridge.lint.report import LintReport
-from bridge.text import Text
+from bridge.text import Text, Words
 from bridge.tomlfile import Key
 
 _LSS: Final = (0x7E4, 0x7E5)
@@ -21,7 +21,7 @@ class _Use:
     opened. ``moved``: the site gives it this COB-ID, with ``key``."""
 
     cob_id: int
-    what: Text | str
+    what: Words
     owner: str
     """Name of the node; empty for the bridge."""
     key: Key

@@ -10,6 +10,7 @@ from bridge.command.worst_case import REACTION_BOUND_MS, sync_wait_ms
 from bridge.lint.bus import BusView, NodeView
 from bridge.lint.wire import busy_bits, wire_of
 from bridge.master.answers import SHARE, answer_bits
+from bridge.text import Text, render
 
 _LOOK_MS: Final = 10
 """Period of the search for foreign frames (``bridge/can/foreignwatch.py``)."""
@@ -26,15 +27,18 @@ class Exposure:
     answers_per_s: int
     share_percent: int
 
-    def __str__(self) -> str:
+    @property
+    def said(self) -> Text:
+        """Harm that an intruder can do."""
         if self.on_intruder == "report":
-            return f"{self.bus}: an intruder is only reported: it can run drives as long as it likes"
-        within = "not in a known time" if self.within_ms is None else f"within {self.within_ms} ms"
-        return (
-            f"{self.bus}: an intruder is answered {within}, up to {self.answers_per_s} times a second "
-            f"({self.share_percent} % of the bus): until each answer it can run a drive, and longer where "
-            "it sends more often. No node can keep another one from sending on CAN"
-        )
+            return Text.of("exposure.reported", bus=self.bus)
+        per_s, share = self.answers_per_s, self.share_percent
+        if self.within_ms is None:
+            return Text.of("exposure.unbounded", bus=self.bus, per_s=per_s, share=share)
+        return Text.of("exposure.answered", bus=self.bus, ms=self.within_ms, per_s=per_s, share=share)
+
+    def __str__(self) -> str:
+        return render(self.said)
 
 
 def exposure(bus: BusView) -> Exposure:

@@ -15,7 +15,7 @@ from bridge.lint.report import LintReport
 from bridge.lint.wire import busy_bits, wire_of
 from bridge.mapping.model import OwnSupervision
 from bridge.mapping.own_places import channels_needed, offline, place_of, settable, wanted
-from bridge.text import Text, render
+from bridge.text import Said, Text, render
 from bridge.tomlfile import Key
 
 
@@ -175,7 +175,7 @@ def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
 def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
     """Report drives that are not known to stop when the bridge falls silent; drives of a node with the same
     reason share one warning."""
-    drives: dict[tuple[OwnVerdict, Text | str], list[str]] = {}
+    drives: dict[tuple[OwnVerdict, Said], list[str]] = {}
     for drive in node.drives:
         own = judged(bus, node, drive)
         if _runs_on(own):

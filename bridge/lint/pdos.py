@@ -30,7 +30,7 @@ def _check_identifier(pdo: PdoView, report: LintReport) -> None:
         report.error(
             pdo.cob_id_key or pdo.key,
             Text.of("check.no_pdo_cob_id", pdo=pdo.name, cob_id=pdo.cob_id),
-            "181h…57Fh or 680h…6DFh",
+            Text.of("check.pdo_cob_ids"),
         )
 
 

@@ -10,7 +10,6 @@ from bridge.mapping.model import Family, ProcessValue
 from bridge.tomlfile import Key
 
 _TEXTS: Final = ("string", "bytes")
-_OTHERWISE: Final = ProcessValue.model_fields["otherwise"].default
 _OF_MODE: Final = (10, 12, 13)
 """Bits of a status word that the mode of operation gives their meaning (CiA 402, 6041h)."""
 
@@ -198,7 +197,7 @@ def _check_conditions(family: Family, value: ProcessValue, key: Key, file: Merge
             return
         seen.add(needed)
         needed = leaves[needed].needs
-    if value.otherwise != _OTHERWISE and not value.when:
+    if value.otherwise and not value.when:
         file.fault((*key, "otherwise"), "has no meaning without when")
     _check_shared_bit(family, value, key, file)
 

@@ -10,10 +10,11 @@ from pydantic import Field
 
 from bridge.canopen.datatypes import INTEGERS
 from bridge.image import DataType, Value
-from bridge.image.limits import shown_range
+from bridge.image.limits import ValueNotTaken, out_of_range
 from bridge.mapping.fields import Name, Ref, States, Table
 from bridge.mapping.parameters import VALUE_TYPES
 from bridge.mapping.process import Process
+from bridge.text import Text
 
 SignalType = Literal[
     "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "real32", "real64"
@@ -73,26 +74,27 @@ class Signal(Table):
         return float(number) if self.value_type is DataType.FLOAT else number
 
     def encode(self, value: object) -> int:
-        """The entry of a PDO as an integer without sign. Raises ``ValueError`` with what it takes instead."""
+        """The entry of a PDO as an integer without sign. Raises ``ValueNotTaken`` with what it takes
+        instead."""
         if self.data_type == "bool":
             if value not in (0, 1):
-                raise ValueError(f"takes true or false, not {value!r}")
+                raise ValueNotTaken(Text.of("takes.bool", value=repr(value)))
             return int(bool(value))
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise ValueError("takes a number")
+            raise ValueNotTaken(Text.of("takes.number"))
         low, high = self.low, self.high
         if (low is not None and value < low) or (high is not None and value > high):
-            raise ValueError(f"takes {shown_range(low, high)}, not {value:.10g}")
+            raise out_of_range(low, high, value)
         number = (value - self.offset) / self.factor if self.is_scaled else value
         real = _REALS.get(self.data_type)
         if real is not None:
             return int.from_bytes(real.pack(number), "little")
         if not self.is_scaled and number != int(number):
-            raise ValueError(f"takes a whole number, not {value:g}")
+            raise ValueNotTaken(Text.of("takes.whole_number", value=f"{value:g}"))
         raw, kind = round(number), INTEGERS[self.data_type]
         if not kind.low <= raw <= kind.high:
             ends = [kind.low * self.factor + self.offset, kind.high * self.factor + self.offset]
-            raise ValueError(f"takes {shown_range(min(ends), max(ends))}, not {value:.10g}")
+            raise out_of_range(min(ends), max(ends), value)
         return raw & ((1 << self.size) - 1)
 
 

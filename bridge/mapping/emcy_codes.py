@@ -4,65 +4,67 @@ from __future__ import annotations
 
 from typing import Final
 
-UNKNOWN: Final = "unknown code"
+from bridge.text import Text
+
+UNKNOWN: Final = Text.of("emcy.unknown")
 
 _CODES: Final = {
-    0x8110: "CAN overrun (objects lost)",
-    0x8120: "CAN in error passive mode",
-    0x8130: "life guard error or heartbeat error",
-    0x8140: "recovered from bus off",
-    0x8150: "CAN-ID collision",
-    0x8210: "PDO not processed due to length error",
-    0x8220: "PDO length exceeded",
-    0x8230: "DAM MPDO not processed, destination object not available",
-    0x8240: "unexpected SYNC data length",
-    0x8250: "RPDO timeout",
+    0x8110: Text.of("emcy.overrun"),
+    0x8120: Text.of("emcy.error_passive"),
+    0x8130: Text.of("emcy.heartbeat"),
+    0x8140: Text.of("emcy.bus_off_over"),
+    0x8150: Text.of("emcy.id_collision"),
+    0x8210: Text.of("emcy.pdo_length"),
+    0x8220: Text.of("emcy.pdo_too_long"),
+    0x8230: Text.of("emcy.mpdo"),
+    0x8240: Text.of("emcy.sync_length"),
+    0x8250: Text.of("emcy.rpdo_timeout"),
 }
 _GROUPS: Final = {
-    0x00: "no error",
-    0x10: "generic error",
-    0x20: "current",
-    0x21: "current, device input side",
-    0x22: "current inside the device",
-    0x23: "current, device output side",
-    0x30: "voltage",
-    0x31: "mains voltage",
-    0x32: "voltage inside the device",
-    0x33: "output voltage",
-    0x40: "temperature",
-    0x41: "ambient temperature",
-    0x42: "device temperature",
-    0x50: "device hardware",
-    0x60: "device software",
-    0x61: "internal software",
-    0x62: "user software",
-    0x63: "data set",
-    0x70: "additional modules",
-    0x80: "monitoring",
-    0x81: "communication",
-    0x82: "protocol error",
-    0x90: "external error",
-    0xF0: "additional functions",
-    0xFF: "device specific",
+    0x00: Text.of("emcy.none"),
+    0x10: Text.of("emcy.generic"),
+    0x20: Text.of("emcy.current"),
+    0x21: Text.of("emcy.input_current"),
+    0x22: Text.of("emcy.inner_current"),
+    0x23: Text.of("emcy.output_current"),
+    0x30: Text.of("emcy.voltage"),
+    0x31: Text.of("emcy.mains_voltage"),
+    0x32: Text.of("emcy.inner_voltage"),
+    0x33: Text.of("emcy.output_voltage"),
+    0x40: Text.of("emcy.temperature"),
+    0x41: Text.of("emcy.ambient_temperature"),
+    0x42: Text.of("emcy.device_temperature"),
+    0x50: Text.of("emcy.hardware"),
+    0x60: Text.of("emcy.software"),
+    0x61: Text.of("emcy.internal_software"),
+    0x62: Text.of("emcy.user_software"),
+    0x63: Text.of("emcy.data_set"),
+    0x70: Text.of("emcy.modules"),
+    0x80: Text.of("emcy.monitoring"),
+    0x81: Text.of("emcy.communication"),
+    0x82: Text.of("emcy.protocol"),
+    0x90: Text.of("emcy.external"),
+    0xF0: Text.of("emcy.functions"),
+    0xFF: Text.of("emcy.device_specific"),
 }
 """By the code's high byte."""
 _LAST_CLASS: Final = 0x90
 """Up to here the first digit is a class of its own: 43xxh has to do with temperature, whatever it is."""
 
 _REGISTER: Final = (
-    "generic error",
-    "current",
-    "voltage",
-    "temperature",
-    "communication",
-    "device profile",
-    "",
-    "manufacturer",
+    Text.of("emcy.generic"),
+    Text.of("emcy.current"),
+    Text.of("emcy.voltage"),
+    Text.of("emcy.temperature"),
+    Text.of("emcy.communication"),
+    Text.of("emcy.profile"),
+    Text.of("emcy.register_bit", bit=6),
+    Text.of("emcy.manufacturer"),
 )
 """Bits of the error register, 1001h (CiA 301 §7.5.2.2); bit 6 is reserved."""
 
 
-def text(code: int) -> str:
+def text(code: int) -> Text:
     """What CiA 301 says of this code, or of the nearest group that it belongs to."""
     high = code >> 8
     found = _CODES.get(code) or _GROUPS.get(high)
@@ -71,7 +73,7 @@ def text(code: int) -> str:
     return found or UNKNOWN
 
 
-def register_text(register: int) -> str:
+def register_text(register: int) -> Text:
     """The error register in words: ``generic error, communication``."""
-    names = [name or f"bit {bit}" for bit, name in enumerate(_REGISTER) if register >> bit & 1]
-    return ", ".join(names) or "no error"
+    bits = tuple(said for bit, said in enumerate(_REGISTER) if register >> bit & 1)
+    return Text.of("emcy.register", bits=bits) if bits else Text.of("emcy.none")

@@ -8,7 +8,8 @@ from typing import Annotated, Final
 from pydantic import AfterValidator, Field
 
 from bridge.mapping import emcy_codes
-from bridge.mapping.fields import Decimal, EmcyCode, FaultNumber, Table
+from bridge.mapping.fields import Decimal, EmcyCode, FaultNumber, Table, Wording
+from bridge.text import Words
 
 FORM_FIELD: Final = re.compile(r"\{(number|group|hex|bits (\d{1,2})-(\d{1,2}))(?::(\d))?\}")
 """What may stand in a ``FaultForm``, with the least number of its digits."""
@@ -59,17 +60,10 @@ class EmcyTable(Table):
         default_factory=dict[str, str], description="event or error number in decimal to text"
     )
 
-    def text(self, code: int) -> str:
+    def text(self, code: int) -> Words:
         """The text of an EMCY code, or of its group: the family's own, else that of CiA 301."""
         name = f"{code:04X}"
         return self.codes.get(name) or self.codes.get(f"{name[:2]}xx") or emcy_codes.text(code)
-
-
-class Wording(Table):
-    """One sentence in two languages."""
-
-    en: str
-    de: str
 
 
 class Explanation(Table):

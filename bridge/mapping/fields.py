@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from bridge.config.fields import Name as Name
 from bridge.config.model import Table as Table
 from bridge.image import DataType
+from bridge.text import Text
 
 WORD_BITS: Final = 16
 _MOST_BITS: Final = 64
@@ -149,3 +150,15 @@ def pattern_bits(pattern: str) -> tuple[int, int]:
     mask = int("".join("0" if c == "X" else "1" for c in pattern), 2)
     value = int(pattern.replace("X", "0"), 2)
     return mask, value
+
+
+class Wording(Table):
+    """One sentence in two languages."""
+
+    en: str
+    de: str
+
+    @property
+    def said(self) -> Text:
+        """The sentence in the reader's language."""
+        return Text.both(self.en, self.de)

@@ -11,7 +11,8 @@ from bridge.config.download import Download
 from bridge.config.fields import PlainValue, listed
 from bridge.image import DataType
 from bridge.mapping.axes import MOST_AXES
-from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, Ref, States, Table
+from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, Ref, States, Table, Wording
+from bridge.text import Text
 
 MOST_WORDS: Final = 9
 """Control or status word and eight values: what Modbus has registers for."""
@@ -180,14 +181,21 @@ class Meaning(Table):
     absent: int | None = Field(
         None, description="the code that counts where the drive refuses to tell it, as one without the object"
     )
-    otherwise: str = Field(
-        "not in the telegram", description="what is said of values that name another code than the drive's"
+    otherwise: str | Wording | None = Field(
+        None,
+        description="what is said of values that name another code than the drive's; left out: that they are "
+        "not in the telegram",
     )
 
     @property
     def leaf(self) -> str:
         """The word's name below the drive, such as ``actual/value_2``."""
         return f"{self.group}/{self.word}"
+
+    @property
+    def said_otherwise(self) -> Text:
+        """What is said of values that name another code."""
+        return _said(self.otherwise) or Text.of("meaning.not_in_telegram")
 
 
 class ProcessValue(Table):
@@ -232,8 +240,10 @@ class ProcessValue(Table):
         default_factory=list[str],
         description="parameters that give it another meaning when they are changed, nobody can tell which",
     )
-    otherwise: str = Field(
-        "means something else", description="what is said where a parameter in `when` has another value"
+    otherwise: str | Wording | None = Field(
+        None,
+        description="what is said where a parameter in `when` has another value; left out: that it means "
+        "something else",
     )
     description: str = ""
 
@@ -241,6 +251,11 @@ class ProcessValue(Table):
     def leaf(self) -> str:
         """Its name below the drive, such as ``actual/frequency``."""
         return f"{self.group}/{self.name}"
+
+    @property
+    def said_otherwise(self) -> Text:
+        """What is said where a parameter in ``when`` has another value."""
+        return _said(self.otherwise) or Text.of("meaning.something_else")
 
     @property
     def word_names(self) -> tuple[str, ...]:
@@ -301,3 +316,9 @@ class ProcessValue(Table):
     def is_conditional(self) -> bool:
         """The drive's parameters say whether there is such a value."""
         return bool(self.code or self.when or self.needs)
+
+
+def _said(words: str | Wording | None) -> Text | None:
+    if isinstance(words, Wording):
+        return words.said
+    return Text.plain(words) if words else None

@@ -9,6 +9,7 @@ from typing import Final, cast
 
 from bridge.base.errors import Fault, FileFaults
 from bridge.config import MODULES, Site, mapping_key, read_site
+from bridge.image.limits import ValueNotTaken
 from bridge.mapping.loader import (
     family_names,
     is_family,
@@ -159,8 +160,8 @@ def _check_outputs(node: RawTable, family: Family, file: TomlFile) -> None:
         elif value != "hold":
             try:
                 known[name].encode(value)
-            except ValueError as error:
-                file.fault(key, str(error), 'a value, or "hold"')
+            except ValueNotTaken as error:
+                file.fault(key, error.said, 'a value, or "hold"')
 
 
 def _check_sdo_channels(node: RawTable, family: Family, file: TomlFile) -> None:

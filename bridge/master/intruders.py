@@ -26,7 +26,7 @@ from bridge.node.node import NodeCore
 from bridge.node.process.command_frames import Command, commands_of
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.wire import Handler
-from bridge.text import Text
+from bridge.text import Said, Text, Words
 
 _AGAIN_S: Final = 10.0
 """How often an intruder that goes on is reported, with the number of frames since the last time."""
@@ -59,7 +59,7 @@ class Intruders:
     ) -> None:
         """``acts`` says whether this bridge is in charge: while another one is, nobody is an intruder."""
         self.count = 0
-        self.last: Text | str = ""
+        self.last: Said = ""
         self._bus = bus
         self._nodes = nodes
         self._events = events
@@ -319,7 +319,7 @@ def _answered(met: Text, stopped: Sequence[NodeCore], nodes: Sequence[NodeCore])
     return Text.of("intruder.answered", what=met, answer=answer)
 
 
-def _named(frame: Frame, what: Text | str) -> Text:
+def _named(frame: Frame, what: Words) -> Text:
     return Text.of("frame.named", what=what, can_id=frame.can_id)
 
 

@@ -8,7 +8,7 @@ from bridge.command import Event, EventQueue, Kind
 from bridge.config import BusTable
 from bridge.master.listening import Listening, Part, listen_s
 from bridge.node.node import NodeCore
-from bridge.text import Text
+from bridge.text import Said, Text
 
 
 class BusMastership:
@@ -36,7 +36,7 @@ class BusMastership:
         return self._listening.is_passive
 
     @property
-    def why_not(self) -> Text | str:
+    def why_not(self) -> Said:
         """Reason why nothing is sent; empty where this bridge acts."""
         if self.acts():
             return ""

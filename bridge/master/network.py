@@ -33,7 +33,7 @@ from bridge.node import nmt_commands as node_commands
 from bridge.node.neighbours import Neighbour
 from bridge.node.node import BUS_IS_DOWN, NodeCore
 from bridge.node.wire import Handler
-from bridge.text import Text, render
+from bridge.text import Text
 
 NOTHING: Final[Mapping[str, Sequence[Download]]] = MappingProxyType({})
 
@@ -411,7 +411,7 @@ class Network:
         self._image.put(f"{top}/held_by", ", ".join(self._gate.missing), now)
         self._watch.refresh(now)
         self._image.put(f"{top}/intruders", self._intruders.count, now)
-        self._image.put(f"{top}/last_intruder", render(self._intruders.last), now)
+        self._image.say(self._image.index[f"{top}/last_intruder"], self._intruders.last, now)
         self._image.put(f"{top}/passive", self.mastership.is_passive, now)
         for node in self.nodes:
             node.wire.refresh(now)

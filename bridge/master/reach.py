@@ -9,7 +9,7 @@ from bridge.command import Commanded
 from bridge.master.farewell import Farewell
 from bridge.master.mastership import BusMastership
 from bridge.node.node import BUS_IS_DOWN, NodeCore
-from bridge.text import Text
+from bridge.text import Said, Text
 
 
 class Reach:
@@ -37,7 +37,7 @@ class Reach:
             for one in node.node.commanded:
                 one.channel.on_sending(why or _why_left_out(node, one), now)
 
-    def _why_not(self, node: NodeCore) -> Text | str:
+    def _why_not(self, node: NodeCore) -> Said:
         """Why no words go to this node; empty where they do."""
         if not self._is_up:
             return BUS_IS_DOWN
@@ -51,12 +51,12 @@ class Reach:
         return _no_words(node)
 
 
-def _why_left_out(node: NodeCore, one: Commanded) -> Text | str:
+def _why_left_out(node: NodeCore, one: Commanded) -> Said:
     """Reason why nothing is sent to ``one`` though its node gets words; empty where it is."""
     return "" if node.wire.carries(one) else _unbooted(node) or node.wire.why_left_out(one)
 
 
-def _unbooted(node: NodeCore) -> Text | str:
+def _unbooted(node: NodeCore) -> Said:
     return "" if node.is_operational else _no_words(node)
 
 

@@ -37,7 +37,7 @@ about as long as a connection may be silent, zenoh can leave a session half open
 that the peer declares, and no query of it is ever answered."""
 _MOST_PENDING: Final = 2000
 """Deltas kept while a snapshot is on its way."""
-UNREACHABLE: Final = "bus process not reachable"
+UNREACHABLE: Final = Text.of("link.unreachable")
 
 _Told = TypeVar("_Told")
 
@@ -139,7 +139,8 @@ class MirrorClient:
         try:
             payload = protocol.encode_request(request, self._clock() + timeout_s)
         except Malformed as error:
-            return Outcome(Code.NOT_VALID, str(error), forwarded=False)
+            said = Text.of("link.not_passed_on", error=str(error))
+            return Outcome(Code.NOT_VALID, said, forwarded=False)
         answers = await self._link.get(self._request_key, payload, timeout_s=timeout_s)
         for answer in answers:
             if answer.ok and (answered := self._read(partial(protocol.decode, Answered), answer.message)):

@@ -15,7 +15,7 @@ from bridge.catalogue.points import CONNECTION_COUNTS
 from bridge.command import Action, Do, Event, Identity, Outcome, Rejection, Request
 from bridge.command.messages.request import COMMANDS
 from bridge.image import Point, Quality, Value
-from bridge.text import Text
+from bridge.text import Said, Text
 
 SNAPSHOT: Final = "mirror/snapshot"
 DELTA: Final = "mirror/delta"
@@ -45,7 +45,7 @@ class Changed(msgspec.Struct, array_like=True, frozen=True):
     """A text where the value is the words of one."""
     quality: Quality
     time: float
-    why: Text | str
+    why: Said
 
 
 class Snapshot(msgspec.Struct, array_like=True, frozen=True):
@@ -162,7 +162,7 @@ def encode_request(request: Request, deadline_s: float) -> bytes:
         who, came = (request.identity, request.target), (request.received_at, request.pressed)
         return _encoder.encode(_Asked(deadline_s, *who, request.action, command, *came))
     except (UnicodeError, OverflowError) as error:
-        raise Malformed(f"cannot be passed on: {error}") from None
+        raise Malformed(str(error)) from None
 
 
 def _encodable(built: object) -> object:

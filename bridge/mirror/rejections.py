@@ -61,6 +61,6 @@ def _both(one: Rejection, other: Rejection) -> Rejection:
         other.target if one.target == other.target else "",
         other.action if one.action == other.action else "",
         other.code if one.code == other.code else "",
-        other.message if one.message == other.message else "",
+        other.said if one.said == other.said else "",
         other.values if is_kind else {},
     )

@@ -27,7 +27,7 @@ class Emergencies:
         self,
         node: Node,
         side: BusSide,
-        reject: Callable[[Frame, str], None],
+        reject: Callable[[Frame, Text], None],
         told: Callable[[Drive, float], None] = lambda drive, now: None,
     ) -> None:
         self._node = node
@@ -41,7 +41,7 @@ class Emergencies:
     def on_frame(self, frame: Frame) -> None:
         emergency = emcy.decode(frame.data)
         if emergency is None:
-            self._reject(frame, "an emergency message has 8 bytes")
+            self._reject(frame, Text.of("frame.emergency_length"))
             return
         byte = self._node.family.emcy.drive_byte
         number = frame.data[byte] if byte is not None and byte < len(frame.data) else None

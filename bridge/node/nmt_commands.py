@@ -12,7 +12,7 @@ from bridge.command.node import Node
 from bridge.node.leaving import Leaving
 from bridge.node.put_off import CANCELS_WORDS
 from bridge.node.wire import NodeWire
-from bridge.text import Text
+from bridge.text import Text, Words
 
 NMT: Final = {
     Action.RESET: NmtCommand.RESET_NODE,
@@ -53,7 +53,7 @@ class CommandedNode(Protocol):
     def was_told(self, command: NmtCommand) -> None: ...
 
     def carry_out_command(
-        self, action: Action, who: Text | str, now: float, *, send: bool = True, at_once: bool = False
+        self, action: Action, who: Words, now: float, *, send: bool = True, at_once: bool = False
     ) -> None: ...
 
 
@@ -112,7 +112,7 @@ def refusal(request: Request, commanded: Sequence[Commanded]) -> Text | None:
 def carry_out(
     node: CommandedNode,
     action: Action,
-    who: Text | str,
+    who: Words,
     now: float,
     *,
     send: bool = True,
@@ -134,7 +134,7 @@ def carry_out(
 
 
 def _nmt(
-    node: CommandedNode, command: NmtCommand, who: Text | str, now: float, *, send: bool, at_once: bool
+    node: CommandedNode, command: NmtCommand, who: Words, now: float, *, send: bool, at_once: bool
 ) -> None:
     """NMT on a node that is switched off goes on the bus and changes nothing here."""
     if command is NmtCommand.START and node.state is not NodeState.OPERATIONAL:

@@ -25,7 +25,7 @@ from bridge.node.process.stop_words import StopWords
 from bridge.node.put_off import CANCELS_WORDS
 from bridge.node.view import NodeView
 from bridge.node.wire import Listener, NodeWire
-from bridge.text import Text
+from bridge.text import Said, Text, Words
 
 _SETTLE_S: Final = 2.0
 _OWN_RESET_S: Final = 30.0
@@ -319,7 +319,7 @@ class NodeCore:
         else:
             self.leaving.send(NmtCommand.STOP, now)
 
-    def enforce(self, action: Action, why: Text | str, now: float) -> None:
+    def enforce(self, action: Action, why: Said, now: float) -> None:
         """Because somebody ignores a stop whose words have been on the bus for long."""
         self.carry_out_command(action, why, now, at_once=self.leaving.has_told(now))
 
@@ -443,7 +443,7 @@ class NodeCore:
     def _show(self, now: float) -> None:
         self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
 
-    def _count_write(self, owner: str, address: str, name: str) -> Text | str:
+    def _count_write(self, owner: str, address: str, name: str) -> Said:
         """The boot-up writes to an EEPROM: counted as of its beginning."""
         ledger, eeprom = self._ledger, self.node.family.eeprom
         cycles = eeprom.cycles if eeprom else None
@@ -451,7 +451,7 @@ class NodeCore:
         return ledger.count((owner, address), name, cycles, self._last_boot)
 
     def carry_out_command(
-        self, action: Action, who: Text | str, now: float, *, send: bool = True, at_once: bool = False
+        self, action: Action, who: Words, now: float, *, send: bool = True, at_once: bool = False
     ) -> None:
         """A command that may be given; ``send`` is false where one frame has told all nodes."""
         self.error_control.forget_boots()

@@ -12,7 +12,7 @@ from bridge.command.node import Node
 from bridge.node.backoff import BackOff
 from bridge.node.boot import BootError
 from bridge.node.bootloop import BootLoop
-from bridge.text import Text
+from bridge.text import Said, Text
 
 
 class NodeView:
@@ -22,15 +22,15 @@ class NodeView:
         self._events = side.events
         self._top = f"{node.name}/node"
         self._failure: tuple[str, Text] | None = None
-        self._success: Text | str = ""
-        self._errors: Text | str = ""
+        self._success: Said = ""
+        self._errors: Said = ""
         self._identification: Identification | None = None
 
     def say(self, said: Text, now: float) -> None:
         """Step or result of the boot-up."""
         self._say("boot_status", said, now)
 
-    def _say(self, leaf: str, said: Text | str, now: float) -> None:
+    def _say(self, leaf: str, said: Said, now: float) -> None:
         self._image.say(self._image.index[f"{self._top}/{leaf}"], said, now)
 
     def is_in(self, state: NodeState, now: float) -> None:
@@ -72,7 +72,7 @@ class NodeView:
             said = Text.of("node.boot_failed", error=error.said)
             self._tell(Kind.CONFIGURATION, 600, said, now)
 
-    def errors(self, said: Text | str, now: float) -> None:
+    def errors(self, said: Said, now: float) -> None:
         """What the node says of its errors, empty where it has none; an event when it is something else."""
         self._say("device_errors", said, now)
         if said and said != self._errors:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
+from bridge.base.sdo_texts import text_of_learned
 from bridge.canopen import cobid, nmt
 from bridge.canopen.duplicate import DuplicateSign
 from bridge.canopen.frame import Frame
@@ -29,7 +30,7 @@ from bridge.node.process.stop_words import StopWords
 from bridge.node.process.tpdo import node_tpdos
 from bridge.node.put_off import PutOff
 from bridge.node.read_back import ReadBack
-from bridge.text import Text
+from bridge.text import Said, Text
 
 Handler = Callable[[Frame], None]
 _SDO_BYTES: Final = 8
@@ -73,7 +74,7 @@ class NodeWire:
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
         self.drives: dict[str, DrivePdos] = {}
-        self._left_out: dict[str, Text | str] = {}
+        self._left_out: dict[str, Said] = {}
         self.outputs: OutputPdos | None = None
         self._emcy_id: int | None = cobid.EMCY + node.table.id
         self.routes: dict[int, Handler] = self._basic_routes()
@@ -176,11 +177,11 @@ class NodeWire:
         sign = self.error_control.on_frame(frame)
         if sign is Sign.MALFORMED:
             self.habits.note(Odd.HEARTBEAT_LENGTH, len(frame.data), 1)
-            self.reject(frame, "an error control message has 1 byte")
+            self.reject(frame, Text.of("frame.error_control_length"))
         else:
             self._listener.on_sign(sign, frame.time)
 
-    def reject(self, frame: Frame, why: str) -> None:
+    def reject(self, frame: Frame, why: Text) -> None:
         """A frame that does not fit: counted, told at most once a minute, nothing changed."""
         self.rejected += 1
         due = self._mapped_bytes.get(frame.can_id, len(frame.data))
@@ -188,7 +189,7 @@ class NodeWire:
             self.habits.note(Odd.TPDO_LENGTH, len(frame.data), due)
         elif frame.can_id == self._emcy_id and len(frame.data) != _EMCY_BYTES:
             self.habits.note(Odd.EMCY_LENGTH, len(frame.data), _EMCY_BYTES)
-        said = Text.of("node.frame_does_not_fit", frame=repr(frame), why=Text.plain(why))
+        said = Text.of("node.frame_does_not_fit", frame=repr(frame), why=why)
         self._events.report(Event(frame.time, Kind.CONFIGURATION, self._node.name, 300, said))
 
     def on_time(self, now: float) -> None:
@@ -204,8 +205,8 @@ class NodeWire:
 
     def _tell_learned(self, now: float) -> None:
         """Something is learned when a transfer ends well, which an answer brings about."""
-        for why in self.sdo.take_learned():
-            said = Text.of("node.no_block_transfer", why=Text.plain(why))
+        for learned in self.sdo.take_learned():
+            said = Text.of("node.no_block_transfer", why=text_of_learned(learned))
             self._events.report(Event(now, Kind.CONFIGURATION, self._node.name, 300, said))
 
     def send_put_off(self, now: float) -> None:

@@ -20,7 +20,7 @@ from bridge.parameter.ledger import Key, Ledger
 from bridge.parameter.names import Names
 from bridge.parameter.protection import Gate
 from bridge.parameter.transfer import Transfer
-from bridge.text import Text
+from bridge.text import Said, Text
 
 FRESH_S: Final = 1.0
 """A value that was read this long ago is what the drive holds: it is not read again before a write."""
@@ -50,12 +50,12 @@ class Written:
     reading: Reading
     before: Value | None
     changed: bool
-    warning: Text | str = ""
+    warning: Said = ""
 
 
 Reads = Generator[Transfer, tuple[bytes, float], Reading]
 Writes = Generator[Transfer, tuple[bytes, float], Written]
-Saves = Generator[Transfer, tuple[bytes, float], Text | str]
+Saves = Generator[Transfer, tuple[bytes, float], Said]
 """Returns the guard's warning, or an empty text."""
 
 
@@ -168,7 +168,7 @@ class DriveParameters:
         try:
             held, now = yield from self._fetch(entry, now, 0.0)
         except ParameterError as error:
-            said = Text.of("parameter.may_be_written", why=Text.plain(error.said))
+            said = Text.of("parameter.may_be_written", why=error.said)
             raise ParameterError(error.why, said, error.abort_code) from None
         if not matches(entry, held, data):
             if lost:
@@ -211,7 +211,7 @@ class DriveParameters:
     def _transfer(self, entry: Entry, data: bytes, gate: Gate, *, of_node: bool) -> Transfer:
         """A write, which passes the gate once more when its turn has come."""
 
-        def why_not() -> str:
+        def why_not() -> Text | None:
             return self.names.protection.why_not(entry, gate)
 
         return Transfer(entry.address, data, of_node, why_not)
@@ -285,7 +285,7 @@ class DriveParameters:
     def _check(self, key: Key, name: str, now: float) -> None:
         self._ledger.check(key, name, now, self._eeprom.cycles if self._eeprom else None)
 
-    def _count(self, key: Key, name: str, now: float) -> Text | str:
+    def _count(self, key: Key, name: str, now: float) -> Said:
         return self._ledger.count(key, name, self._eeprom.cycles if self._eeprom else None, now)
 
     def _wears(self, entry: Entry, now: float) -> Generator[Transfer, tuple[bytes, float], bool]:
@@ -305,11 +305,12 @@ class DriveParameters:
             return True
 
     def _error(self, entry: Entry, failure: TransferFailed) -> ParameterError:
-        hint = self.names.hint(entry.name) if failure.abort_code in MISSING and not entry.definition else ""
+        said = Text.of("parameter.of", owner=entry.name, what=failure.said)
         if failure.abort_code in MISSING and not entry.definition:
-            hint += self.names.set_hint(entry.name)
+            hints = (*self.names.hints(entry.name), *self.names.set_hints(entry.name))
+            said = Text.of("parameter.of_advised", owner=entry.name, what=failure.said, hints=hints)
         why = Why.REFUSED if failure.by_drive else Why.NO_ANSWER
-        return ParameterError(why, f"{entry.name}: {failure}{hint}", failure.abort_code)
+        return ParameterError(why, said, failure.abort_code)
 
 
 def _address(entry: Entry) -> str:

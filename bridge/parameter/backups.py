@@ -24,6 +24,7 @@ from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.names import Names
 from bridge.parameter.protection import Gate
 from bridge.parameter.transfer import Transfer
+from bridge.text import Text
 
 _MOVING: Final = (Effect.COMMANDS, Effect.MAY_MOVE)
 _NO_VALUE: Final = "is neither a number nor a text"
@@ -94,7 +95,7 @@ def settings(names: Names, *, on_first: bool = True) -> list[Entry]:
 def left_out(names: Names, *, on_first: bool = True) -> dict[str, str]:
     """Reasons by name, for what could be set and belongs into no set, because it moves something or may."""
     return {
-        one.name: why
+        one.name: str(why)
         for one in _set(names, on_first)
         if names.protection.effect(one.address) in _MOVING and (why := names.protection.why_no_setting(one))
     }
@@ -138,22 +139,16 @@ def _fitting(names: Names, name: str, seen: dict[ObjectRef, str]) -> Entry:
     entry = names.resolve(name)
     other = seen.setdefault(entry.address, name)
     if other != name:
-        raise ParameterError(
-            Why.OUT_OF_RANGE, f"{other} and {name} are the same parameter: leave one of them out"
-        )
+        raise ParameterError(Why.OUT_OF_RANGE, Text.of("parameter_set.twice", other=other, name=name))
     if entry.definition and not entry.definition.backup:
-        raise ParameterError(
-            Why.PROTECTED,
-            f"{name} is an address, an identity or a command, and no set holds it: remove it, and write "
-            "it by itself where it is to be changed",
-        )
+        raise ParameterError(Why.PROTECTED, Text.of("parameter_set.no_setting", name=name))
     return entry
 
 
 def _check_moves_nothing(names: Names, entry: Entry) -> None:
     """Raises ``ParameterError`` for what no set holds because it moves something."""
     if names.protection.effect(entry.address) in _MOVING and (why := names.protection.why_no_setting(entry)):
-        raise ParameterError(Why.PROTECTED, f"{why}: remove it")
+        raise ParameterError(Why.PROTECTED, Text.of("parameter_set.moves", why=why))
 
 
 def back_up(access: DriveParameters, into: Backup, now: float) -> Steps:
@@ -259,11 +254,12 @@ def identify(into: dict[str, int]) -> Steps:
             data, _ = yield Transfer(ObjectRef(0x1018, sub), of_node=True)
         except TransferFailed as failure:
             if not failure.by_drive:
-                raise ParameterError(Why.NO_ANSWER, f"its identity: {failure}") from None
+                said = Text.of("parameter_set.identity", why=failure.said)
+                raise ParameterError(Why.NO_ANSWER, said) from None
             continue
         found[name] = int.from_bytes(data[:4], "little")
     if into and into != found:
-        raise ParameterError(Why.NOT_CONFIGURED, "another device answers than before (1018h)")
+        raise ParameterError(Why.NOT_CONFIGURED, Text.of("parameter_set.other_device"))
     into |= found
 
 
@@ -384,7 +380,8 @@ def _checked(access: DriveParameters, values: Mapping[str, Value]) -> list[tuple
         except ParameterError as error:
             refused.append(error)
     if refused:
-        raise ParameterError(refused[0].why, "; ".join(map(str, refused)))
+        reasons = tuple(one.said for one in refused)
+        raise ParameterError(refused[0].why, Text.of("parameter_set.refused", reasons=reasons))
     switch = access.ram_switch
 
     def place(pair: tuple[Entry, Value]) -> int:

@@ -10,13 +10,15 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
+from bridge.base.data_type_texts import text_of_misfit
 from bridge.canopen import datatypes, width
-from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, Integer
+from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, DataTypeError, Integer, Misfit
 from bridge.image import Value
 from bridge.image.limits import shown_range
 from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.number_text import NumberError, command_line_number
+from bridge.text import Text
 
 _RAW_SIZES: Final = (1, 2, 4, 8)
 _DIGITS: Final = 9
@@ -33,16 +35,22 @@ def decode(entry: Entry, data: bytes) -> Value:
         return _raw(data)
     kind = definition.data_type
     if kind in NUMBERS and len(data) < NUMBERS[kind].size:
-        found = f"the drive sent {len(data)}: {data.hex(' ').upper()}"
-        what = f"{entry.name} is {kind} with {NUMBERS[kind].size} bytes"
-        raise ParameterError(Why.NOT_CONFIGURED, f"{what}, {found}")
+        said = Text.of(
+            "parameter.too_short",
+            parameter=entry.name,
+            type=kind,
+            size=NUMBERS[kind].size,
+            count=len(data),
+            data=data.hex(" ").upper(),
+        )
+        raise ParameterError(Why.NOT_CONFIGURED, said)
     value = datatypes.decode(kind, data)
     if isinstance(value, str | bool) or (definition.factor == 1.0 and isinstance(value, int)):
         return value
     if isinstance(value, int):
         return round(value * definition.factor, _DIGITS)
     if not math.isfinite(value):
-        raise ParameterError(Why.REFUSED, f"{entry.name}: the drive has no number, but {value}")
+        raise ParameterError(Why.REFUSED, _of(entry, Text.of("parameter.no_number", value=str(value))))
     return value * definition.factor
 
 
@@ -66,13 +74,15 @@ def encode_value(entry: Entry, value: Value, held: bytes | None) -> bytes:
         # A number of 64 bits has more digits than a division leaves it.
         raw = round(number if definition.factor == 1.0 else number / definition.factor)
         if definition.factor == 1.0 and raw != number:
-            raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes whole numbers, not {value}")
+            raise _not_taken(entry, Text.of("takes.whole_numbers", value=str(value)))
         _check_range(entry, raw if definition.factor == 1.0 else round(raw * definition.factor, _DIGITS))
         if definition.states and raw not in definition.states:
-            raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {_shown_states(entry)}")
+            raise _not_taken(entry, Text.of("takes.one_of", choices=_shown_states(entry)))
         return datatypes.encode(kind, raw)
-    except (ValueError, OverflowError) as error:
-        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} = {value!r}: {error}") from None
+    except DataTypeError as error:
+        raise _misfit(entry, value, error) from None
+    except OverflowError:  # an integer of more than 308 digits
+        raise _misfit(entry, value, DataTypeError(Misfit.TOO_LARGE, kind, str(value))) from None
 
 
 def matches(entry: Entry, held: bytes, wanted: bytes) -> bool:
@@ -114,20 +124,21 @@ def parse(entry: Entry, text: str) -> Value:
         if definition is None and error.why == "no_number":
             return text
         if definition and (definition.states or kind == "bool"):
-            takes = _shown_states(entry) if definition.states else "true or false"
-            message = f"{entry.name} takes {takes}, not {text!r}"
-            raise ParameterError(Why.OUT_OF_RANGE, message) from None
-        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name}: {error}") from None
+            given, choices = repr(text), _shown_states(entry)
+            if not choices:
+                raise _not_taken(entry, Text.of("takes.bool", value=given)) from None
+            raise _not_taken(entry, Text.of("takes.choices", choices=choices, value=given)) from None
+        raise ParameterError(Why.OUT_OF_RANGE, _of(entry, error.said)) from None
 
 
 def check_raw(entry: Entry, value: Value) -> None:
     """Raises ``ParameterError`` where ``value`` is not bytes in hexadecimal that the parameter takes."""
     try:
-        data = bytes.fromhex(value) if isinstance(value, str) else None
-    except ValueError:
-        data = None
-    if data is None:
-        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name}: bytes are pairs of hexadecimal digits")
+        if not isinstance(value, str):
+            raise DataTypeError(Misfit.NO_BYTES, "bytes", value)
+        data = datatypes.encode("bytes", value)
+    except DataTypeError as error:
+        raise ParameterError(Why.OUT_OF_RANGE, _of(entry, text_of_misfit(error))) from None
     if entry.definition is not None:
         encode_value(entry, decode(entry, data), data)
 
@@ -153,14 +164,15 @@ def _encode_raw(entry: Entry, value: Value, held: bytes | None) -> bytes:
     if isinstance(value, str):
         try:
             return datatypes.encode("string", value)
-        except ValueError as error:
-            raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name}: {error}") from None
+        except DataTypeError as error:
+            raise ParameterError(Why.OUT_OF_RANGE, _of(entry, text_of_misfit(error))) from None
     whole = isinstance(value, bool | int) or value.is_integer()
     size = len(held) if held is not None else 0
     number = Integer(size, signed=value < 0) if size in _RAW_SIZES else None
-    if number is None or not whole or not number.low <= value <= number.high:
-        what = "a text" if number is None else f"a whole number of {size} bytes"
-        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {what}, not {value}")
+    if number is None:
+        raise _not_taken(entry, Text.of("takes.text", value=str(value)))
+    if not whole or not number.low <= value <= number.high:
+        raise _not_taken(entry, Text.of("takes.bytes", size=size, value=str(value)))
     return number.encode(int(value))
 
 
@@ -172,10 +184,12 @@ def _number(entry: Entry, value: Value) -> int | float:
             if state.lower() == value.strip().lower():
                 return code
     if isinstance(value, bool | str):
-        takes = _shown_states(entry) if definition and definition.states else "a number"
-        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes {takes}, not {value!r}")
+        given, choices = repr(value), _shown_states(entry)
+        if not choices:
+            raise _not_taken(entry, Text.of("takes.number_not", value=given))
+        raise _not_taken(entry, Text.of("takes.choices", choices=choices, value=given))
     if isinstance(value, float) and not math.isfinite(value):
-        raise ParameterError(Why.OUT_OF_RANGE, f"{entry.name} takes a finite number")
+        raise _not_taken(entry, Text.of("takes.finite_number"))
     return value
 
 
@@ -185,11 +199,26 @@ def _check_range(entry: Entry, number: int | float) -> None:
         return
     low, high = definition.low, definition.high
     if (low is not None and number < low) or (high is not None and number > high):
-        unit = f" {definition.unit}" if definition.unit else ""
-        message = f"{entry.name} takes {shown_range(low, high)}{unit}, not {number:.10g}"
-        raise ParameterError(Why.OUT_OF_RANGE, message)
+        allowed, unit, value = shown_range(low, high), definition.unit, f"{number:.10g}"
+        if not unit:
+            raise _not_taken(entry, Text.of("takes.range", range=allowed, value=value))
+        raise _not_taken(entry, Text.of("takes.range_in", range=allowed, unit=unit, value=value))
 
 
-def _shown_states(entry: Entry) -> str:
+def _shown_states(entry: Entry) -> tuple[str, ...]:
     states = entry.definition.states if entry.definition else {}
-    return ", ".join(f"{code} ({state})" for code, state in states.items())
+    return tuple(f"{code} ({state})" for code, state in states.items())
+
+
+def _not_taken(entry: Entry, takes: Text) -> ParameterError:
+    return ParameterError(Why.OUT_OF_RANGE, Text.of("value.of", name=entry.name, said=takes))
+
+
+def _misfit(entry: Entry, value: Value, error: DataTypeError) -> ParameterError:
+    why = text_of_misfit(error)
+    said = Text.of("parameter.value_does_not_fit", parameter=entry.name, value=repr(value), why=why)
+    return ParameterError(Why.OUT_OF_RANGE, said)
+
+
+def _of(entry: Entry, what: Text) -> Text:
+    return Text.of("parameter.of", owner=entry.name, what=what)

@@ -27,7 +27,7 @@ class Why(Enum):
 class ParameterError(Exception):
     """``said`` is one sentence for a human, ``str()`` its English; ``abort_code`` is the drive's, or 0."""
 
-    def __init__(self, why: Why, said: Text | str, abort_code: int = 0) -> None:
+    def __init__(self, why: Why, said: Text, abort_code: int = 0) -> None:
         super().__init__(render(said))
         self.why = why
         self.said = said
@@ -40,7 +40,8 @@ class TransferFailed(Exception):
     ``by_drive``: the drive has said so itself, and has not done what was asked.
     """
 
-    def __init__(self, message: str, abort_code: int, *, by_drive: bool) -> None:
-        super().__init__(message)
+    def __init__(self, said: Text, abort_code: int, *, by_drive: bool) -> None:
+        super().__init__(render(said))
+        self.said = said
         self.abort_code = abort_code
         self.by_drive = by_drive

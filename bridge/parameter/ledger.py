@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.parameter.error import ParameterError, Why
-from bridge.text import Text
+from bridge.text import Said, Text
 
 MOST_WRITES: Final = 10
 WINDOW_S: Final = 600.0
@@ -72,7 +72,7 @@ class Ledger:
                 said = Text.of("eeprom.too_often", name=name, count=most, within=within, left_s=left_s)
                 raise ParameterError(Why.TOO_OFTEN, said)
 
-    def count(self, key: Key, name: str, cycles: int | None, now: float) -> Text | str:
+    def count(self, key: Key, name: str, cycles: int | None, now: float) -> Said:
         """One more write. The warning where it is one of the tenths of ``cycles``, or nothing."""
         count = self._counts.setdefault(key, _Count())
         count.writes += 1

@@ -17,6 +17,7 @@ from bridge.mapping.parameters import indices, object_of
 from bridge.parameter.definition import Entry
 from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.protection import Protection
+from bridge.text import Text
 
 _OBJECT: Final = re.compile(r"(?:0x)?([0-9a-f]{4})h?:(?:0x)?([0-9a-f]{1,2})h?", re.IGNORECASE | re.ASCII)
 _SPELLINGS: Final = (
@@ -68,7 +69,8 @@ class Names:
             return self._entry(definition, None, None)
         found = self._by_pattern(wanted) or self._by_leaf.get(wanted.lower())
         if found is None:
-            raise ParameterError(Why.UNKNOWN_NAME, f"there is no parameter {text!r}{self.hint(wanted)}")
+            said = Text.of("parameter.unknown", name=text, hints=self.hints(wanted))
+            raise ParameterError(Why.UNKNOWN_NAME, said)
         return found
 
     def entries(self) -> Iterator[Entry]:
@@ -146,22 +148,22 @@ class Names:
                 yield self._spelled(name, None, number)
             yield self._spelled(name, place + rule.element_first, number)
 
-    def hint(self, text: str) -> str:
-        """The nearest names and how names look, as the end of a sentence."""
+    def hints(self, text: str) -> tuple[Text, ...]:
+        """The nearest names and how names look."""
         names = {definition.name.upper(): definition.name for definition in self.definitions}
         near = difflib.get_close_matches(text.upper(), names, _NEAREST, 0.5)
-        parts = [f"did you mean {', '.join(names[name] for name in near)}?"] if near else []
+        parts = [Text.of("parameter_name.near", names=tuple(names[name] for name in near))] if near else []
         if self._rule:
-            parts.append(f"names look like {self._rule.example}")
-        return f"; {'; '.join([*parts, 'an object such as 1018:01 is taken too'])}"
+            parts.append(Text.of("parameter_name.example", example=self._rule.example))
+        return (*parts, Text.of("parameter_name.object"))
 
-    def set_hint(self, name: str) -> str:
+    def set_hints(self, name: str) -> tuple[Text, ...]:
         """Hint on how to write a parameter that the file does not list, where each parameter set has its
-        own."""
+        own; none elsewhere."""
         if self._rule is None or not self._rule.set_step or self._pattern is None:
-            return ""
+            return ()
         example = f"{name}.1"
-        return f"; if it depends on the parameter set: {example}" if self._pattern.fullmatch(example) else ""
+        return (Text.of("parameter_name.of_set", example=example),) * bool(self._pattern.fullmatch(example))
 
     def _elements(self, definition: Parameter) -> range | tuple[None]:
         return range(self._first, self._first + definition.elements) if definition.elements else (None,)
@@ -187,13 +189,22 @@ class Names:
 
     def _check(self, definition: Parameter, element: int | None, number: int | None) -> None:
         """Raises ``ParameterError`` where the parameter has no such element or set."""
-        for what, given, first, count in (
-            ("element", element, self._first, definition.elements),
-            ("parameter set", number, 1, definition.sets),
-        ):
-            if given is not None and not first <= given < first + count:
-                has = f"{what}s {first}…{first + count - 1}" if count else f"no {what}s"
-                raise ParameterError(Why.UNKNOWN_NAME, f"{definition.name} has {has}, not {given}")
+        name, first, count = definition.name, self._first, definition.elements
+        if element is not None and not first <= element < first + count:
+            last = first + count - 1
+            raise ParameterError(
+                Why.UNKNOWN_NAME,
+                Text.of("parameter.elements", parameter=name, low=first, high=last, given=element)
+                if count
+                else Text.of("parameter.no_elements", parameter=name, given=element),
+            )
+        if number is not None and not 1 <= number <= definition.sets:
+            raise ParameterError(
+                Why.UNKNOWN_NAME,
+                Text.of("parameter.sets", parameter=name, high=definition.sets, given=number)
+                if definition.sets
+                else Text.of("parameter.no_sets", parameter=name, given=number),
+            )
 
     def _entry(self, definition: Parameter, element: int | None, number: int | None) -> Entry:
         name = self._spelled(definition.name, element, number)

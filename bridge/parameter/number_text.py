@@ -12,6 +12,8 @@ import re
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from bridge.text import Text, render
+
 Language = Literal["en", "de"]
 
 _BLANKS: Final = " \t\u00a0\u2009\u202f"
@@ -37,35 +39,36 @@ _PLAIN: Final[dict[Language, re.Pattern[str]]] = {"en": _plain(r"\.", ","), "de"
 
 
 class NumberError(ValueError):
-    """A text that is no number, or may be two; the message is a sentence for whoever typed it.
+    """A text that is no number, or may be two; ``said`` is for whoever typed it.
 
     ``why`` is ``empty``, ``no_number``, ``other_digits``, ``too_large``, ``ambiguous``, or for the command
     line ``other_notation`` or ``hexadecimal``; ``readings`` are the numbers that the text may mean.
     """
 
     def __init__(self, text: str, why: str, readings: tuple[int | float, ...] = ()) -> None:
-        super().__init__(_sentence(text, why, readings))
+        self.said = _said(text, why, readings)
+        super().__init__(render(self.said))
         self.why = why
         self.readings = readings
 
 
-def _sentence(text: str, why: str, readings: tuple[int | float, ...]) -> str:
-    meant = " or ".join(written(one) for one in readings)
+def _said(text: str, why: str, readings: tuple[int | float, ...]) -> Text:
+    meant = tuple(written(one) for one in readings)
     match why:
         case "empty":
-            return "a number is missing"
+            return Text.of("number.missing")
         case "ambiguous":
-            return f"{text!r} may mean {meant}: write {meant}"
+            return Text.of("number.ambiguous", text=text, readings=meant)
         case "other_notation":
-            return f"{text!r} is not how numbers are written here: write {meant}"
+            return Text.of("number.other_notation", text=text, readings=meant)
         case "other_digits":
-            return f"{text!r}: only the digits 0 to 9 are read"
+            return Text.of("number.other_digits", text=text)
         case "hexadecimal":
-            return f"{text!r}: hexadecimal is for whole numbers without a unit"
+            return Text.of("number.hexadecimal", text=text)
         case "too_large":
-            return f"{text[:_MOST]!r} is too large, or has too many digits"
+            return Text.of("number.too_large", text=text[:_MOST])
         case _:
-            return f"{text[:_MOST]!r} is no number; one is written as 1500, 2.5 or 0x1F"
+            return Text.of("number.none", text=text[:_MOST])
 
 
 @dataclass(frozen=True, slots=True)

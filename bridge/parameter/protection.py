@@ -21,6 +21,7 @@ from bridge.parameter.definition import Entry
 from bridge.parameter.effect import Effect, Verdict, judge
 from bridge.parameter.profiles import effect_of
 from bridge.parameter.transfer import Transfer
+from bridge.text import Text
 
 _PROFILE: Final = 0xFFFF
 """The bits of 1000h that are the number of the profile (CiA 301 §7.5.2.1)."""
@@ -120,70 +121,66 @@ class Protection:
             self._is_device and self.effect(address) is Effect.MAKES_SAFE
         )
 
-    def why_not(self, entry: Entry, gate: Gate) -> str:
-        """Reason why this is not written by whom the gate lets in; empty where it is."""
+    def why_not(self, entry: Entry, gate: Gate) -> Text | None:
+        """Reason why this is not written by whom the gate lets in; None where it is."""
         effect = self.effect(entry.address)
         match judge(effect, is_engineer=gate.is_engineer, is_moving=gate.is_moving()):
             case Verdict.WRITTEN:
-                return ""
+                return None
             case Verdict.NEVER:
                 return self.why_never(entry)
             case Verdict.NOT_AN_ENGINEER:
-                return f"{self._what(entry, effect)}: an engineer may set it"
+                return Text.of("protection.needs_engineer", what=self._what(entry, effect))
             case Verdict.NOT_AT_REST if self._is_device:
-                return f"{entry.name} is not written while an output is active: make it safe first"
+                return Text.of("protection.output_active", parameter=entry.name)
             case Verdict.NOT_AT_REST:
-                return f"{entry.name} is not written while the drive is enabled: stop and disable it first"
+                return Text.of("protection.drive_enabled", parameter=entry.name)
 
-    def why_never(self, entry: Entry) -> str:
-        """Reason why nobody writes it as a parameter; empty where somebody may."""
-        address, effect = entry.address, self.effect(entry.address)
+    def why_never(self, entry: Entry) -> Text | None:
+        """Reason why nobody writes it as a parameter; None where somebody may."""
+        name, address, effect = entry.name, entry.address, self.effect(entry.address)
         if self._read_only:
-            return f"{entry.name} is not written, the device is only read: {self._read_only}"
-        where = "belongs to the communication that the bridge supervises: set it in the site file"
+            return Text.of("protection.device_read_only", parameter=name, why=self._read_only)
         if effect is Effect.BUS and (objects := self.stands_for(address)):
-            names = ", ".join(str(ref) for ref in objects)
-            return f"{entry.name} ({address}) stands for {names}, which {where} ([[bus.node.configure]])"
+            refs = tuple(str(ref) for ref in objects)
+            return Text.of("protection.stands_for", parameter=name, object=str(address), objects=refs)
         if effect is Effect.BUS:
-            return f"{entry.name} {where} ([[bus.node.configure]])"
+            return Text.of("protection.communication", parameter=name)
         if effect is Effect.SHAPES:
-            return (
-                f"{entry.name} changes outputs at once, and what is safe for them: set it in the site file "
-                "([[bus.node.configure]])"
-            )
+            return Text.of("protection.shapes_outputs", parameter=name)
         if effect is not Effect.COMMANDS:
-            return ""
+            return None
         if self._is_device:
-            return f"{entry.name} commands what the node moves: its owner alone does, by process data"
+            return Text.of("protection.commands_outputs", parameter=name)
         if address in self._process:
-            return f"{entry.name} is process data, which the drive's controller alone commands"
-        return f"{entry.name} commands the drive: its controller alone does, by process data"
+            return Text.of("protection.process_data", parameter=name)
+        return Text.of("protection.commands_drive", parameter=name)
 
-    def why_no_setting(self, entry: Entry) -> str:
-        """Reason why no parameter set holds it: a restore would move something. Empty where one may. What an
+    def why_no_setting(self, entry: Entry) -> Text | None:
+        """Reason why no parameter set holds it: a restore would move something. None where one may. What an
         RPDO can carry to a drive moves nothing while that is disabled, and a set is restored only then."""
         effect = self.effect(entry.address)
         if effect is Effect.MAY_MOVE and self._is_device:
-            return f"{entry.name} may move something: no parameter set holds it"
+            return Text.of("protection.in_no_set", parameter=entry.name)
         return self.why_never(entry)
 
-    def why_forced(self, entry: Entry) -> str:
+    def why_forced(self, entry: Entry) -> Text | None:
         """Reason why the command line, which knows no roles, writes it with ``--force`` only, if at all. What
         may move a drive does so only while that is enabled, and then it is not written."""
         effect = self.effect(entry.address)
         if effect is Effect.MAY_MOVE and not self._is_device:
-            return ""
+            return None
         verdict = judge(effect, is_engineer=False, is_moving=False)
         if verdict is Verdict.NOT_AN_ENGINEER:
             return self._what(entry, effect)
         return self.why_never(entry)
 
-    def _what(self, entry: Entry, effect: Effect) -> str:
+    def _what(self, entry: Entry, effect: Effect) -> Text:
         if effect is Effect.SUPERVISES:
-            return f"{entry.name} decides who commands the drive and what supervises it"
+            return Text.of("protection.supervises", parameter=entry.name)
         if effect is Effect.MAKES_SAFE:
-            return f"{entry.name} decides what a stop and a silent bridge do"
-        return f"{entry.name} may move something"
+            return Text.of("protection.makes_safe", parameter=entry.name)
+        return Text.of("protection.may_move", parameter=entry.name)
 
 
 def _profile_of(family: Family) -> int | None:

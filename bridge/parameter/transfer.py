@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bridge.mapping.model import ObjectRef
+from bridge.text import Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,4 +17,4 @@ class Transfer:
     address: ObjectRef
     data: bytes | None = None
     of_node: bool = False
-    why_not: Callable[[], str] | None = None
+    why_not: Callable[[], Text | None] | None = None

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge.base.errors import BridgeError, OperationFailed
-from bridge.text import Text
+from bridge.text import Text, Words
 
 SIGN_PERIOD_S: Final = 1.0
 _SILENT_LOOKS: Final = 5
@@ -265,7 +265,7 @@ def shortened(reason: str) -> str:
 
 
 def _how(code: int, reason: str) -> Text:
-    how: Text | str = Text.of("front.exit_status", code=code)
+    how: Words = Text.of("front.exit_status", code=code)
     if code < 0:
         with contextlib.suppress(ValueError):
             how = signal.Signals(-code).name

@@ -17,7 +17,7 @@ from bridge.base.quietlog import log_source
 from bridge.base.ratelimit import Pauses
 from bridge.command import Event, Kind, Plant
 from bridge.service.front_process import shortened
-from bridge.text import Text, render
+from bridge.text import Said, Text, render
 
 _log = logging.getLogger(__name__)
 
@@ -117,7 +117,7 @@ class Supervisor:
         return f"{self._status}; not served: {render(failing)}" if failing else self._status
 
     @property
-    def _failing_said(self) -> Text | str:
+    def _failing_said(self) -> Said:
         """Empty where all serve."""
         parts = tuple(
             Text.of("front.fails", front=name, how=self._failing[name]) for name in sorted(self._failing)

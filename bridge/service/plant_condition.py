@@ -13,7 +13,7 @@ from bridge.condition.layout import layout_of
 from bridge.condition.own_faults import with_faults
 from bridge.condition.told import condition, recent_json, troubles_json
 from bridge.condition.troubles import Troubles
-from bridge.text import Text
+from bridge.text import Said, Text
 
 LOOK_EVERY_S: Final = 0.5
 _PORTION: Final = 20
@@ -97,13 +97,16 @@ class PlantCondition:
                 self._plant.report(Event(now, Kind.CAUSE, source, severity, said))
         self._told_causes = present
 
-    def because(self, event: Event) -> Text | str:
+    def because(self, event: Event) -> Said:
         """Cause of an event as a phrase; empty where none is known."""
         kind = _NOTICED.get(event.kind)
         if kind is None or event.source == "bridge" or event.severity < _NO_NEWS:
             return ""
         cause = self.troubles.cause_of(Trouble(Rank.ALARM, kind, event.source), self._clock() * 1000)
-        return _said(cause) or f"{cause.kind.replace('_', ' ')} at {cause.place}" if cause else ""
+        if cause is None:
+            return ""
+        kind = Text.word("trouble", cause.kind)
+        return _said(cause) or Text.of("cause.at_place", kind=kind, place=cause.place)
 
 
 def _said(trouble: Trouble) -> Text | None:

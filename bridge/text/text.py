@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from bridge.text.templates import Part, templates
 
 PLAIN: Final = "plain"
-"""Code of a sentence that has none."""
+"""Code of words that are somebody else's: of a drive's maker, the site file, or an operating system."""
 _JOINED_BY: Final = ", "
+
+BOTH: Final = "both"
+"""Code of a sentence whose facts are its wordings by language: each template has its own of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +41,26 @@ class Text:
         return render(self)
 
     @classmethod
-    def plain(cls, said: Text | str) -> Text:
-        """An English sentence that has no code; a text as it is."""
-        return said if isinstance(said, Text) else cls(PLAIN, (("text", said),))
+    def plain(cls, words: Words) -> Text:
+        """Somebody else's words, which have no code; a text as it is."""
+        return words if isinstance(words, Text) else cls(PLAIN, (("text", words),))
+
+    @classmethod
+    def both(cls, en: str, de: str) -> Text:
+        """A sentence of a mapping file in both languages."""
+        return cls(BOTH, (("en", en), ("de", de)))
 
 
+Said = Text | Literal[""]
+"""A text, or nothing where there is none."""
+Words = Text | str
+"""A text, or a name or somebody else's words, which are the same in every language."""
 Fact = str | int | float | Text | tuple[Text | str, ...]
 """A string is a name or somebody else's words, which are the same in every language."""
 
 
-def as_json(said: Text | str) -> dict[str, Any] | None:
-    """``{"code": …, "facts": {…}}``, also of the texts among the facts; None of a sentence without a code."""
+def as_json(said: Words) -> dict[str, Any] | None:
+    """``{"code": …, "facts": {…}}``, also of the texts among the facts; None of words without a code."""
     return None if isinstance(said, str) or said.code == PLAIN else _object_of(said)
 
 
@@ -64,7 +76,7 @@ def _json_of(fact: Fact) -> object:
     return [_json_of(one) for one in fact] if isinstance(fact, tuple) else fact
 
 
-def render(said: Text | str, language: str = "en") -> str:
+def render(said: Words, language: str = "en") -> str:
     """``said`` in words; a string is somebody's words already. Raises KeyError for a code that has no
     template and for facts that a template lacks."""
     if isinstance(said, str):
@@ -77,7 +89,7 @@ def render(said: Text | str, language: str = "en") -> str:
 
 
 @lru_cache(maxsize=1024)
-def in_english(said: Text | str) -> str:
+def in_english(said: Words) -> str:
     """As ``render``, and remembered: for what many points have in common and is shown again and again."""
     return render(said)
 

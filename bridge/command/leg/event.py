@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from bridge.command.leg.state import Way
 from bridge.command.messages.request import Identity, Request
 from bridge.drive import DriveState
-from bridge.text import Text
+from bridge.text import Words
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class Report:
 
     state: DriveState
     is_taken: bool
-    fault: Text | str
+    fault: Words
 
 
 @dataclass(frozen=True, slots=True)

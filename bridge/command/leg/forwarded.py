@@ -10,7 +10,7 @@ from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import Output, Way
 from bridge.command.messages.request import Code, Outcome
-from bridge.text import Text
+from bridge.text import Said, Text
 
 SILENT: Final = Text.of("request.silent")
 SENT_BEFORE: Final = Text.of("request.sent_before")
@@ -38,7 +38,7 @@ class Edge(NamedTuple):
 Asked = Words | Stop | Edge
 
 
-def why_not(settings: LegSettings, asked: Asked, way: Way, sent: Output) -> Text | str:
+def why_not(settings: LegSettings, asked: Asked, way: Way, sent: Output) -> Said:
     """The reason why the bus does not say what is asked, where ``sent`` goes this ``way``; empty where it
     does."""
     if way.why_unsent:
@@ -76,10 +76,10 @@ def judged(
     return [_not_forwarded(one, why) if isinstance(one, Answer) else one for one in effects]
 
 
-def _not_forwarded(answer: Answer, why: Text | str) -> Answer:
+def _not_forwarded(answer: Answer, why: Said) -> Answer:
     if answer.is_refused or not answer.outcome.forwarded:
         return answer
     done = answer.outcome.said
     if done:
-        why = Text.of("request.and_not_sent", done=Text.plain(done), why=Text.plain(why))
+        why = Text.of("request.and_not_sent", done=done, why=why)
     return Answer(Outcome(Code.OK, why, forwarded=False))

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from bridge.command.messages.request import Identity
 from bridge.drive import DriveState
-from bridge.text import Text
+from bridge.text import Said
 
 
 class Stage(StrEnum):
@@ -186,10 +186,10 @@ class Way(NamedTuple):
     the bus at all, empty where they are."""
 
     is_open: bool
-    why: Text | str
-    why_unplaced: Text | str = ""
+    why: Said
+    why_unplaced: Said = ""
     is_heard: bool = False
-    why_unsent: Text | str = ""
+    why_unsent: Said = ""
 
 
 class LegState(NamedTuple):

@@ -72,7 +72,9 @@ def initial(settings: LegSettings) -> LegState:
     rest = settings.resting or (0,) * settings.setpoints
     stopped = settings.words.stopped
     timer = Timer(settings.timeout_ms)
-    way = Way(is_open=False, why="the drive's node is not seen yet")
+    way = Way(
+        is_open=False, why=Text.of("node.state_of_drives", state=Text.word("node_state", "not seen yet"))
+    )
     sent = Output((stopped, *rest))
     return LegState(way=way, timer=timer, word=stopped, sent=sent, setpoints=rest, rest=rest)
 

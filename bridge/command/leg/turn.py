@@ -91,9 +91,9 @@ class Turn:
         if self.is_tripped:
             return Text.of("request.tripped")
         if self.way.why:
-            return Text.plain(self.way.why)
+            return self.way.why
         if self.way.why_unplaced and not self.is_commanded:
-            return Text.plain(self.way.why_unplaced)
+            return self.way.why_unplaced
         return Text.of("request.interlocked")
 
     # what several deeds do

@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Final
 
 from bridge.base.ratelimit import PerSecond
-from bridge.text import Text, render
+from bridge.text import Said, render
 
 
 class Kind(StrEnum):
@@ -35,8 +35,8 @@ class Event:
     kind: Kind
     source: str
     severity: int
-    said: Text | str
-    because: Text | str = ""
+    said: Said
+    because: Said = ""
 
     @property
     def message(self) -> str:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final
 
 from bridge.catalogue.codes import Source as Source
 from bridge.image import Value
-from bridge.text import Text, render
+from bridge.text import Said, Text, render
 
 
 class Role(IntEnum):
@@ -143,7 +143,7 @@ class Outcome:
     """
 
     code: Code
-    said: Text | str = ""
+    said: Said = ""
     forwarded: bool = True
     value: Value | None = None
     time: float = 0.0
@@ -162,9 +162,9 @@ class Outcome:
 DONE = Outcome(Code.OK)
 
 
-def refused(action: Action, who: str, why: Text | str) -> Text:
+def refused(action: Action, who: str, why: Said) -> Text:
     """The event about a request that is refused."""
-    return Text.of("request.refused", action=Text.word("action", action), who=who, why=Text.plain(why))
+    return Text.of("request.refused", action=Text.word("action", action), who=who, why=why)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from bridge.command.messages.request import Code
 from bridge.drive import ControlWords, Meanings, ParameterSet, ValueCodec, Written, codecs
 from bridge.image import Value
+from bridge.image.limits import ValueNotTaken
 from bridge.mapping.model import Family, Slot
-from bridge.text import Text, render
+from bridge.text import Said, Text, render
 
 _WORD_MASK = 0xFFFF
 
@@ -18,10 +19,10 @@ _WORD_MASK = 0xFFFF
 class Refusal(Exception):
     """A request is not carried out and changes nothing; ``code`` and ``said`` are its outcome."""
 
-    def __init__(self, code: Code, said: Text | str) -> None:
+    def __init__(self, code: Code, said: Said) -> None:
         super().__init__(said)
         self.code = code
-        self.said = said
+        self.said: Said = said
 
     def __str__(self) -> str:
         return render(self.said)
@@ -208,7 +209,7 @@ class TelegramDecoder:
         return tuple(kept)
 
 
-def _not_configured(leaf: str, why: Text | str) -> Refusal:
+def _not_configured(leaf: str, why: Said) -> Refusal:
     said = Text.of("telegram.not_configured", leaf=leaf, why=why)
     return Refusal(Code.NOT_CONFIGURED, said)
 
@@ -218,8 +219,15 @@ def _from_value(codec: ValueCodec, value: Value) -> tuple[Written, ...]:
     is_bit = model.bit is not None and isinstance(value, bool)
     try:
         return codec.to_words(int(value) if is_bit else _as_number(model.name, value))
-    except ValueError as error:
-        raise Refusal(Code.OUT_OF_RANGE, f"{model.name} {error} {model.unit}".rstrip()) from None
+    except ValueNotTaken as error:
+        raise not_taken(model.name, error, model.unit) from None
+
+
+def not_taken(leaf: str, error: ValueNotTaken, unit: str) -> Refusal:
+    """Refusal of a value that ``leaf``, which is in ``unit``, does not take."""
+    if unit:
+        return Refusal(Code.OUT_OF_RANGE, Text.of("value.of_unit", name=leaf, said=error.said, unit=unit))
+    return Refusal(Code.OUT_OF_RANGE, Text.of("value.of", name=leaf, said=error.said))
 
 
 def _as_number(leaf: str, value: object) -> float:

@@ -24,7 +24,7 @@ from typing import Final
 
 from bridge.command.stop_check.state import LastStop, Verdict
 from bridge.mapping.fields import ObjectRef
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _AGAIN_S: Final = 1.0
 """Pause before what was ignored, or has not been answered, is read again."""
@@ -67,7 +67,7 @@ class Answer:
     said so, or because it was silent."""
 
     raw: int | None
-    why: Text | str = ""
+    why: Said = ""
     was_silent: bool = False
 
 
@@ -77,7 +77,7 @@ class _Seen:
 
     raw: int | None = None
     at: float = -inf
-    why: Text | str = ""
+    why: Said = ""
 
 
 class OutputStopCheck:
@@ -89,7 +89,7 @@ class OutputStopCheck:
     def __init__(self) -> None:
         self.last_stop = LastStop.NONE
         self.follows = True
-        self.why: Text | str = ""
+        self.why: Said = ""
         self.awaits_sending = False
         """Another stop is to be sent, and has not been handed to the bus yet."""
         self.is_owed = False

@@ -19,7 +19,7 @@ from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_plan import PdoPlan
 from bridge.node.boot.status import BootError
-from bridge.text import Text
+from bridge.text import Said, Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ class DeviceErrors:
 
     register: int = 0
     codes: tuple[int, ...] = ()
-    said: Text | str = ""
+    said: Said = ""
 
     @property
     def cause(self) -> tuple[int, int]:
@@ -119,7 +119,7 @@ class DrivePlan:
 
     rpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
     tpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
-    problem: Text | str = ""
+    problem: Said = ""
     unserved: dict[str, Text] = field(default_factory=dict[str, Text])
 
     def leave_out(self, why: Text) -> None:
@@ -160,7 +160,7 @@ class BootResult:
     outputs: SignalPlan | None = None
     held: dict[str, int] = field(default_factory=dict[str, int])
     """What outputs hold that are to hold it, as integers without sign, by their names."""
-    bridge_stop: tuple[int, Text | str] = (0, "")
+    bridge_stop: tuple[int, Said] = (0, "")
     """Longest time in ms from the bridge's hang to outputs that the node itself has made safe; 0 with the
     reason where there is none."""
     notes: list[Text] = field(default_factory=list[Text])

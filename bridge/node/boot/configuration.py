@@ -21,7 +21,7 @@ from bridge.node.boot.actions import Action, BootResult, Do, Step, number, told_
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_downloads import download_pdo, is_pdo, pdo_parameter
 from bridge.node.boot.status import BootError
-from bridge.text import Text
+from bridge.text import Text, Words
 
 _VERIFY: Final = 0x1020
 _STORE: Final = 0x1010
@@ -187,7 +187,7 @@ def _write(download: Download, have: bytes | None = None) -> Do:
             )
 
 
-def _shown(data: bytes | None) -> Text | str:
+def _shown(data: bytes | None) -> Words:
     """A value as people write it: a number up to eight bytes, else its bytes."""
     if data is None:
         return Text.of("boot.nothing")

@@ -24,7 +24,7 @@ from bridge.node.boot.actions import (
     wish,
 )
 from bridge.node.boot.status import BootError
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _REGISTER: Final = 0x1001
 _HISTORY: Final = 0x1003
@@ -72,14 +72,11 @@ def _number(data: bytes | None, size: int) -> int:
     return width.unsigned(data, size) if data and len(data) <= _LONGEST else 0
 
 
-def _text(node: Node, register: int, codes: list[int]) -> Text | str:
+def _text(node: Node, register: int, codes: list[int]) -> Said:
     if not register:
         return ""
-    bits = Text.plain(emcy_codes.register_text(register))
+    bits = emcy_codes.register_text(register)
     if not codes:
         return Text.of("boot.error_register", register=register, bits=bits)
-    named = tuple(
-        Text.of("boot.kept_error", number=code, text=Text.plain(node.family.emcy.text(code)))
-        for code in codes
-    )
+    named = tuple(Text.of("boot.kept_error", number=code, text=node.family.emcy.text(code)) for code in codes)
     return Text.of("boot.kept_errors", register=register, bits=bits, errors=named)

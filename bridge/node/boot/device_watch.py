@@ -18,7 +18,7 @@ from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, judge
 from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.actions import Action, BootResult, Step, number
 from bridge.node.boot.own_supervision import bring_node
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _DIGITAL: Final = range(0x6200, 0x6400)
 """CiA 401: one bit of error mode and error value for each output. Analogue ones have a number each."""
@@ -51,19 +51,20 @@ def judge_outputs(
             why = yield from read_why_not_safe(place, place.safe)
     accepted = node.table.outputs.accepts.runs_on or ""
     result.own[node.name] = replace(keeps_outputs(own, why) if why else own, accepted=accepted)
-    result.bridge_stop = (0, accepted or why) if why else (own.bridge_ms, "")
+    stays = Text.plain(accepted) if accepted else why
+    result.bridge_stop = (0, stays) if why else (own.bridge_ms, "")
     if why and not accepted:
         result.notes.append(Text.of("boot.outputs_not_safe", why=why))
 
 
-def read_why_not_safe(place: Place, safe: int) -> Generator[Read, bytes | None, Text | str]:
+def read_why_not_safe(place: Place, safe: int) -> Generator[Read, bytes | None, Said]:
     """As ``why_not_safe``, by what the node holds."""
     mode = yield from _number(place.output.error_mode)
     value = yield from _number(place.output.error_value)
     return why_not_safe(place, safe, mode, value)
 
 
-def why_not_safe(place: Place, safe: int, mode: int | None, value: int | None) -> Text | str:
+def why_not_safe(place: Place, safe: int, mode: int | None, value: int | None) -> Said:
     """Why this output does not take its safe value when the node leaves Operational; empty where it does.
     ``mode`` and ``value`` are what error mode and error value hold, None where that is not known."""
     output = place.output
@@ -85,7 +86,7 @@ def why_not_safe(place: Place, safe: int, mode: int | None, value: int | None) -
     return ""
 
 
-def keeps_outputs(own: OwnJudgement, why: Text | str, *, is_known: bool = True) -> OwnJudgement:
+def keeps_outputs(own: OwnJudgement, why: Said, *, is_known: bool = True) -> OwnJudgement:
     """The same for a node that notices a silent bridge, and does not make all of its outputs safe."""
     verdict = OwnVerdict.RUNS_ON if is_known else OwnVerdict.UNKNOWN
     watches = [

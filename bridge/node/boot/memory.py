@@ -11,7 +11,7 @@ from bridge.canopen.sync import LAST_SYNCHRONOUS
 from bridge.config.download import COMMANDS
 from bridge.mapping.aliases import COMMUNICATION
 from bridge.node.boot.pdo_plan import PdoPlan
-from bridge.text import Text
+from bridge.text import Said
 
 _RPDOS: Final = 2
 """Identifiers that are remembered of one RPDO: a node that lies does not fill the memory."""
@@ -20,12 +20,12 @@ _RESETS: Final = 3
 """Errors in a row for which a node that does not start is reset: one with ever new ones is left alone."""
 
 
-CountWrite = Callable[[str, str, str], Text | str]
+CountWrite = Callable[[str, str, str], Said]
 """One more write to an EEPROM: owner, object, name. Returns a warning or an empty text, and raises
 ``ParameterError`` where it is one too many (``parameter.ledger``)."""
 
 
-def _not_counted(owner: str, address: str, name: str) -> str:
+def _not_counted(owner: str, address: str, name: str) -> Said:
     del owner, address, name
     return ""
 

@@ -19,7 +19,7 @@ from bridge.node.boot.actions import Action, BootResult, Do, Step, told_as, wish
 from bridge.node.boot.status import BootError
 from bridge.node.places.sdo_channels import FIRST, channel_of
 from bridge.parameter import ParameterError
-from bridge.text import Text
+from bridge.text import Said, Text
 
 Raws = dict[tuple[int, int], int]
 
@@ -124,9 +124,9 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
         try:
             warning = memory.count_write(owner, str(place.ref).upper(), place.name)
         except ParameterError as error:
-            raise BootError("J", Text.of("boot.of", owner=owner, what=Text.plain(error.said))) from None
+            raise BootError("J", Text.of("boot.of", owner=owner, what=error.said)) from None
         if warning:
-            result.notes.append(Text.plain(warning))
+            result.notes.append(warning)
 
     def refused(error: SdoError) -> BootError:
         memory.note_not_kept(tried, place.ref.sub, data)
@@ -159,7 +159,7 @@ def _wears(family: Family, place: OwnPlace) -> bool:
 
 def _note_who_runs_on(node: Node, result: BootResult) -> None:
     """One note for all drives of the node about which the same is to be said."""
-    names: dict[Text | str, list[str]] = {}
+    names: dict[Said, list[str]] = {}
     for drive in node.drives:
         own = result.own[drive.name]
         if own.verdict is OwnVerdict.RUNS_ON and not own.accepted:

@@ -141,7 +141,7 @@ def parameter_value(parameter: Parameter, data: bytes) -> float:
         raise NotANumber(said)
     try:
         return round(number.decode(data) * parameter.factor, 9)
-    except ValueError as error:
+    except ValueError:
         name, kind = parameter.name, parameter.data_type
-        said = Text.of("boot.parameter_bytes", parameter=name, type=kind, why=Text.plain(str(error)))
+        said = Text.of("boot.parameter_bytes", parameter=name, type=kind, count=len(data))
         raise NotANumber(said) from None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bridge.base.sdo_texts import text_of
-from bridge.canopen.pdo import MappingError
+from bridge.canopen.pdo import MOST_BITS, MOST_BYTES, MappingError, PdoEntry
 from bridge.canopen.sdo import SdoError
 from bridge.text import Text, render
 
@@ -26,5 +26,7 @@ def why_unusable(error: MappingError | SdoError) -> Text:
             return error.said
         case SdoError():
             return text_of(error)
-        case _:
-            return Text.plain(str(error))
+        case MappingError(entry=PdoEntry() as entry):
+            return Text.of("boot.entry_bits", entry=str(entry), most=MOST_BITS)
+        case MappingError(length=length):
+            return Text.of("boot.pdo_too_long", length=length, most=MOST_BYTES)

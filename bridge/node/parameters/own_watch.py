@@ -11,7 +11,7 @@ from bridge.image import Value
 from bridge.mapping.own_places import OwnPlace, ends_own_watch, places
 from bridge.parameter import Entry, ParameterError
 from bridge.parameter.codec import encode_value
-from bridge.text import Text
+from bridge.text import Said, Text
 
 
 class OwnWatch:
@@ -22,7 +22,7 @@ class OwnWatch:
         self._protection = node.names.protection
         self._places = {drive.name: places(drive.family) for drive in node.drives}
 
-    def why_kept(self, drive: HasParameters, entry: Entry, value: Value) -> Text | str:
+    def why_kept(self, drive: HasParameters, entry: Entry, value: Value) -> Said:
         """Why this is not written: a drive of the site is stopped by silence, and would not stop."""
         key = entry.address.index, entry.address.sub
         silent: list[str] = []

@@ -6,9 +6,11 @@ from collections.abc import Callable, Generator
 from functools import partial
 from typing import TypeVar
 
+from bridge.base.sdo_texts import text_of
 from bridge.canopen.dialogue import Dialogue
 from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
 from bridge.parameter import ParameterError, Transfer, TransferFailed, Why
+from bridge.text import Text
 
 T = TypeVar("T")
 Procedure = Generator[Transfer, tuple[bytes, float], T]
@@ -28,7 +30,7 @@ def run(
 
     ``clock`` gives the latest known time in monotonic seconds. A value is as old as the request that read it.
     """
-    refused: list[str] = []
+    refused: list[Text] = []
     """Why the write that is under way was not begun."""
 
     def carry_out(transfer: Transfer, now: float) -> bool:
@@ -61,7 +63,7 @@ def run(
         if refused:
             dialogue.go_on(ParameterError(Why.PROTECTED, refused.pop()), clock())
         elif isinstance(result, SdoError):
-            failure = TransferFailed(str(result), result.code, by_drive=result.by_server)
+            failure = TransferFailed(text_of(result), result.code, by_drive=result.by_server)
             dialogue.go_on(failure, clock())
         else:
             dialogue.go_on((result, asked), clock())

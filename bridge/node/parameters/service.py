@@ -48,7 +48,7 @@ from bridge.parameter import (
 )
 from bridge.parameter.codec import check_raw, decode, shown
 from bridge.parameter.protection import Gate
-from bridge.text import Text
+from bridge.text import Said, Text
 
 _CODES: Final = {
     Why.UNKNOWN_NAME: Code.UNKNOWN_PARAMETER,
@@ -288,7 +288,7 @@ class NodeParameters:
         except ParameterError as error:
             return error
 
-    def _on_saved(self, conclude: Reply, result: Text | str | ParameterError) -> None:
+    def _on_saved(self, conclude: Reply, result: Said | ParameterError) -> None:
         if isinstance(result, ParameterError):
             conclude(_failed(result))
             return
@@ -309,9 +309,9 @@ class NodeParameters:
     def _tell(self, source: str, severity: int, said: Text) -> None:
         self._events.report(Event(self._now, Kind.CONFIGURATION, source, severity, said))
 
-    def _warn(self, source: str, warning: Text | str) -> None:
+    def _warn(self, source: str, warning: Said) -> None:
         if warning:
-            self._tell(source, 600, Text.plain(warning))
+            self._tell(source, 600, warning)
 
     # points
 
@@ -351,5 +351,5 @@ def _failed(error: ParameterError) -> Outcome:
     return Outcome(_CODES[error.why], error.said, forwarded=False, abort_code=error.abort_code)
 
 
-def _no(code: Code, why: Text | str) -> Outcome:
+def _no(code: Code, why: Said) -> Outcome:
     return Outcome(code, why, forwarded=False)

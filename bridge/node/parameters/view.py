@@ -89,4 +89,4 @@ class ParameterView:
             quality = Quality.CONFIG_ERROR
         else:
             quality = Quality.STALE if had_value else Quality.WAITING
-        self._image.judge((index,), quality, now, str(error))
+        self._image.judge((index,), quality, now, error.said)

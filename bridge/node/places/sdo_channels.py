@@ -11,6 +11,7 @@ from typing import Final, NamedTuple
 from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoChannel
+from bridge.canopen.sdo_block import Learned
 from bridge.catalogue import NodeSpec
 from bridge.command import HasParameters
 from bridge.command.node import Node
@@ -90,7 +91,7 @@ class SdoChannels:
         """Frames on the reply COB-IDs that were no answer."""
         return sum(channel.unmatched for channel in self._all)
 
-    def take_learned(self) -> list[str]:
+    def take_learned(self) -> list[Learned]:
         """Why block transfer is not used any more on a channel, once for each."""
         return [why for channel in self._all if (why := channel.take_learned())]
 

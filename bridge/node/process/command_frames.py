@@ -11,7 +11,7 @@ from bridge.node.boot import rpdo_plan
 from bridge.node.process.outputs import OutputPdos, OutputRpdo
 from bridge.node.process.process_data import DrivePdos, Rpdo
 from bridge.node.process.stop_words import StopWords
-from bridge.text import Text
+from bridge.text import Text, Words
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Command:
     words: ControlWords
     rpdo: Rpdo | OutputRpdo
 
-    def said(self, data: bytes) -> Text | str:
+    def said(self, data: bytes) -> Words:
         """The words for what ``data`` asks of the drive; bytes where that is nothing."""
         raw = data.hex(" ").upper()
         word = self.rpdo.control_word(data)

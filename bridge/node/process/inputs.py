@@ -10,8 +10,9 @@ from bridge.canopen.sync import tpdo_deadline_s
 from bridge.command.device import Device, InputPdo
 from bridge.mapping.fields import ObjectRef
 from bridge.node.boot import PdoPlan, SignalPlan
+from bridge.text import Text
 
-Reject = Callable[[Frame, str], None]
+Reject = Callable[[Frame, Text], None]
 
 
 def connect_inputs(
@@ -35,7 +36,7 @@ def _input_pdo(tpdo: PdoPlan, sync_period_ms: int) -> InputPdo:
 def _on_frame(device: Device, place: int, tpdo: PdoPlan, reject: Reject, frame: Frame) -> None:
     length = tpdo.codec.length
     if len(frame.data) != length:
-        reject(frame, f"{length} bytes are mapped")
+        reject(frame, Text.of("frame.bytes_mapped", length=length))
         if len(frame.data) < length:
             return
     device.on_data(place, tpdo.codec.unpack(frame.data[:length]), frame.time)

@@ -21,7 +21,7 @@ from bridge.node.places.words import WordMap
 from bridge.node.process.held import held_s
 from bridge.text import Text
 
-Reject = Callable[[Frame, str], None]
+Reject = Callable[[Frame, Text], None]
 
 
 class Repetition(NamedTuple):
@@ -114,7 +114,7 @@ class Tpdo:
         data = frame.data
         length = self._length
         if len(data) != length:
-            self._reject(frame, f"{length} bytes are mapped")
+            self._reject(frame, Text.of("frame.bytes_mapped", length=length))
             if len(data) < length:
                 return None
             # CiA 301 §7.2.2.5: of a PDO that is too long the mapped bytes count.

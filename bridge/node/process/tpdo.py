@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 from bridge.canopen.frame import Frame
 from bridge.canopen.sync import tpdo_deadline_s
 from bridge.node.boot import NodePdoPlan
+from bridge.text import Text
 
 Show = Callable[[str, int, float, float], None]
-Reject = Callable[[Frame, str], None]
+Reject = Callable[[Frame, Text], None]
 
 
 def node_tpdos(
@@ -40,7 +41,7 @@ class NodeTpdo:
     def on_frame(self, frame: Frame) -> None:
         length = self._codec.length
         if len(frame.data) != length:
-            self._reject(frame, f"{length} bytes are mapped")
+            self._reject(frame, Text.of("frame.bytes_mapped", length=length))
             if len(frame.data) < length:
                 return
         values = self._codec.unpack(frame.data[:length])

@@ -37,6 +37,7 @@ from bridge.northbound.modbus.registers import BRIDGE_UNITS, MIRROR, Table, Word
 from bridge.northbound.modbus.unit import BridgeUnit, Unit
 from bridge.northbound.modbus.units import Units
 from bridge.northbound.view import View
+from bridge.text import Text
 
 _log = logging.getLogger(__name__)
 
@@ -105,8 +106,10 @@ class Dispatcher:
         for device in units.devices:
             self._names[device.unit_id] = device.device_name
             self._units[device.unit_id] = DeviceUnit(device, view, words32)
-        known = _ranges(self._names) or "no drives"
-        self._served = f"this site has {known}, and {BRIDGE_UNITS[0]} for the bridge itself"
+        known, own = _ranges(self._names), BRIDGE_UNITS[0]
+        self._served = (
+            Text.of("modbus.units", units=known, own=own) if known else Text.of("modbus.no_units", own=own)
+        )
         for unit_id in BRIDGE_UNITS:
             self._units[unit_id] = BridgeUnit(units, view)
 
@@ -137,24 +140,24 @@ class Dispatcher:
     def _note_refusal(self, unit_id: int, function: int, caller: Identity, code: ExceptionCode) -> None:
         """A write that was refused before it became a request, for the audit log and the events."""
         target = self._names.get(unit_id, f"unit {unit_id}")
-        ending, message = _CODES.get(code, Code.NOT_READY), self._why(unit_id)
+        ending, said = _CODES.get(code, Code.NOT_READY), self._why(unit_id)
         if unit_id in BRIDGE_UNITS:
             ending = Code.READ_ONLY
-        message = message or f"function {function} refused with exception {code.value:02X}h"
-        self._view.rejected(Rejection(caller, target, Action.WRITE, ending, message))
+        said = said or Text.of("modbus.refused", function=function, exception=code.value)
+        self._view.rejected(Rejection(caller, target, Action.WRITE, ending, said))
 
     def _note_unknown(self, unit_id: int, caller: Identity) -> None:
         """A PLC that asks for a unit which is not there is set up wrongly, and shows its user a number."""
         source, why = source_of(caller.user), self._why(unit_id)
         _log.warning("Modbus: %s is refused: %s", caller.address, why, extra=log_source(source, unit_id))
 
-    def _why(self, unit_id: int) -> str:
-        """Reason why nothing can be written to a unit id; empty for that of a drive or device."""
+    def _why(self, unit_id: int) -> Text | None:
+        """Reason why nothing can be written to a unit id; None for that of a drive or device."""
         if unit_id in self._names:
-            return ""
+            return None
         if unit_id in BRIDGE_UNITS:
-            return f"unit {unit_id} is the bridge itself, which is only read; {self._served}"
-        return f"no drive or device has unit id {unit_id}; {self._served}"
+            return Text.of("modbus.unit_is_bridge", unit=unit_id, served=self._served)
+        return Text.of("modbus.no_unit", unit=unit_id, served=self._served)
 
     def _read(self, unit: Unit, request: Read | Identify | Loopback, caller: Identity) -> bytes:
         match request:

@@ -10,6 +10,7 @@ from typing import Final
 from bridge.command import Rejection
 from bridge.command.messages.request import Code, Identity, Outcome
 from bridge.image import DataType, Image, Point, Quality, Reading, Value
+from bridge.text import Text
 from bridge.uaserver.library import GOOD, StatusCodes, data_value, status, ua, variant
 
 EpochNs = Callable[[float], int]
@@ -118,7 +119,7 @@ def rejection(
     texts, which are the client's, are cut."""
     ending = _REJECTION_CODE.get(code, Code.NOT_VALID)
     shown = {name[:_LONGEST]: _cut(value) for name, value in values.items()}
-    return Rejection(identity, target[:_LONGEST], action, ending, status(code).name, shown)
+    return Rejection(identity, target[:_LONGEST], action, ending, Text.plain(status(code).name), shown)
 
 
 def _cut(value: Value) -> Value:

@@ -27,6 +27,7 @@ from bridge.parameter import Entry, Names, backups
 from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.factory import DESCRIPTIONS, factory
 from bridge.parameter.set_file import read_set
+from bridge.text import as_json
 
 Counts = Callable[[], Mapping[tuple[str, str], int]]
 """Writes to the EEPROM, by the drive's or node's name and the object."""
@@ -236,6 +237,7 @@ def _entry(holder: Holder, entry: Entry, counts: Mapping[tuple[str, str], int]) 
     if definition is None:
         return {"name": entry.name, "object": str(entry.address)}
     owner = holder.node.name if definition.of_node else holder.name
+    why_never = holder.names.protection.why_never(entry) if definition.writable else None
     facts: dict[str, Any] = {
         "name": entry.name,
         "title": definition.title,
@@ -248,7 +250,7 @@ def _entry(holder: Holder, entry: Entry, counts: Mapping[tuple[str, str], int]) 
         "states": {str(code): text for code, text in definition.states.items()},
         "write_only": not definition.readable,
         "read_only": not definition.writable,
-        "why_never": holder.names.protection.why_never(entry) if definition.writable else "",
+        "why_never": why_never and as_json(why_never),
         "protected": holder.names.protection.level(entry.address),
         "volatile": definition.volatile,
         "command": definition.command,

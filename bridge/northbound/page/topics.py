@@ -20,7 +20,7 @@ import msgspec
 from bridge.condition.layout import Layout
 from bridge.image import Image, Point, Quality
 from bridge.northbound.view import View
-from bridge.text import Text, as_json, in_english
+from bridge.text import Said, Text, as_json, in_english
 
 _MOST_AT_ONCE: Final = 1 << 20
 _encode = msgspec.json.Encoder().encode
@@ -113,6 +113,6 @@ class Topics:
         return shown
 
 
-def _texts(value: Text | None, reason: Text | str) -> dict[str, Any]:
+def _texts(value: Text | None, reason: Said) -> dict[str, Any]:
     found = {"value": value and as_json(value), "reason": as_json(reason)}
     return {name: text for name, text in found.items() if text}

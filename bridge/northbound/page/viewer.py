@@ -186,7 +186,8 @@ class Viewer:
             kind = COMMANDS.get(action)
             command = Do(action) if kind is None else msgspec.convert(fields, kind)
         except (msgspec.ValidationError, TypeError) as error:
-            answered(Outcome(Code.OUT_OF_RANGE, f"{action}: {error}", forwarded=False))
+            said = Text.of("request.malformed", action=Text.word("action", action), error=str(error))
+            answered(Outcome(Code.OUT_OF_RANGE, said, forwarded=False))
             return
         self._view.submit(Request(self.identity, ask.target, command), answered)
 

@@ -24,6 +24,7 @@ from bridge.command import (
 from bridge.command.messages.request import NMT_ACTIONS, NODE_ACTIONS
 from bridge.image import Point, Value
 from bridge.northbound.zenoh.users import ANONYMOUS, NAME, WANTED_NAME
+from bridge.text import Text, render
 
 METHODS: Final = (
     Action.START,
@@ -64,10 +65,15 @@ _HEXADECIMAL: Final = re.compile(r"0[xX][0-9A-Fa-f]{1,8}")
 class BadCommand(Exception):
     """The query is not a valid command. ``code`` is that of an outcome, or ``malformed``."""
 
-    def __init__(self, code: str, message: str) -> None:
-        super().__init__(message)
+    def __init__(self, code: str, said: Text) -> None:
+        super().__init__(said)
         self.code = code
-        self.message = message
+        self.said = said
+
+    @property
+    def message(self) -> str:
+        """In English."""
+        return render(self.said)
 
 
 class _One(msgspec.Struct, forbid_unknown_fields=True):
@@ -100,7 +106,7 @@ def identity_of(attachment: bytes | None) -> Identity:
     """
     if not attachment:
         return Identity(Source.ZENOH, ANONYMOUS)
-    wanted = 'the attachment must be {"controller": "<name>"}'
+    wanted = Text.of("zenoh.attachment", form='{"controller": "<name>"}')
     if len(attachment) > _LONGEST:
         raise BadCommand(MALFORMED, wanted)
     said = _decoded(_controller, attachment, wanted)
@@ -152,7 +158,7 @@ class Commands:
         No payload is an empty one.
         """
         if len(payload) > _LONGEST:
-            raise BadCommand(MALFORMED, f"a command has at most {_LONGEST} bytes")
+            raise BadCommand(MALFORMED, Text.of("zenoh.too_long", most=_LONGEST))
         drive, name = self.parameter(tail)
         if name:
             return Request(identity, drive, WriteParameter(name, _decode_parameter(name, payload)))
@@ -166,7 +172,7 @@ class Commands:
         if point is None:
             raise self._unknown(tail, target, group)
         if not point.writable:
-            raise BadCommand(Code.READ_ONLY, f"{tail} is read-only; {self._how(target)}")
+            raise BadCommand(Code.READ_ONLY, Text.of("zenoh.read_only", key=tail, drive=self._where(target)))
         if group == "supervision":
             return Request(identity, target, SetTimeout(_decode_whole(point, payload)))
         return Request(identity, target, Write({leaf: _decode_value(point, payload)}))
@@ -204,24 +210,28 @@ class Commands:
                 name.rpartition("/")[2] for name in self._points if name.startswith(f"{target}/command/")
             ]
             known = ", ".join((*leaves, *METHODS))
-            return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; {target}/command has {known}")
+            return BadCommand(Code.UNKNOWN_POINT, _no_key(tail, f"{target}/command", known))
         if target in self._with_outputs and group in ("command", "output"):
             outputs = [
                 name.rpartition("/")[2] for name in self._points if name.startswith(f"{target}/output/")
             ]
             known = ", ".join(OUTPUT_METHODS if group == "command" else outputs)
-            return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; {target}/{group} has {known}")
+            return BadCommand(Code.UNKNOWN_POINT, _no_key(tail, f"{target}/{group}", known))
         if group == "node" and target in self._nodes:
             known = ", ".join(NODE_METHODS)
-            return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; a node takes {known}")
+            return BadCommand(Code.UNKNOWN_POINT, Text.of("zenoh.no_key_of_node", key=tail, known=known))
         if group == "command":
             drives = ", ".join(sorted(self._drives))
-            return BadCommand(Code.UNKNOWN_TARGET, f"there is no drive {target!r}; there are {drives}")
-        return BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}; {self._how(target)}")
+            return BadCommand(Code.UNKNOWN_TARGET, Text.of("zenoh.no_drive", drive=target, known=drives))
+        said = Text.of("zenoh.no_command", key=tail, drive=self._where(target))
+        return BadCommand(Code.UNKNOWN_POINT, said)
 
-    def _how(self, target: str) -> str:
-        drive = target if target in self._drives else "<node>/<drive>"
-        return f"commands go to {drive}/command/…"
+    def _where(self, target: str) -> str:
+        return target if target in self._drives else "<node>/<drive>"
+
+
+def _no_key(key: str, group: str, known: str) -> Text:
+    return Text.of("zenoh.no_key", key=key, group=group, known=known)
 
 
 def _owners(points: Iterable[str], ending: str) -> frozenset[str]:
@@ -232,14 +242,15 @@ def _decode_value(point: Point, payload: bytes) -> Value:
     bare = payload.strip()
     if point.data_type.is_integer and _HEXADECIMAL.fullmatch(bare.decode(errors="replace")):
         return int(bare, 16)
-    decoded = _decoded(_one_or_bare, bare, f'{point.name} takes a number or {{"v": <number>}} in JSON')
+    wanted = Text.of("zenoh.number", name=point.name, form='{"v": <number>}')
+    decoded = _decoded(_one_or_bare, bare, wanted)
     return _bounded(point.name, decoded.v if isinstance(decoded, _One) else decoded)
 
 
 def _decode_whole(point: Point, payload: bytes) -> int:
     value = _decode_value(point, payload)
     if isinstance(value, bool) or not isinstance(value, int):
-        raise BadCommand(Code.OUT_OF_RANGE, f"{point.name} takes a whole number")
+        raise BadCommand(Code.OUT_OF_RANGE, Text.of("zenoh.whole_number", name=point.name))
     return value
 
 
@@ -250,58 +261,62 @@ def _decode_parameter(name: str, payload: bytes) -> Value:
     try:
         text = bare.decode()
     except UnicodeDecodeError:
-        raise BadCommand(MALFORMED, f"{name} takes a value in JSON or a bare text in UTF-8") from None
+        raise BadCommand(MALFORMED, Text.of("zenoh.value_or_text", name=name)) from None
     if not text:
-        raise BadCommand(MALFORMED, f"{name} takes a value, and got an empty payload")
+        raise BadCommand(MALFORMED, Text.of("zenoh.empty", name=name))
     if _HEXADECIMAL.fullmatch(text):
         return int(text, 16)
     try:
         decoded = _one_or_bare.decode(bare)
     except msgspec.DecodeError as error:
         if text[0] in '{["':
-            raise BadCommand(MALFORMED, f"{name} takes a value in JSON: {error}") from None
+            raise BadCommand(MALFORMED, _and(Text.of("zenoh.value", name=name), error)) from None
         return text
     return _bounded(name, decoded.v if isinstance(decoded, _One) else decoded)
 
 
 def _decode_telegram(tail: str, payload: bytes) -> dict[str, Value]:
-    wanted = f'{tail} takes an object such as {{"control_word": 1151}}'
+    wanted = Text.of("zenoh.telegram", name=tail, form='{"control_word": 1151}')
     values = _decoded(_telegram, payload, wanted)
     if not values:
-        raise BadCommand(MALFORMED, f"the object for {tail} names no point")
+        raise BadCommand(MALFORMED, Text.of("zenoh.names_no_point", name=tail))
     return {leaf: _bounded(leaf, value) for leaf, value in values.items()}
 
 
-def _decoded(decoder: msgspec.json.Decoder[_Model], payload: bytes, wanted: str) -> _Model:
+def _decoded(decoder: msgspec.json.Decoder[_Model], payload: bytes, wanted: Text) -> _Model:
     try:
         return decoder.decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise BadCommand(MALFORMED, f"{wanted}: {error}") from None
+        raise BadCommand(MALFORMED, _and(wanted, error)) from None
+
+
+def _and(wanted: Text, error: Exception) -> Text:
+    return Text.of("zenoh.not_decoded", wanted=wanted, error=str(error))
 
 
 def _bounded(name: str, value: Value) -> Value:
     """JSON integers have no limit; no point has more than 32 bits."""
     if isinstance(value, int) and abs(value) >= 2**63:
-        raise BadCommand(Code.OUT_OF_RANGE, f"{name}: the number is too large")
+        raise BadCommand(Code.OUT_OF_RANGE, Text.of("zenoh.too_large", name=name))
     return value
 
 
 def _call(identity: Identity, target: str, action: Action, payload: bytes) -> Request:
-    has_payload = bool(payload.strip())
+    has_payload, named = bool(payload.strip()), Text.word("action", action)
     if not has_payload and action not in _WITHOUT_PAYLOAD:
-        raise BadCommand(MALFORMED, f"{action} needs a payload, and got a plain get; {{}} is enough")
+        raise BadCommand(MALFORMED, Text.of("zenoh.needs_payload", action=named, enough="{}"))
     options = _Options()
     if has_payload:
-        options = _decoded(_options, payload, f"{action} takes an object of options")
+        options = _decoded(_options, payload, Text.of("zenoh.options", action=named))
     ttl_ms, direction = options.ttl_ms, options.direction
     if ttl_ms is not msgspec.UNSET and action is not Action.TAKE_CONTROL:
-        raise BadCommand(MALFORMED, f"{action} takes no ttl_ms")
+        raise BadCommand(MALFORMED, Text.of("zenoh.no_option", action=named, option="ttl_ms"))
     if ttl_ms is not msgspec.UNSET and not 0 <= ttl_ms <= _LONGEST_MS:
-        raise BadCommand(Code.OUT_OF_RANGE, f"ttl_ms takes 0…{_LONGEST_MS}")
+        raise BadCommand(Code.OUT_OF_RANGE, Text.of("request.ttl_range", low=0, high=_LONGEST_MS))
     if direction is not msgspec.UNSET and action is not Action.START:
-        raise BadCommand(MALFORMED, f"{action} takes no direction")
+        raise BadCommand(MALFORMED, Text.of("zenoh.no_option", action=named, option="direction"))
     if direction not in (msgspec.UNSET, -1, 0, 1):
-        raise BadCommand(Code.OUT_OF_RANGE, "direction takes 1 (forward), -1 (reverse) or 0")
+        raise BadCommand(Code.OUT_OF_RANGE, Text.of("zenoh.direction"))
     options_given = {"ttl_ms": ttl_ms, "direction": direction}
     given = {name: value for name, value in options_given.items() if value is not msgspec.UNSET}
     return Request(identity, target, command_of(action, **given))

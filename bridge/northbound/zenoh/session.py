@@ -35,6 +35,7 @@ from bridge.northbound.zenoh.gets import Gets
 from bridge.northbound.zenoh.publication import Publication
 from bridge.northbound.zenoh.sessions import Sessions
 from bridge.northbound.zenoh.users import ANONYMOUS, Users, read_users
+from bridge.text import Text
 from bridge.zenohlink import IncomingQuery, Message, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
@@ -152,7 +153,7 @@ class ZenohServer:
         is_pattern = "*" in asked.key
         owner, tail = ("", "") if is_pattern else self._users.owner(self._keys.tail(asked.key))
         if is_pattern and asked.payload is not None:
-            bad = BadCommand(MALFORMED, "a command goes to one key, without wildcards")
+            bad = BadCommand(MALFORMED, Text.of("zenoh.one_key"))
             self._note_refusal(owner, asked.key, asked, bad)
             _refuse(asked, bad)
         elif asked.payload is not None or self._commands.is_method(tail):
@@ -163,13 +164,13 @@ class ZenohServer:
             asked.send([self._render(self._keys.index[asked.key], self._view.epoch_ns(0.0))])
             asked.finish()
         elif not is_pattern:
-            _refuse(asked, BadCommand(Code.UNKNOWN_POINT, f"there is no {tail}"))
+            _refuse(asked, BadCommand(Code.UNKNOWN_POINT, Text.of("zenoh.nothing", key=tail)))
         elif self._keys.is_prompt(asked.key):
             # At once: so few that they fit into the queue to their reader.
             asked.send(self._matching(self._keys.of_owner(asked.key), asked.key))
             asked.finish()
         elif not self._gets.has_room(asked.source, self._clock()):
-            _refuse(asked, BadCommand("busy", "too many gets across drives at once; ask again"))
+            _refuse(asked, BadCommand("busy", Text.of("zenoh.too_many_gets")))
         else:
             task = asyncio.get_running_loop().create_task(self._answer_get(asked.apart()))
             ending = self._gets.add(task, asked.source, self._clock())
@@ -180,7 +181,7 @@ class ZenohServer:
     async def _answer_get(self, asked: IncomingQuery) -> None:
         """The present values of all points that match, a portion at a time."""
         # A part of the answer must not look like all of it.
-        end = partial(_refuse, asked, BadCommand("busy", "others wait and this is read slowly; ask for less"))
+        end = partial(_refuse, asked, BadCommand("busy", Text.of("zenoh.read_slowly")))
         try:
             for start in range(0, len(self._keys.keys), _REPLIES_AT_ONCE):
                 portion = range(start, min(start + _REPLIES_AT_ONCE, len(self._keys.keys)))
@@ -218,7 +219,7 @@ class ZenohServer:
         request = self._commands.request(tail, payload, identity)
         if self._users.are_proved and not owner and request.action not in STOP_ACTIONS:
             own = f"{self._keys.top}/@/controller/<user>/{tail}"
-            raise BadCommand(Code.NOT_ALLOWED, f"nobody knows who asks by this key; use your own, {own}")
+            raise BadCommand(Code.NOT_ALLOWED, Text.of("zenoh.shared_key", own=own))
         return request
 
     def _submit(self, request: Request, received_at: float, reply: Reply) -> None:
@@ -269,7 +270,7 @@ class ZenohServer:
         except BadCommand:
             identity = identity_of(None)
         target, action = self._commands.addressee_of(tail)
-        self._view.rejected(Rejection(identity, target, action, bad.code, bad.message))
+        self._view.rejected(Rejection(identity, target, action, bad.code, bad.said))
 
     def _on_put(self, message: Message) -> None:
         """A plain put on a command key, if the site allows them. It has no answer."""

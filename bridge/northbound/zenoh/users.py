@@ -13,10 +13,11 @@ from typing import Final
 
 from bridge.base.errors import Unavailable
 from bridge.config import ZenohTable
+from bridge.text import Text
 
 ANONYMOUS: Final = "anonymous"
 NAME: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")
-WANTED_NAME: Final = "a controller's name has 1…64 letters, digits and _ . -"
+WANTED_NAME: Final = Text.of("zenoh.controller_name")
 
 _OWN_KEYS: Final = "@/controller/"
 

@@ -6,10 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.base.sdo_texts import text_of, text_of_abort, text_of_request
+from bridge.base.sdo_texts import text_of, text_of_abort, text_of_learned, text_of_request
 from bridge.canopen import abort
 from bridge.canopen.decode_sdo import SdoListener
+from bridge.canopen.sdo_block import Learned
 from bridge.canopen.sdo_transfer import SdoError
+from bridge.canopen.sdo_ways_back import WAYS_BACK, WayBack
 from bridge.text import render
 
 
@@ -24,6 +26,13 @@ def test_an_abort_code_has_its_text(code: int) -> None:
 def test_a_failed_transfer_has_its_text(code: int, by_server: bool) -> None:
     error = SdoError(0x1018, 1, code, by_server=by_server)
     assert render(text_of(error)) == str(error)
+
+
+@pytest.mark.parametrize("way", WAYS_BACK)
+def test_each_way_back_from_block_transfer_has_its_text(way: WayBack) -> None:
+    learned = Learned(way, SdoError(0x1018, 1, abort.TIMED_OUT, by_server=False))
+    assert render(text_of_learned(learned)) == str(learned)
+    assert way.says not in render(text_of_learned(learned), "de")
 
 
 _COMMANDS = st.sampled_from(

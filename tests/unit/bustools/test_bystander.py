@@ -16,6 +16,7 @@ from bridge.mapping import load_family as load_any
 from bridge.mapping.loader import family_names
 from bridge.mapping.own_places import places
 from bridge.parameter import Entry, Names, ParameterError, Transfer, TransferFailed
+from bridge.text import Text
 
 load_family = cache(load_any)
 FAMILIES = [(mapping, load_family(mapping).slot[-1].name) for mapping in family_names()]
@@ -42,7 +43,9 @@ def answered(
         while True:
             data = words.get((transfer.address.index, transfer.address.sub))
             if data is None:
-                transfer = steps.throw(TransferFailed("object does not exist", 0x0602_0000, by_drive=True))
+                transfer = steps.throw(
+                    TransferFailed(Text.plain("object does not exist"), 0x0602_0000, by_drive=True)
+                )
             else:
                 transfer = steps.send((data, 1.0))
     except StopIteration:

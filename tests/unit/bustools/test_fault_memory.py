@@ -12,6 +12,7 @@ from bridge.mapping import load_family
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, TransferFailed
 from bridge.sim.catalogue import simulate_node
 from bridge.sim.core.abort import SdoAbort
+from bridge.text import Text
 from tests.unit.sim.conftest import Bench
 
 Answers = Callable[[int, int], bytes]
@@ -27,9 +28,9 @@ def asked(mapping: str, answers: Answers) -> list[Remembered]:
             try:
                 data = answers(transfer.address.index, transfer.address.sub)
             except SdoAbort as abort:
-                transfer = steps.throw(TransferFailed("refused", abort.code, by_drive=True))
+                transfer = steps.throw(TransferFailed(Text.plain("refused"), abort.code, by_drive=True))
             except TimeoutError:
-                transfer = steps.throw(TransferFailed("no answer", 0, by_drive=False))
+                transfer = steps.throw(TransferFailed(Text.plain("no answer"), 0, by_drive=False))
             else:
                 transfer = steps.send((data, 0.0))
     except StopIteration as end:

@@ -8,6 +8,7 @@ from bridge.bustools.parameter import ParameterTask
 from bridge.canopen.frame import Frame
 from bridge.mapping.model import ObjectRef
 from bridge.parameter import ParameterError, Transfer, TransferFailed, Why
+from bridge.text import Text
 from tests.support import sites
 from tests.support.nodes import node_of
 
@@ -20,11 +21,11 @@ def task(slot: str = "fu1", *, of_node: bool = False, fails: bool = False) -> Pa
 
     def steps() -> Steps:
         if fails:
-            raise ParameterError(Why.READ_ONLY, "no")
+            raise ParameterError(Why.READ_ONLY, Text.plain("no"))
         try:
             data, _ = yield Transfer(PLACE, of_node=of_node)
         except TransferFailed as failure:
-            raise ParameterError(Why.NO_ANSWER, str(failure)) from None
+            raise ParameterError(Why.NO_ANSWER, failure.said) from None
         return data
 
     return ParameterTask(node.table, node.family, node.drives[0].slot, lambda now: steps(), 10.0)

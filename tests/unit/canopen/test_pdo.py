@@ -125,7 +125,9 @@ class Words:
         self.drive = bench.plant.drives["conveyor/fu1"]
         node_goes(bench.plant, bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
         self.told: list[str] = []
-        self.pdos = DrivePdos(self.drive, [rpdo or tpdo], [tpdo], lambda frame, why: self.told.append(why))
+        self.pdos = DrivePdos(
+            self.drive, [rpdo or tpdo], [tpdo], lambda frame, why: self.told.append(str(why))
+        )
 
     def receive(self, data: str) -> list[int]:
         self.pdos.tpdos[0].on_frame(Frame(0x185, bytes.fromhex(data), 2.0))

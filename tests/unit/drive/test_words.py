@@ -138,4 +138,4 @@ class TestStatusWord:
     ],
 )
 def test_an_emergency_code_has_its_own_text_or_that_of_its_group(code: int, text: str):
-    assert NORD.emcy.text(code) == text
+    assert str(NORD.emcy.text(code)) == text

@@ -37,12 +37,13 @@ from bridge.image import DataType, Point, Quality
 from bridge.mirror import protocol, socket_endpoint
 from bridge.mirror.endpoint import prepare_folder
 from bridge.mirror.protocol import Answered, Changed, Connected, Counted, Delta, Malformed, Rejected, Snapshot
-from bridge.text import Text
+from bridge.text import Said, Text
 from tests.support.zenoh_site import make_plant
 
 values = st.booleans() | st.integers(-(2**31), 2**32 - 1) | st.floats(allow_nan=False) | st.text(max_size=20)
 times = st.floats(0, 1e11)
-changes = st.builds(Changed, st.integers(0, 9), values, st.sampled_from(Quality), times, st.text(max_size=10))
+said = st.just("") | st.text(max_size=10).map(Text.plain)
+changes = st.builds(Changed, st.integers(0, 9), values, st.sampled_from(Quality), times, said)
 identities = st.builds(
     Identity,
     st.sampled_from(Source),
@@ -85,11 +86,13 @@ def test_requests_read_back_with_their_identity(request: Request, deadline: floa
 
 @given(identities, st.text(max_size=20), st.dictionaries(st.text(max_size=10), values, max_size=4))
 def test_rejections_read_back(identity: Identity, target: str, written: dict[str, bool | int | float | str]):
-    told = Rejected(12.5, 3, Rejection(identity, target, Action.WRITE, Code.READ_ONLY, "why", written))
+    told = Rejected(
+        12.5, 3, Rejection(identity, target, Action.WRITE, Code.READ_ONLY, Text.plain("why"), written)
+    )
     assert protocol.decode(Rejected, protocol.encode(told)) == told
 
 
-outcomes = st.builds(Outcome, st.sampled_from(Code), st.text(), st.booleans())
+outcomes = st.builds(Outcome, st.sampled_from(Code), said, st.booleans())
 
 
 @given(st.builds(Answered, outcomes, st.integers(0, 2**63 - 1), st.integers(0, 10**9)))
@@ -108,7 +111,7 @@ def test_whatever_was_refused_can_be_told(
     who: Identity, target: str, why: str, written: dict[str, str | int | float]
 ) -> None:
     """One that could not would end whoever tells it, and every client with that."""
-    told = Rejected(12.5, 3, Rejection(who, target, Action.WRITE, why, why, written))
+    told = Rejected(12.5, 3, Rejection(who, target, Action.WRITE, why, Text.plain(why), written))
     back = protocol.decode(Rejected, protocol.encode(told))
     assert back.count == 3
     assert len(back.rejection.target) == len(target)
@@ -116,9 +119,10 @@ def test_whatever_was_refused_can_be_told(
 
 @given(any_text, any_text, any_text | st.integers() | st.floats(allow_nan=False))
 def test_whatever_happens_can_be_told(source: str, message: str, value: str | int | float) -> None:
-    protocol.decode(Event, protocol.encode(Event(1.5, Kind.REFUSED, source, 300, message)))
-    protocol.decode(Answered, protocol.encode(Answered(Outcome(Code.NOT_VALID, message), 1, 1)))
-    delta = Delta(1, 1, (Changed(0, 5, Quality.GOOD, 0, ""), Changed(1, value, Quality.GOOD, 0, message)))
+    told = Text.plain(message)
+    protocol.decode(Event, protocol.encode(Event(1.5, Kind.REFUSED, source, 300, told)))
+    protocol.decode(Answered, protocol.encode(Answered(Outcome(Code.NOT_VALID, told), 1, 1)))
+    delta = Delta(1, 1, (Changed(0, 5, Quality.GOOD, 0, ""), Changed(1, value, Quality.GOOD, 0, told)))
     back = protocol.decode_delta(protocol.encode(delta), 2)
     assert back.readings[0] == delta.readings[0], "what is well is as it was"
 
@@ -170,9 +174,9 @@ def test_a_snapshot_brings_the_nature_of_every_point() -> None:
     assert protocol.decode_snapshot(protocol.encode(Snapshot(1, 2, (rich,), ()))).points == (rich,)
 
 
-@given(times, st.sampled_from(Kind), st.text(max_size=10), st.integers(1, 1000), st.text(max_size=10))
-def test_events_read_back(time: float, kind: Kind, source: str, severity: int, message: str) -> None:
-    event = Event(time, kind, source, severity, message)
+@given(times, st.sampled_from(Kind), st.text(max_size=10), st.integers(1, 1000), said)
+def test_events_read_back(time: float, kind: Kind, source: str, severity: int, told: Said) -> None:
+    event = Event(time, kind, source, severity, told)
     assert protocol.decode(Event, protocol.encode(event)) == event
 
 

@@ -22,7 +22,7 @@ class Case:
         self.emergencies = Emergencies(
             self.plant.nodes["conveyor"],
             self.plant.side_of(self.plant.site.bus[0]),
-            lambda frame, why: self.rejected.append(why),
+            lambda frame, why: self.rejected.append(str(why)),
             lambda drive, now: self.about.append(drive.name),
         )
 

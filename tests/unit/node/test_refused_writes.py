@@ -23,6 +23,7 @@ from bridge.command import (
     Write,
     WriteParameter,
 )
+from bridge.text import Text
 from tests.support.bench import PLC, Bench, write_site
 
 FU1 = "conveyor/fu1"
@@ -86,7 +87,9 @@ def test_it_counts_once_and_is_one_event(bench: Bench, what: str) -> None:
 
 def test_so_does_what_a_protocol_refuses_by_itself(bench: Bench) -> None:
     before = bench.number("bridge/refused_writes")
-    bench.plant.rejected(Rejection(PLC, "unit 77", "write", Code.UNKNOWN_TARGET, "0Ah"), bench.now, 3)
+    bench.plant.rejected(
+        Rejection(PLC, "unit 77", "write", Code.UNKNOWN_TARGET, Text.plain("0Ah")), bench.now, 3
+    )
     bench.run(0.2)
     assert bench.number("bridge/refused_writes") == before + 3
 

@@ -9,12 +9,13 @@ import pytest
 from bridge.command import Event, Kind
 from bridge.mirror import MirrorClient, protocol
 from bridge.northbound.view import View
+from bridge.text import Text
 from bridge.zenohlink import Message
 from tests.support import sites
 from tests.support.views import view_of
 
 SITE = sites.site(sites.bus(sites.node(sites.drive("fu1", "modbus", 0))))
-TRIP = Event(10.0, Kind.WATCHDOG, "conveyor/fu1", 900, "tripped")
+TRIP = Event(10.0, Kind.WATCHDOG, "conveyor/fu1", 900, Text.plain("tripped"))
 
 Tell = Callable[[Event], None]
 

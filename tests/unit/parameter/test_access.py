@@ -11,6 +11,7 @@ from bridge.image import Value
 from bridge.mapping.model import ObjectRef, Parameter
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, Transfer, TransferFailed, Why
 from bridge.parameter.definition import Entry
+from bridge.text import Text
 from tests.support import sites
 from tests.support.gates import ENGINEER_AT_REST
 
@@ -55,7 +56,7 @@ class Drive:
             self.now += 0.1
             answer = self.fails.get(transfer.data is not None) or (self._answer(transfer.data), self.now)
             if self.loses_answer and transfer.data is not None:
-                answer = TransferFailed("silent", TIME_OUT, by_drive=False)
+                answer = TransferFailed(Text.plain("silent"), TIME_OUT, by_drive=False)
 
     def _answer(self, data: bytes | None) -> bytes:
         if data is not None:
@@ -119,7 +120,7 @@ def test_an_answer_that_was_lost_is_no_failure_where_the_value_is_there() -> Non
 
 def test_a_refusal_is_the_last_word_and_nothing_is_read_back() -> None:
     drive = Drive(5)
-    drive.fails[True] = TransferFailed("too high", 0x0609_0031, by_drive=True)
+    drive.fails[True] = TransferFailed(Text.plain("too high"), 0x0609_0031, by_drive=True)
     assert why(lambda: drive.writes(9)) is Why.REFUSED
     assert drive.done[-1] is not None
 
@@ -153,7 +154,9 @@ def test_a_value_that_does_not_fit_is_not_sent() -> None:
 def test_a_drive_that_is_silent_is_told_apart_from_one_that_refuses() -> None:
     for by_drive, reason in ((True, Why.REFUSED), (False, Why.NO_ANSWER)):
         drive = Drive()
-        drive.fails[False] = TransferFailed("no", NO_OBJECT if by_drive else TIME_OUT, by_drive=by_drive)
+        drive.fails[False] = TransferFailed(
+            Text.plain("no"), NO_OBJECT if by_drive else TIME_OUT, by_drive=by_drive
+        )
         assert why(drive.reads) is reason
 
 

@@ -32,6 +32,7 @@ from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.ledger import Saved
 from bridge.sim.nord.nord_supervision import Presence
 from bridge.sim.nord.nord_tu4 import NordTu4
+from bridge.text import Text
 from tests.support.gates import ENGINEER_AT_REST
 
 NORD = load_family("nord/sk-tu4-cao")
@@ -351,15 +352,15 @@ class AnyDrive:
     def _answer(self, transfer: Transfer) -> bytes:
         self.answers -= 1
         if self.answers < 0:
-            raise TransferFailed("no valid answer", abort.TIMED_OUT, by_drive=False)
+            raise TransferFailed(Text.plain("no valid answer"), abort.TIMED_OUT, by_drive=False)
         place = (transfer.address.index, transfer.address.sub)
         is_there = any(index == place[0] for index, _ in self.objects)
         held = self.objects.get(place, 0x0609_0011 if is_there else 0x0602_0000)
         if isinstance(held, int):
-            raise TransferFailed("the node aborted", held, by_drive=True)
+            raise TransferFailed(Text.plain("the node aborted"), held, by_drive=True)
         if transfer.data is not None:
             if place in READ_ONLY:
-                raise TransferFailed("the node aborted", 0x0601_0002, by_drive=True)
+                raise TransferFailed(Text.plain("the node aborted"), 0x0601_0002, by_drive=True)
             self.written[place] = self.objects[place] = transfer.data
         return held
 
@@ -512,7 +513,7 @@ def test_what_the_drive_is_silent_about_twice_holds_up_nothing() -> None:
     class Silent(AnyDrive):
         def _answer(self, transfer: Transfer) -> bytes:
             if (transfer.address.index, transfer.address.sub) == (0x20C8, 0):
-                raise TransferFailed("no valid answer", abort.TIMED_OUT, by_drive=False)
+                raise TransferFailed(Text.plain("no valid answer"), abort.TIMED_OUT, by_drive=False)
             return super()._answer(transfer)
 
     drive = Silent(dict(MOTOR))

@@ -49,7 +49,7 @@ def test_a_write_is_judged_again_when_its_turn_has_come() -> None:
     assert transfer.why_not is not None
     assert not transfer.why_not()
     doors.moving = True
-    assert "is not written while the drive is enabled" in transfer.why_not()
+    assert "is not written while the drive is enabled" in str(transfer.why_not())
 
 
 def test_who_asks_the_drive_asks_it_right_before_the_write() -> None:

@@ -111,7 +111,7 @@ def test_what_a_manual_calls_another_name_of_an_object_is_known_as_one(
     names = Names(load_family(mapping))
     entry = names.resolve(name)
     assert target in {str(ref) for ref in names.protection.stands_for(entry.address)}
-    why = names.protection.why_never(entry)
+    why = str(names.protection.why_never(entry))
     assert target in why
     assert entry.name in why
 

@@ -17,6 +17,7 @@ from bridge.derive import derive_family
 from bridge.mapping import load_family
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, Transfer, TransferFailed, Why
 from bridge.parameter.protection import Gate
+from bridge.text import Text
 from tests.support import sites
 from tests.support.invented_eds import BASIC, U32, Section, described, family_of, record, var
 
@@ -35,7 +36,7 @@ def saved(access: DriveParameters, abort_code: int | None) -> tuple[Transfer, st
         if abort_code is None:
             steps.send((b"", 1.0))
         else:
-            steps.throw(TransferFailed("refused", abort_code, by_drive=True))
+            steps.throw(TransferFailed(Text.plain("refused"), abort_code, by_drive=True))
     except StopIteration as end:
         return transfer, end.value
     raise AssertionError("one transfer saves")
@@ -100,7 +101,7 @@ def attempting(code: int | None) -> Callable[..., Any]:
             if code is None:
                 steps.send((b"", 1.0))
             else:
-                steps.throw(TransferFailed("refused", code, by_drive=True))
+                steps.throw(TransferFailed(Text.plain("refused"), code, by_drive=True))
         except StopIteration as end:
             return end.value
         except ParameterError as error:

@@ -16,6 +16,7 @@ from bridge.can.interface import ControllerState
 from bridge.canopen.nmt import NmtCommand, NmtState, command_name
 from bridge.command.link import NodeState
 from bridge.command.messages.request import Action
+from bridge.condition.causes import RULES
 from bridge.config import DriveTable, NodeTable
 from bridge.drive import DriveState
 from bridge.text import LANGUAGES, Text
@@ -30,6 +31,7 @@ GROUPS: Final[Mapping[str, Iterable[str]]] = {
     "node_state": [state.value for state in NodeState],
     "reaction": get_args(DriveTable.model_fields["on_expiry"].annotation),
     "supervision": get_args(NodeTable.model_fields["supervision"].annotation),
+    "trouble": sorted({rule.cause for rule in RULES}),
     "word": ["control_word", "status_word"],
 }
 """Words out of enumerations."""
@@ -60,10 +62,22 @@ def made_in(path: Path) -> Iterator[Made]:
                 place = f"{path}:{node.lineno}"
                 for one in _codes(group, place):
                     assert one in GROUPS, f"{place}: {one} is no group of words"
+            case ast.Call(func=ast.Attribute(value=ast.Name(id="Text"), attr="plain"), args=[words]):
+                place = f"{path}:{node.lineno}"
+                assert not _is_sentence(words), f"{place}: a sentence of the program has a code"
             case ast.Call(func=ast.Name(id="Text")):
                 raise AssertionError(f"{path}:{node.lineno}: a text is made by Text.of")
             case _:
                 pass
+
+
+def _is_sentence(node: ast.expr) -> bool:
+    """Whether words are written at this place; what is not is somebody else's."""
+    return any(isinstance(one, ast.JoinedStr) or _is_written(one) for one in ast.walk(node))
+
+
+def _is_written(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)
 
 
 def _codes(node: ast.expr, place: str) -> tuple[str, ...]:
@@ -111,11 +125,13 @@ def test_each_word_of_a_group_has_its_template() -> None:
 def test_no_template_is_left_over() -> None:
     used = {code for made in all_made() for code in made.codes}
     left = [code for code in templates("en") if code not in used and code.partition(".")[0] not in GROUPS]
-    assert left == ["plain"]
+    assert left == ["both", "plain"]
 
 
 def test_both_languages_have_the_same_codes_with_the_same_facts() -> None:
-    assert names_of("en") == names_of("de")
+    english, german = names_of("en"), names_of("de")
+    assert (english.pop("both"), german.pop("both")) == ({"en"}, {"de"})
+    assert english == german
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -141,7 +157,14 @@ def test_a_text_with_the_wrong_facts_is_found(tmp_path: Path) -> None:
         (("node.lost",), frozenset({"why"})),
         (("a.b", "a.c"), frozenset()),
     ]
-    for wrong in ("Text.of(code)", "Text.of('a', **facts)", "Text('a')", "Text.word('nothing', x)"):
+    for wrong in (
+        "Text.of(code)",
+        "Text.of('a', **facts)",
+        "Text('a')",
+        "Text.word('nothing', x)",
+        "Text.plain('no')",
+        "Text.plain(f'{x}')",
+    ):
         file.write_text(head + wrong)
         with pytest.raises(AssertionError):
             list(made_in(file))

@@ -195,5 +195,6 @@ def test_the_page_knows_what_it_has_no_template_for() -> None:
         {"code": "vendor", "facts": {"now": [vendor, newer]}},
         {"code": "vendor", "facts": {"now": [vendor, vendor]}},
     ]
-    told = by_the_page({"asked": asked, "templates": {"vendor": "Hersteller {now}"}})["known"]
+    templates_of_page = {"plain": "{text}", "vendor": "Hersteller {now}"}
+    told = by_the_page({"asked": asked, "templates": templates_of_page})["known"]
     assert told == [True, False, True, False, False, True]

@@ -145,7 +145,7 @@ def test_one_output_that_is_kept_is_enough_to_run_on(tmp_path: Path) -> None:
 
 def test_what_the_site_accepts_is_no_note(tmp_path: Path) -> None:
     result = judged(tmp_path, {**SAFE, (0x6206, 1): b"\xfe"}, 'accepts = { runs_on = "only a lamp is kept" }')
-    assert result.bridge_stop == (0, "only a lamp is kept")
+    assert result.bridge_stop == (0, Text.plain("only a lamp is kept"))
     assert result.notes == []
     assert result.own["shaft"].accepted == "only a lamp is kept"
 

@@ -11,6 +11,7 @@ from bridge.canopen.sdo import Result, SdoChannel, SdoError
 from bridge.mapping.model import ObjectRef
 from bridge.node.parameters.run import run
 from bridge.parameter import ParameterError, Transfer, TransferFailed, Why
+from bridge.text import Text
 
 PLACE = ObjectRef(0x2066, 1)
 Steps = Generator[Transfer, tuple[bytes, float], object]
@@ -72,7 +73,7 @@ def test_a_refusal_is_thrown_into_it_and_says_who_has_refused(case: Case) -> Non
 def test_its_own_error_is_its_result(case: Case) -> None:
     def steps() -> Steps:
         yield Transfer(PLACE)
-        raise ParameterError(Why.NOT_TAKEN, "no")
+        raise ParameterError(Why.NOT_TAKEN, Text.plain("no"))
 
     case.runs(steps())
     case.open[0](b"\1")

@@ -9,7 +9,7 @@ from bridge.command.link import NodeState
 from bridge.image import Quality
 from bridge.node.parameters.view import NO_CHANNEL, ParameterView
 from bridge.parameter import Entry, ParameterError, Reading, Why
-from bridge.text import render
+from bridge.text import Text, render
 from tests.support import sites
 
 DRIVE = "conveyor/fu1"
@@ -46,10 +46,10 @@ def test_a_value_is_good_since_it_was_asked_for(case: Case) -> None:
 @pytest.mark.parametrize(
     ("error", "quality"),
     [
-        (ParameterError(Why.NO_ANSWER, "silent", 0x0504_0000), Quality.STALE),
-        (ParameterError(Why.REFUSED, "no object", 0x0602_0000), Quality.CONFIG_ERROR),
-        (ParameterError(Why.REFUSED, "busy", 0x0800_0022), Quality.STALE),
-        (ParameterError(Why.WRITE_ONLY, "wo"), Quality.CONFIG_ERROR),
+        (ParameterError(Why.NO_ANSWER, Text.plain("silent"), 0x0504_0000), Quality.STALE),
+        (ParameterError(Why.REFUSED, Text.plain("no object"), 0x0602_0000), Quality.CONFIG_ERROR),
+        (ParameterError(Why.REFUSED, Text.plain("busy"), 0x0800_0022), Quality.STALE),
+        (ParameterError(Why.WRITE_ONLY, Text.plain("wo")), Quality.CONFIG_ERROR),
     ],
 )
 def test_the_last_value_stays_but_is_not_current(case: Case, error: ParameterError, quality: Quality) -> None:
@@ -60,7 +60,7 @@ def test_the_last_value_stays_but_is_not_current(case: Case, error: ParameterErr
 
 
 def test_what_never_had_a_value_waits_on(case: Case) -> None:
-    case.view.failed(DRIVE, case.entry, ParameterError(Why.NO_ANSWER, "silent"), 11.0)
+    case.view.failed(DRIVE, case.entry, ParameterError(Why.NO_ANSWER, Text.plain("silent")), 11.0)
     assert case.point.quality is Quality.WAITING
     case.view.on_node(NodeState.LOST, 12.0)
     assert case.point.quality is Quality.WAITING

@@ -26,7 +26,7 @@ class Case:
         codec = PdoCodec(entries, {(0x6004, 0)})
         plan = PdoPlan(0x194, kind, event_ms, codec, (None, None), name="TPDO1")
         self.rejected: list[str] = []
-        reject = lambda frame, why: self.rejected.append(why)  # noqa: E731
+        reject = lambda frame, why: self.rejected.append(str(why))  # noqa: E731
         self.device = device
         self.routes = connect_inputs(device, SignalPlan([plan], {}), 10, reject, 9.0)
 

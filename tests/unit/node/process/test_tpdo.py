@@ -8,6 +8,7 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.node.boot import NodePdoPlan, PdoPlan
 from bridge.node.process.tpdo import node_tpdos
+from bridge.text import Text
 
 
 class Shown:
@@ -23,8 +24,8 @@ class Shown:
     def _show(self, name: str, value: int, at: float, until: float) -> None:
         self.shown.append((name, value, at, until))
 
-    def _reject(self, frame: Frame, why: str) -> None:
-        self.rejected.append(why)
+    def _reject(self, frame: Frame, why: Text) -> None:
+        self.rejected.append(str(why))
 
     def comes(self, data: str) -> None:
         self.routes[0x385](Frame(0x385, bytes.fromhex(data), 10.0))

@@ -96,6 +96,6 @@ def test_what_is_no_number_is_out_of_range(number: float) -> None:
 def test_a_clients_words_are_cut_before_they_are_told():
     guest = Identity(Source.OPCUA, "guest")
     told = rejection(guest, "x" * 10_000, "call", Codes.BadNodeIdUnknown, {"y" * 10_000: "z" * 10_000})
-    assert (told.code, told.message) == ("unknown_point", "BadNodeIdUnknown")
+    assert (told.code, str(told.said)) == ("unknown_point", "BadNodeIdUnknown")
     assert len(told.target) == 200
     assert [(len(name), len(str(value))) for name, value in told.values.items()] == [(200, 200)]

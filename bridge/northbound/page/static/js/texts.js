@@ -44,44 +44,23 @@ export function faultIn(family, number) {
 
 const templates = signal({});
 
-/** A sentence of the bridge in the reader's language: `english` is made of `text`, {code, facts}, or has none. */
+/** A sentence of the bridge in the reader's language: `english` is made of `text`, {code, facts}, or is somebody else's
+ * words, which have no other language. */
 export function worded(text, english) {
-  if (language.value === "en") return english;
-  if (!text) return translated(english);
+  if (language.value === "en" || !text) return english;
   const known = templates.value[language.value];
-  if (known) return isKnown(text, known) ? rendered(text, known, translated) : translated(english);
+  if (known) return isKnown(text, known) ? rendered(text, known) : english;
   load(language.value, "texts", templates);
   return english;
 }
 
 /** Words for a part of a sentence of the bridge, {code, facts} or words already, of which there is no English. */
 export function inWords(text) {
-  if (typeof text === "string") return translated(text);
+  if (typeof text === "string") return text;
   const known = templates.value[language.value];
-  if (known) return isKnown(text, known) ? rendered(text, known, translated) : text.code;
+  if (known) return isKnown(text, known) ? rendered(text, known) : text.code;
   load(language.value, "texts", templates);
   return "";
-}
-
-const book = signal(null);
-let isOpening = false;
-
-/** A sentence of the bridge in the reader's language: English until the phrases are loaded, and where none fits. */
-export function translated(text) {
-  if (language.value === "en" || !text) return text;
-  if (book.value) return book.value.said(text, language.value);
-  openBook();
-  return text;
-}
-
-async function openBook() {
-  if (isOpening) return;
-  isOpening = true;
-  try {
-    book.value = await import("./texts/said.js");
-  } catch {
-    setTimeout(() => (isOpening = false), 10000);
-  }
 }
 
 const loading = new Set();

@@ -2,9 +2,8 @@
 
 import { html } from "../ui.js";
 import { isConnected } from "../live.js";
-import { nature } from "../site.js";
 import { number, quantity } from "../format.js";
-import { t, translated } from "../texts.js";
+import { t } from "../texts.js";
 import { good } from "../drivestate.js";
 import { words } from "../words.js";
 import { BusState } from "./state.js";
@@ -29,7 +28,7 @@ export function Condition({ bus }) {
       ${good(point("last_error")) && html`<p><span class="label">${t("bus.last_error")}</span> ${words(point("last_error"))}</p>`}
       ${good(point("second_master")) && html`<p class="is-alarm"><${Icon} name="alarm" /> ${t("trouble.second_master")}</p>`}
       <${Strangers} point=${point} />
-      ${good(point("passive")) && html`<p>${translated(nature(point("passive")).description)}</p>`}
+      ${good(point("passive")) && html`<p>${t("bus.gives_way")}</p>`}
     </section>
   `;
 }
@@ -39,5 +38,5 @@ function Strangers({ point }) {
   const found = STRANGERS.filter((leaf) => good(point(leaf)));
   const isKnown = isConnected.value && STRANGERS.every((leaf) => good(point(leaf)) !== null);
   if (!found.length) return isKnown ? html`<p class="quiet">${t("bus.no_strangers")}</p>` : null;
-  return found.map((leaf) => html`<p class="is-alarm"><${Icon} name="alarm" /> <span class="label">${t(`bus.${leaf}`)}</span> ${good(point(leaf))}</p>`);
+  return found.map((leaf) => html`<p class="is-alarm"><${Icon} name="alarm" /> <span class="label">${t(`bus.${leaf}`)}</span> ${words(point(leaf))}</p>`);
 }

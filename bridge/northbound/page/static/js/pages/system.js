@@ -4,7 +4,7 @@ import { html } from "../ui.js";
 import { events } from "../live.js";
 import { may } from "../session.js";
 import { clock, number, quantity } from "../format.js";
-import { maybe, t, translated, worded } from "../texts.js";
+import { maybe, t, worded } from "../texts.js";
 import { good } from "../drivestate.js";
 import { Failure, useFetched } from "../fetched.js";
 import { Icon } from "../icons.js";
@@ -49,7 +49,7 @@ function Versions({ versions }) {
 // Facts that could not be read; the rest of the page stands.
 function Unreadable({ faults }) {
   return html`<ul class="findings">${faults.map((one) => html`<li class="is-warning"><${Icon} name="warning" />
-    <span>${maybe(`system.${one.of}`) || one.of}: ${translated(one.text)}</span></li>`)}</ul>`;
+    <span>${maybe(`system.${one.of}`) || one.of}: ${one.text}</span></li>`)}</ul>`;
 }
 
 function Health() {

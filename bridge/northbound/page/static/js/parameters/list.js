@@ -3,7 +3,7 @@
 import { html, useEffect, useMemo, useRef, useState } from "../ui.js";
 import { may } from "../session.js";
 import { ask, isConnected } from "../live.js";
-import { t } from "../texts.js";
+import { inWords, t } from "../texts.js";
 import { told } from "../outcome.js";
 import { counted, matching } from "../rows.js";
 import { Editor } from "./editor.js";
@@ -94,7 +94,7 @@ function Held({ holder, entry }) {
 // Controls to change it, or the reason why it cannot be changed.
 function Change({ entry, isEdited, onEdit }) {
   if (entry.read_only) return html`<small>${t("parameters.read_only")}</small>`;
-  if (entry.why_never) return html`<small class="why">${t("parameters.never")}: ${entry.why_never}</small>`;
+  if (entry.why_never) return html`<small class="why">${t("parameters.never")}: ${inWords(entry.why_never)}</small>`;
   if (!may("engineer")) return html`<small>${t("parameters.engineer")}</small>`;
   return html`<button onClick=${onEdit} aria-expanded=${isEdited} aria-label=${t("parameters.change_one", { name: entry.name })}>${t("parameters.change")}</button>`;
 }

@@ -486,6 +486,7 @@ export const de = {
   "bus.unexpected_nodes": "Knoten, die nicht in der Site-Datei stehen",
   "bus.duplicate_ids": "Doppelt belegte Knotennummern",
   "bus.last_intruder": "Eindringling",
+  "bus.gives_way": "Eine andere Bridge führt den Bus; diese hört nur zu.",
   "bus.no_strangers": "Auf dem Bus ist niemand, der nicht in der Site-Datei steht.",
   "bus.nodes": "Knoten und ihr Hochlauf",
   "bus.nmt": "NMT",

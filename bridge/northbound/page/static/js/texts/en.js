@@ -486,6 +486,7 @@ export const en = {
   "bus.unexpected_nodes": "Nodes that are not in the site file",
   "bus.duplicate_ids": "Node ids used twice",
   "bus.last_intruder": "Intruder",
+  "bus.gives_way": "Another bridge is in charge of the bus; this one only listens.",
   "bus.no_strangers": "Nobody is on the bus who is not in the site file.",
   "bus.nodes": "Nodes and their boot-up",
   "bus.nmt": "NMT",

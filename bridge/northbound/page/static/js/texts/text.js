@@ -4,19 +4,17 @@
 const JOINED_BY = ", ";
 const PIECE = /\{\{|\}\}|\{(\w+)(!r)?(?::([^}]*))?\}/g;
 
-/** `text`, {code, facts}, by `templates`, a mapping of codes. `plain` puts English sentences that have no code into the
- * reader's language. */
-export function rendered(text, templates, plain = (sentence) => sentence) {
-  if (text.code === "plain") return plain(text.facts.text);
+/** `text`, {code, facts}, by `templates`, a mapping of codes. */
+export function rendered(text, templates) {
   return templates[text.code].replace(PIECE, (piece, name, quoted, format) => {
     if (!name) return piece[0];
-    return shown(text.facts[name], quoted, format, (one) => rendered(one, templates, plain));
+    return shown(text.facts[name], quoted, format, (one) => rendered(one, templates));
   });
 }
 
 /** True if `text` and the texts among its facts have templates: a tab may be older than the bridge that it shows. */
 export function isKnown(text, templates) {
-  if (text.code !== "plain" && !(text.code in templates)) return false;
+  if (!(text.code in templates)) return false;
   const texts = Object.values(text.facts).flat().filter((fact) => typeof fact === "object");
   return texts.every((one) => isKnown(one, templates));
 }

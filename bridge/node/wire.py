@@ -77,7 +77,8 @@ class NodeWire:
         self.drives: dict[str, DrivePdos] = {}
         self.output_pdos: dict[str, OutputPdos] = {}
         """The PDOs of outputs, by their names, as ``drives`` has those of drives."""
-        self._left_out = {one.name: Text.of("unsent.no_rpdo") for one in outputs}
+        self._no_rpdo = {one.name: Text.of("unsent.no_rpdo") for one in outputs}
+        self._left_out = self._no_rpdo
         self._emcy_id: int | None = cobid.EMCY + node.table.id
         self.routes: dict[int, Handler] = self._basic_routes()
         self.routes_changed = True
@@ -245,7 +246,7 @@ class NodeWire:
         self._emcy_id = self._usable_emcy_id(result)
         self._image.put(f"{self._node.name}/node/software_version", result.software_version, now)
         self.drives = connect(self._node, result, self.reject, self._listener.is_taken, now)
-        self._left_out |= {
+        self._left_out = self._no_rpdo | {
             name: Text.of("unsent.no_pdos_because", why=plan.problem)
             for name, plan in result.drives.items()
             if plan.problem

@@ -39,9 +39,8 @@ class Bystander(ForeignMaster):
 def command_ids(node: NodeTable, family: Family) -> frozenset[int]:
     """Identifiers of the node's RPDOs: by its mapping, or where that has none by the pre-defined connection
     set."""
-    if family.is_device:
-        return frozenset(base + node.id for base in cobid.RPDOS)
-    return frozenset(pdo.cob_id + node.id for slot in family.slot for pdo in slot.rpdo)
+    mapped = frozenset(pdo.cob_id + node.id for slot in family.slot for pdo in slot.rpdo)
+    return mapped or frozenset(base + node.id for base in cobid.RPDOS)
 
 
 class Standstill:
@@ -70,7 +69,7 @@ class Standstill:
         self._heard = heard
         self._force = force
         self._whole = whole
-        self._places = tuple(outputs.places.values()) if outputs and not slot else ()
+        self._places = tuple(outputs.places.values()) if outputs else ()
 
     @property
     def gate(self) -> Gate:

@@ -13,8 +13,9 @@ from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from typing import Final
 
-from bridge.bustools.decode_device import DevicePdoView, device_views
-from bridge.bustools.decode_pdo import PdoView, views
+from bridge.bustools.decode_device import DevicePdoView
+from bridge.bustools.decode_pdo import PdoView
+from bridge.bustools.pdo_views import pdo_views
 from bridge.canopen import cobid, decode_lss, emcy, lss, nmt, time_stamp
 from bridge.canopen.decode_sdo import SdoListener, Value
 from bridge.canopen.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
@@ -95,9 +96,7 @@ class Decoder:
             family = (families or {}).get(node.mapping_key)
             if family:
                 self._families[node.id] = family
-                self._pdos.update(views(node, family))
-                if family.is_device:
-                    self._pdos.update(device_views(node, family, (descriptions or {}).get(node.mapping_key)))
+                self._pdos.update(pdo_views(node, family, (descriptions or {}).get(node.mapping_key)))
 
     def decode(self, frame: Frame) -> Meaning:
         """Meaning of ``frame``; every frame has one."""

@@ -8,7 +8,7 @@ from bridge.bustools.task import SdoTasks
 from bridge.canopen import dialogue
 from bridge.canopen.dialogue import Dialogue, Read
 from bridge.canopen.sdo import SdoError
-from bridge.catalogue import DeviceSpec, NodeSpec
+from bridge.catalogue import MemberSpec, NodeSpec
 from bridge.command.output_words import OutputWords
 from bridge.drive import OwnJudgement
 from bridge.drive.own_supervision import judge
@@ -24,22 +24,17 @@ def ask(node: NodeSpec) -> Generator[Read, bytes | None, Judgements]:
     """Judgement of each drive of the node, by the drive's name, or of the node itself with its outputs."""
     of_node = yield from read_places(node, None, link=True)
     found: Judgements = {}
-    for drive in node.drives:
-        of_drive = yield from read_places(node, drive, link=True)
-        accepted = drive.table.accepts.runs_on or ""
-        found[drive.name] = judge(drive.family, {**of_node, **of_drive}, node.bus, node.table, accepted)
-    if node.device and node.device.is_commanded:
-        found[node.name] = yield from _of_outputs(node.device, of_node)
+    for one in node.commanded:
+        found[one.name] = yield from _judged(node, one, of_node)
     return found
 
 
-def _of_outputs(
-    device: DeviceSpec, of_node: Mapping[tuple[int, int], int]
+def _judged(
+    node: NodeSpec, one: MemberSpec, of_node: Mapping[tuple[int, int], int]
 ) -> Generator[Read, bytes | None, OwnJudgement]:
-    outputs = device.node.outputs
-    own = judge(device.family, of_node, device.bus, device.node, outputs.accepts.runs_on or "")
-    words = OutputWords(device.name, device.family.output, outputs.on_expiry)
-    for place in words.places.values():
+    of_one = yield from read_places(node, one, link=True)
+    own = judge(one.family, {**of_node, **of_one}, node.bus, node.table, one.table.accepts.runs_on or "")
+    for place in OutputWords.of(node.table, one.family).places.values():
         if place.safe is not None and (why := (yield from read_why_not_safe(place, place.safe))):
             return keeps_outputs(own, why)
     return own

@@ -7,7 +7,7 @@ from typing import Final
 
 from bridge.catalogue.codes import Source
 from bridge.catalogue.site import Catalogue
-from bridge.catalogue.specs import DeviceSpec, DriveSpec
+from bridge.catalogue.specs import MemberSpec
 from bridge.image.point import Point
 
 _TAKES_LEASES: Final = (Source.OPCUA, Source.ZENOH)
@@ -25,23 +25,23 @@ class Rights:
         """True where a write of this point is ever carried out."""
         owner, _, _ = point.name.rpartition("/")
         name, _, group = owner.rpartition("/")
-        one = catalogue.drives.get(name) or catalogue.devices.get(name)
+        one = catalogue.members.get(name)
         if not point.writable or one is None:
             return point.writable
         if group == "parameter":
             return self._may_set(one, point.name.removeprefix(f"{name}/parameter/"))
         return self.may_command(one)
 
-    def may_command(self, one: DriveSpec | DeviceSpec) -> bool:
+    def may_command(self, one: MemberSpec) -> bool:
         """True where clients may command a drive, or the outputs of a node that is none."""
         return one.control == self.source.label or (one.control == "lease" and self.source in _TAKES_LEASES)
 
-    def may_stop(self, one: DriveSpec | DeviceSpec) -> bool:
+    def may_stop(self, one: MemberSpec) -> bool:
         return one.stop_by_anyone or self.may_command(one)
 
-    def _may_set(self, one: DriveSpec | DeviceSpec, leaf: str) -> bool:
+    def _may_set(self, one: MemberSpec, leaf: str) -> bool:
         entry = next((entry for entry in one.names.points() if entry.leaf == leaf), None)
-        if entry is None or not one.has_parameters:
+        if entry is None or one.sdo_channel is None:
             return False
         if not one.names.protection.may_set(entry.address, is_engineer=self.has_engineers):
             return False

@@ -8,7 +8,7 @@ from itertools import chain
 from typing import Self
 
 from bridge.catalogue.points import site_points
-from bridge.catalogue.specs import DeviceSpec, DriveSpec, NodeSpec
+from bridge.catalogue.specs import DeviceSpec, DriveSpec, MemberSpec, NodeSpec
 from bridge.catalogue.unit_ids import DEVICE, unit_ids
 from bridge.config import BusTable, NodeTable, Site
 from bridge.image.point import Point
@@ -18,14 +18,15 @@ from bridge.parameter import AxisNames
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Catalogue:
-    """Points, nodes, drives and devices, by their names and in the order of the site file. ``devices`` are
-    the nodes that are no drives."""
+    """Points, nodes, and members of nodes, by their names and in the order of the site file."""
 
     site: Site
     points: tuple[Point, ...]
     nodes: Mapping[str, NodeSpec]
+    members: Mapping[str, MemberSpec]
     drives: Mapping[str, DriveSpec]
     devices: Mapping[str, DeviceSpec]
+    """Nodes that are no drives."""
 
     @classmethod
     def of(cls, site: Site, families: Mapping[str, Family]) -> Self:
@@ -43,8 +44,9 @@ class Catalogue:
             site,
             tuple(chain.from_iterable(points.values())),
             nodes,
-            {drive.name: drive for node in nodes.values() for drive in node.drives},
-            {node.name: node.device for node in nodes.values() if node.device},
+            {one.name: one for node in nodes.values() for one in node.members},
+            {one.name: one for node in nodes.values() for one in node.drives},
+            {one.name: one for node in nodes.values() for one in node.devices},
         )
 
 
@@ -56,12 +58,13 @@ class _Maker:
     unit_ids: Mapping[tuple[str, int], int]
 
     def node(self, bus: BusTable, node: NodeTable, family: Family, names: AxisNames) -> NodeSpec:
-        drives = tuple(self._drive(bus, node, place, family, names) for place in range(len(node.drive)))
-        device = None
+        members: list[MemberSpec] = [
+            self._drive(bus, node, place, family, names) for place in range(len(node.drive))
+        ]
         if family.is_device:
             unit_id = self.unit_ids[node.name, DEVICE]
-            device = DeviceSpec(bus, node, family, names.of(), unit_id, tuple(self.points[node.name]))
-        return NodeSpec(bus, node, family, names, drives, device)
+            members.append(DeviceSpec(bus, node, family, names.of(), unit_id, tuple(self.points[node.name])))
+        return NodeSpec(bus, node, family, names, tuple(members))
 
     def _drive(
         self, bus: BusTable, node: NodeTable, place: int, family: Family, names: AxisNames

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
-from bridge.config import BusTable, DriveTable, NodeTable
+from bridge.config import BusTable, DriveTable, NodeTable, OutputsTable
 from bridge.image.point import Point
 from bridge.mapping.model import Family, Slot
 from bridge.parameter import AxisNames, Names
+
+FIRST_CHANNEL: Final = 1
+"""Number of the SDO channel whose server is object 1200h."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,9 +44,19 @@ class DriveSpec:
         return True
 
     @property
-    def has_parameters(self) -> bool:
-        """True where an SDO channel that is open reaches its parameters."""
-        return self.family.sdo_channel(self.slot, self.node.sdo_channels) is not None
+    def axis(self) -> int:
+        """Logical device of the node that has its profile, 1 to 8 (CiA 301 §7.4.1)."""
+        return self.slot.axis
+
+    @property
+    def sdo_channel(self) -> int | None:
+        """Number of the SDO channel that reaches its parameters; None where none is open."""
+        return self.family.sdo_channel(self.slot, self.node.sdo_channels)
+
+    @property
+    def is_on_first(self) -> bool:
+        """True where its objects are those of the node's first SDO channel."""
+        return self.family.is_on_first(self.slot)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,13 +76,22 @@ class DeviceSpec:
         return self.node.name
 
     @property
+    def table(self) -> OutputsTable:
+        return self.node.outputs
+
+    @property
+    def slot(self) -> None:
+        """None: it is no drive of its node."""
+        return
+
+    @property
     def control(self) -> str:
         """Protocol whose clients may command its outputs, ``lease`` or ``none``."""
-        return self.node.outputs.control if self.is_commanded else "none"
+        return self.table.control if self.is_commanded else "none"
 
     @property
     def stop_by_anyone(self) -> bool:
-        return self.is_commanded and self.node.outputs.stop_by_anyone
+        return self.is_commanded and self.table.stop_by_anyone
 
     @property
     def is_commanded(self) -> bool:
@@ -76,9 +99,23 @@ class DeviceSpec:
         return bool(self.family.output)
 
     @property
-    def has_parameters(self) -> bool:
-        """True where an SDO channel that is open reaches its parameters."""
+    def axis(self) -> int:
+        """Logical device of the node that has its profile, 1 to 8 (CiA 301 §7.4.1)."""
+        return 1
+
+    @property
+    def sdo_channel(self) -> int | None:
+        """Number of the SDO channel that reaches its parameters; None where none is open."""
+        return FIRST_CHANNEL
+
+    @property
+    def is_on_first(self) -> bool:
+        """True where its objects are those of the node's first SDO channel."""
         return True
+
+
+MemberSpec = DriveSpec | DeviceSpec
+"""Whatever a node has that parameters, inputs or commands are of."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,9 +126,21 @@ class NodeSpec:
     table: NodeTable
     family: Family
     axis_names: AxisNames
-    drives: tuple[DriveSpec, ...]
-    device: DeviceSpec | None
+    members: tuple[MemberSpec, ...]
 
     @property
     def name(self) -> str:
         return self.table.name
+
+    @property
+    def drives(self) -> tuple[DriveSpec, ...]:
+        return tuple(one for one in self.members if isinstance(one, DriveSpec))
+
+    @property
+    def devices(self) -> tuple[DeviceSpec, ...]:
+        return tuple(one for one in self.members if isinstance(one, DeviceSpec))
+
+    @property
+    def commanded(self) -> tuple[MemberSpec, ...]:
+        """Members with setpoints or outputs."""
+        return tuple(one for one in self.members if one.is_commanded)

@@ -28,7 +28,7 @@ class Occasion:
 
 def facts(occasion: Occasion, node: Node, test: DropTest) -> dict[str, Any]:
     """The report as a JSON object."""
-    first = node.device.identification if node.device else node.drives[0].identification
+    first = node.members[0].identification
     report: dict[str, Any] = {
         "report": "drivebridge drop-test",
         "version": __version__,

@@ -19,9 +19,10 @@ from bridge.base.errors import OperationFailed
 from bridge.bustools.bystander import command_ids
 from bridge.bustools.drop_test import DropTest, ForeignMaster, Phase
 from bridge.bustools.muted_bus import MutableBus
-from bridge.catalogue import Catalogue
+from bridge.catalogue import Catalogue, MemberSpec
 from bridge.cli import drop_report
 from bridge.cli.bus import AsJson, CliBus, carry_out, not_virtual, tell
+from bridge.cli.kinds import words_of
 from bridge.cli.stopping import until_stopped
 from bridge.command import Plant
 from bridge.config import BusTable, NodeTable, Site
@@ -50,10 +51,10 @@ def drop_test(
     """Stop supervising the drives or outputs of NODE, measure what it does, and write a report to sign."""
     project = load_project(site)
     bus, table = find_node(project, node)
-    family = project.families[table.mapping_key]
-    if family.is_device and not family.output:
+    commanded = Catalogue.of(project.site, project.families).nodes[table.name].commanded
+    if not commanded:
         raise typer.BadParameter(f"{node} has neither drives nor outputs: there is nothing to stop")
-    consent = agree(table, at_the_machine=at_the_machine, is_device=family.is_device)
+    consent = agree(commanded[0], at_the_machine=at_the_machine)
     refuse_company(project, bus, table)
     occasion = drop_report.Occasion(
         operator or getpass.getuser(), socket.gethostname(), consent, datetime.now(UTC), site
@@ -89,23 +90,15 @@ def find_node(project: Project, name: str) -> tuple[BusTable, NodeTable]:
     return bus, node
 
 
-def agree(node: NodeTable, *, at_the_machine: bool, first: str = "", is_device: bool = False) -> str:
-    """Form in which the operator agreed. ``first`` says what is done before the test. Raises ``BadParameter``
-    or ``OperationFailed`` if nobody agreed."""
+def agree(one: MemberSpec, *, at_the_machine: bool, first: str = "") -> str:
+    """Form in which the operator agreed to the test of a node, of which ``one`` is commanded. ``first`` says
+    what is done before the test. Raises ``BadParameter`` or ``OperationFailed`` if nobody agreed."""
     if at_the_machine:
         return "agreed by --yes-i-am-at-the-machine"
     if not sys.stdin.isatty():
         raise typer.BadParameter("somebody has to be at the machine: run it on a terminal")
-    what = (
-        f"The drives of {node.name} (id {node.id}) are booted, get stopped words, and are then left "
-        "without supervision until they report a fault. None is enabled; all of them will have to be "
-        "acknowledged."
-    )
-    if is_device:
-        what = (
-            f"{node.name} (id {node.id}) is booted, its outputs get their safe values, and it is then left "
-            "without supervision until it leaves Operational."
-        )
+    node = one.node
+    what = words_of(one).drop_test.format(node=node.name, id=node.id)
     tell(
         f"{first}{what} Nobody else may command this bus meanwhile. Be where the machine's emergency stop is."
     )

@@ -95,17 +95,17 @@ def _lines(
     findings: Sequence[Finding],
     node_id: int | None,
 ) -> list[str]:
-    device, commissioning = description.device, description.commissioning
-    named = " ".join(text for text in (device.vendor, device.product, device.order_code) if text)
+    info, commissioning = description.device_info, description.commissioning
+    named = " ".join(text for text in (info.vendor, info.product, info.order_code) if text)
     entries = sum(len(one.entries) for one in description.objects)
     lines = [
         f"{file}: {description.format}, {named or 'a device without a name'}",
-        f"  vendor id {_hex(device.vendor_id)}, product code {_hex(device.product_code)}, "
-        f"revision {_hex(device.revision)}",
+        f"  vendor id {_hex(info.vendor_id)}, product code {_hex(info.product_code)}, "
+        f"revision {_hex(info.revision)}",
         f"  {len(description.objects)} objects with {entries} entries",
     ]
-    if device.bitrates:
-        rates = ", ".join(f"{rate // 1000}" for rate in device.bitrates)
+    if info.bitrates:
+        rates = ", ".join(f"{rate // 1000}" for rate in info.bitrates)
         lines.append(f"  bit rates {rates} kbit/s")
     if commissioning.node_id is not None or commissioning.node_name:
         name = f" {commissioning.node_name}" if commissioning.node_name else ""
@@ -144,7 +144,7 @@ def _as_json(
 ) -> dict[str, Any]:
     return {
         "format": description.format,
-        "device": asdict(description.device),
+        "device": asdict(description.device_info),
         "modules": [asdict(one) for one in description.modules],
         "plugged": list(description.plugged),
         "node_id": node_id,

@@ -90,7 +90,7 @@ def exchange(
     options = _Options(site, files, at_the_machine, same_serial, force, operator, wait, as_json)
     project = load_project(site)
     bus, table = drop_test.find_node(project, node)
-    if project.families[table.mapping_key].is_device:
+    if not table.drive:
         raise typer.BadParameter(
             f"{node} is no drive: `drivebridge parameters restore` gives it its settings, and `drop-test` "
             "proves what becomes of its outputs"
@@ -116,7 +116,7 @@ def _begin(
     places[0].target.run(lambda now: backups.identify(identity))
     _judge(options.site, table, places, identity, same_serial=options.same_serial)
     consent = drop_test.agree(
-        table,
+        places[0].target.one,
         at_the_machine=options.at_the_machine,
         first=f"The settings of {table.name} are overwritten with those of the backups. ",
     )

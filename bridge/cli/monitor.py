@@ -16,6 +16,7 @@ from bridge.base import clock
 from bridge.base.errors import OperationFailed
 from bridge.bustools.decode import Decoder, Kind, Meaning
 from bridge.bustools.habit_watch import HabitWatch
+from bridge.bustools.pdo_views import without_pdos
 from bridge.bustools.silence_watch import SilenceWatch, bounds
 from bridge.bustools.statistics import Statistics
 from bridge.bustools.task import BusTask
@@ -91,8 +92,8 @@ def monitor(
     line = choose_bus(site, replace(which, channel=None) if path else which, is_recorded=path is not None)
     ids = {line.node_id(text) for text in node or []}
     kinds = set(kind or [])
-    devices = [name for name, family in line.families.items() if family.is_device]
-    decoder = Decoder(line.table.node, line.families, line.own_id, family_dictionaries(devices, site))
+    descriptions = family_dictionaries(without_pdos(line.families), site)
+    decoder = Decoder(line.table.node, line.families, line.own_id, descriptions)
     tally = Statistics(line.table.bitrate)
     habits = HabitWatch(lambda node_id: line.sdo_policy(node_id)[0], decoder.tpdo_bytes)
 

@@ -12,8 +12,9 @@ import typer
 
 from bridge.base.errors import Unavailable
 from bridge.bustools.own_check import OwnCheck
-from bridge.catalogue import Catalogue, DeviceSpec, DriveSpec, NodeSpec
+from bridge.catalogue import Catalogue, MemberSpec, NodeSpec
 from bridge.cli.bus import AsJson, BusName, CliBus, carry_out, print_table, tell
+from bridge.cli.kinds import words_of
 from bridge.cli.terminal import progress
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.lint import WorstCase, lint
@@ -38,6 +39,7 @@ class Audited:
     """One drive. ``failure``: why its node could not be asked."""
 
     node: NodeSpec
+    one: MemberSpec
     case: WorstCase
     was_read: bool
     failure: str = ""
@@ -108,26 +110,19 @@ def audit_drives(
         elif not offline:
             answers = _ask(CliBus(table, project.families, is_of_site=True), nodes, unavailable)
         for node in nodes:
-            for drive in _commanded(node):
+            for drive in node.commanded:
                 case = cases.get(drive.name)
                 if case is None:  # nobody commands it
                     continue
                 if answers is None:
-                    yield Audited(node, case, was_read=False)
+                    yield Audited(node, drive, case, was_read=False)
                     continue
                 judgements, failed = answers
                 own = judgements.get(drive.name)
                 failure = failed.get(node.name, "" if own else "interrupted")
                 unknown = OwnJudgement(accepted=case.own.accepted)
                 found = replace(case, own=own or unknown)
-                yield Audited(node, found, own is not None, failure)
-
-
-def _commanded(node: NodeSpec) -> Sequence[DriveSpec | DeviceSpec]:
-    """Its drives, or the device that it is instead where that has outputs."""
-    if node.device:
-        return [node.device] if node.device.is_commanded else []
-    return node.drives
+                yield Audited(node, drive, found, own is not None, failure)
 
 
 def _ask(line: CliBus, nodes: Sequence[NodeSpec], unavailable: list[str]) -> _Answers:
@@ -184,8 +179,7 @@ def _explain(found: list[Audited], site: Path) -> None:
 
 
 def _tell(one: Audited) -> None:
-    runs_on = "keep its outputs" if one.node.device else "run on"
-    would = f"{'would' if one.own.verdict is OwnVerdict.RUNS_ON else 'may'} {runs_on}"
+    would = f"{'would' if one.own.verdict is OwnVerdict.RUNS_ON else 'may'} {words_of(one.one).runs_on}"
     word, why = ("accepted", one.own.accepted) if one.own.accepted else ("error", one.own.reason)
     print(f"{word}: {one.case.drive} {would} when the bridge falls silent: {why}")
 
@@ -235,10 +229,8 @@ def _configure(want: OwnWant) -> Iterator[str]:
 def audit_facts(one: Audited) -> dict[str, Any]:
     """JSON object of one drive for ``--json``."""
     own = one.own
-    family = next(
-        (drive.family for drive in one.node.drives if drive.name == one.case.drive), one.node.family
-    )
-    wants = [] if own.verdict is OwnVerdict.STOPS else suggested(family, one.node.bus, one.node.table)
+    is_stopped = own.verdict is OwnVerdict.STOPS
+    wants = [] if is_stopped else suggested(one.one.family, one.node.bus, one.node.table)
     return {
         "drive": one.case.drive,
         "ok": one.is_ok,

@@ -13,14 +13,15 @@ from bridge.base import clock
 from bridge.base.errors import OperationFailed
 from bridge.bustools.bystander import Bystander, Standstill
 from bridge.bustools.parameter import ParameterTask
+from bridge.catalogue import Catalogue, MemberSpec
 from bridge.cli.bus import CliBus, carry_out, not_virtual, tell
 from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import Show, progress
 from bridge.command.output_words import OutputWords
-from bridge.config import BusTable, NodeTable
+from bridge.config import NodeTable
 from bridge.mapping.model import Family, Slot
 from bridge.node.parameters.run import Procedure
-from bridge.parameter import DriveParameters, Entry, Ledger, Names, ParameterError, Why
+from bridge.parameter import DriveParameters, Entry, Ledger, ParameterError, Why
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.parameter.protection import Gate
 from bridge.project import load_project
@@ -53,20 +54,30 @@ class Saved:
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One drive of a site, or a node that is none and has no slot, with the ledger that counts the writes to
-    it."""
+    """One drive of a site, or a node that is none, with the ledger that counts the writes to it."""
 
     line: CliBus
-    node: NodeTable
-    family: Family
-    slot: Slot | None
+    one: MemberSpec
     access: DriveParameters
     ledger: Ledger
     file: LedgerFile
 
     @property
     def name(self) -> str:
-        return self.access.name
+        return self.one.name
+
+    @property
+    def node(self) -> NodeTable:
+        return self.one.node
+
+    @property
+    def family(self) -> Family:
+        return self.one.family
+
+    @property
+    def slot(self) -> Slot | None:
+        """Slot of the drive; a node that is none has no slot."""
+        return self.one.slot
 
     def refuse_unforced(self, entries: Iterable[Entry]) -> None:
         """Raises ``BadParameter`` with all that is written with ``--force`` only, if at all."""
@@ -91,7 +102,6 @@ class Target:
             raise OperationFailed(
                 f"another master is active on {table.name}: {heard.found}; write through it, or stop it first"
             )
-        outputs = OutputWords(self.node.name, self.family.output, self.node.outputs.on_expiry)
         return Standstill(
             self.access.names,
             self.family,
@@ -99,7 +109,7 @@ class Target:
             heard.status,
             force=force,
             whole=whole,
-            outputs=outputs,
+            outputs=OutputWords.of(self.node, self.family),
         )
 
     def run(
@@ -175,25 +185,12 @@ def find(site: Path, drive: str) -> Target:
     there are."""
     project = load_project(site)
     ledger, file = Ledger(), LedgerFile(Path(project.site.site.state_dir))
-    targets: dict[str, tuple[BusTable, NodeTable, Slot | None]] = {}
-    for bus in project.site.bus:
-        for node in bus.node:
-            family = project.families[node.mapping_key]
-            for table in node.drive:
-                slot = family.slot_named(table.slot)
-                targets[f"{node.name}/{family.leaf_of(table)}"] = (bus, node, slot)
-            if family.is_device:
-                targets[node.name] = (bus, node, None)
+    targets = Catalogue.of(project.site, project.families).members
     found = [name for name in targets if drive in (name, name.partition("/")[0])]
     if len(found) != 1:
         known = ", ".join(found or targets)
         raise typer.BadParameter(f"{drive!r} is {'more than one' if found else 'no'} drive: {known}")
-    (name,) = found
-    bus, node, slot = targets[name]
-    family = project.families[node.mapping_key]
-    family = family.of_slot(slot) if slot else family
-    access = DriveParameters(
-        name, node.name, family, Names(family), ledger, on_first=family.is_on_first(slot)
-    )
-    line = CliBus(bus, project.families, is_of_site=True, state_dir=Path(project.site.site.state_dir))
-    return Target(line, node, family, slot, access, ledger, file)
+    one = targets[found[0]]
+    access = DriveParameters(one.name, one.node.name, one.family, one.names, ledger, on_first=one.is_on_first)
+    line = CliBus(one.bus, project.families, is_of_site=True, state_dir=Path(project.site.site.state_dir))
+    return Target(line, one, access, ledger, file)

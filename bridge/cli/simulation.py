@@ -68,7 +68,7 @@ def _described(file: Path, folders: Sequence[Path], modules: Sequence[str]) -> _
     """A node of a device description. A drive with one axis is played as the mapping that is made of its
     file: it has a motor."""
     family = describe(file, folders, modules)
-    if family.is_device or any(slot.axis > 1 for slot in family.slot):
+    if {slot.axis for slot in family.slot} != {1}:
         description = read_whole_device_file(file, modules)
         return lambda node_id, parameters: simulate_description(
             description, node_id, values_of(family, parameters)

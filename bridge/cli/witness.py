@@ -24,7 +24,7 @@ from bridge.cli.bus import AsJson
 from bridge.config import Site, load_site
 from bridge.witness.findings import Alarm, Finding, Kind, Sight, Stop
 from bridge.witness.numbers import Numbers
-from bridge.witness.plan import UNKNOWN_MS, UnknownFamily, WatchedBus, WatchedOutputs, plan
+from bridge.witness.plan import UnknownFamily, WatchedBus, plan
 from bridge.witness.shell import CannotListen, Witness
 
 _log = logging.getLogger(__name__)
@@ -123,28 +123,7 @@ def _numbers(site: Site, given: str | None, buses: list[WatchedBus]) -> Numbers 
 
 def _promises(buses: list[WatchedBus], has_numbers: bool) -> list[str]:
     """The bounds for each drive, and for the outputs of each node."""
-    lines: list[str] = []
-    for bus in buses:
-        for drive in bus.drives:
-            stop_ms = drive.stop_ms(drive.timeout_ms) if has_numbers else 0
-            controller = f"{stop_ms} ms" if stop_ms else "not judged"
-            own = "" if drive.silent_ms else " (the drive's own time-out is not known, give --own-timeout-ms)"
-            silent = f"{drive.silent_ms or UNKNOWN_MS} ms{own}"
-            lines.append(
-                f"{drive.name}: dead controller: {controller}, dead bridge: {silent}, "
-                f"stop followed within {drive.follow_ms} ms"
-            )
-        lines += [_promise_of(outputs, has_numbers) for outputs in bus.outputs]
-    return lines
-
-
-def _promise_of(outputs: WatchedOutputs, has_numbers: bool) -> str:
-    if outputs.why_unknown:
-        return f"{outputs.name}: its outputs are not judged: {outputs.why_unknown}"
-    controller = f"{outputs.stop_ms} ms" if has_numbers and outputs.stop_ms else "not judged"
-    own = "" if outputs.silent_ms else " (the node's own time-out is not known, give --own-timeout-ms)"
-    bridge = outputs.why_active or f"{outputs.silent_ms or UNKNOWN_MS} ms{own}"
-    return f"{outputs.name}: outputs: dead controller: {controller}, dead bridge: {bridge}"
+    return [one.promise(has_numbers=has_numbers) for bus in buses for one in bus.watched]
 
 
 def _until(seconds: float | None) -> Callable[[float], bool]:

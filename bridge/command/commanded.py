@@ -9,7 +9,7 @@ from bridge.command.channel import Channel
 from bridge.command.stop_check.state import LastStop, Verdict
 from bridge.command.worst_case import Wire, sync_wait_ms, takeover_ms
 from bridge.config import BusTable
-from bridge.config.model import StoppedTable
+from bridge.config.model import CommandedTable
 from bridge.text import Said, Text
 
 _ASYNCHRONOUS: Final = 255
@@ -52,7 +52,7 @@ class Commanded(Protocol):
     def node_name(self) -> str: ...
 
     @property
-    def table(self) -> StoppedTable: ...
+    def table(self) -> CommandedTable: ...
 
     @property
     def channel(self) -> Channel: ...
@@ -91,6 +91,11 @@ class Commanded(Protocol):
 
     def on_wire(self, wire: Wire, now: float) -> None:
         """Take over the figures that are predicted of its bus."""
+        ...
+
+    def on_own_supervision_changed(self, why: Text, now: float) -> None:
+        """Forget what it does by itself when the bridge falls silent: an object that decides it was
+        written."""
         ...
 
     def on_handed_over(self, now: float) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Protocol
 
 from bridge.catalogue import DeviceSpec
 from bridge.command.drive import Identification
@@ -46,12 +46,48 @@ class _InputTpdo:
         return [index for _, _, index in self.shown]
 
 
-class Device:
-    """One node: its inputs, and its outputs where it has some. Times are monotonic seconds."""
+class Access(Protocol):
+    """Rights to command a device, and the requests about it that were refused."""
 
-    def __init__(self, spec: DeviceSpec, image: Image) -> None:
+    @property
+    def refused_writes(self) -> int: ...
+
+    def refusal(self, identity: Identity) -> Text | None:
+        """Reason why ``identity`` may not command it; None where it may."""
+        ...
+
+    def on_refused(self, now: float) -> None:
+        """Count a request about it that was refused."""
+        ...
+
+
+class InputAccess:
+    """Access to a device of inputs alone: there is nothing to command, and an operator sets its parameters.
+    ``place`` is that of the count in the image."""
+
+    def __init__(self, image: Image, place: int) -> None:
+        self.refused_writes = 0
+        self._image, self._place = image, place
+
+    def refusal(self, identity: Identity) -> Text | None:
+        if identity.role < Role.OPERATOR:
+            return Text.of("request.may_only_read", who=str(identity))
+        return None
+
+    def on_refused(self, now: float) -> None:
+        self.refused_writes += 1
+        self._image.set(self._place, self.refused_writes, now)
+
+
+class Device:
+    """One node: its inputs, and its outputs where it has some, which are ``commanded``. Times are monotonic
+    seconds."""
+
+    def __init__(self, spec: DeviceSpec, image: Image, commanded: Sequence[Outputs] = ()) -> None:
         node, family = spec.node, spec.family
+        self.spec = spec
         self.name = node.name
+        self.commanded = commanded
         self.family = family
         self._hold_ms = node.hold_ms
         self._image = image
@@ -66,9 +102,8 @@ class Device:
         )
         self.identification = Identification()
         """Who it is, by its last boot-up."""
-        self._refused_count = 0
-        self.outputs: Outputs | None = None
-        """Where it has some."""
+        channels = (one.channel for one in commanded)
+        self._access: Access = next(channels, InputAccess(image, self._refused))
         self._heard: list[_InputTpdo] = []
         self._unserved: dict[int, Text] = {}
         """Points that no TPDO carries, with the reason."""
@@ -94,8 +129,8 @@ class Device:
                 if ref is not None and ref in self._signals and in_charge[ref] == place:
                     heard.shown.append((entry, self._signals[ref], self._points[ref]))
             self._heard.append(heard)
-        if self.outputs:
-            self._find_told(self.outputs, in_charge)
+        for outputs in self.commanded:
+            self._find_told(outputs, in_charge)
         self._unserved = {self._points[ref]: why for ref, why in unserved.items()}
         self._judge(now)
 
@@ -117,6 +152,11 @@ class Device:
         for heard in self._heard:
             heard.link.on_node(state, now)
         self._judge(now)
+        for outputs in self.commanded:
+            outputs.channel.on_node(state, now)
+
+    def on_heard_again(self) -> None:
+        """Its node is heard again: its inputs come with the next TPDOs."""
 
     def on_data(self, place: int, values: Sequence[int], now: float) -> None:
         """The TPDO at this place of ``pdos`` has come: the values of its entries, with their signs."""
@@ -132,10 +172,11 @@ class Device:
     def _tell(self, heard: _InputTpdo, values: Sequence[int], now: float) -> None:
         """The link does not know of the TPDO yet."""
         told = [(ref, values[entry] & mask) for entry, ref, mask in heard.told]
-        outputs, last, deadline_s = self.outputs, heard.link.last_pdo, heard.pdo.deadline_s
-        if outputs is not None and (outputs.stop_check.is_owed or told != heard.told_values):
-            is_late = last is not None and deadline_s is not None and now - last > deadline_s
-            outputs.on_told(told, now, after_pause=is_late)
+        last, deadline_s = heard.link.last_pdo, heard.pdo.deadline_s
+        is_late = last is not None and deadline_s is not None and now - last > deadline_s
+        for outputs in self.commanded:
+            if outputs.stop_check.is_owed or told != heard.told_values:
+                outputs.on_told(told, now, after_pause=is_late)
         heard.told_values = told
 
     def on_time(self, now: float) -> None:
@@ -144,6 +185,12 @@ class Device:
             heard.link.on_time(now)
         self._judge(now)
         self._image.keep(self._age, self.age_ms(now), now)
+
+    def look(self, now: float) -> None:
+        """Bring to this moment what changes by itself: how good its inputs are, and times of its outputs."""
+        self.on_time(now)
+        for outputs in self.commanded:
+            outputs.look(now)
 
     def next_deadline(self) -> float | None:
         times = [heard.link.next_deadline() for heard in self._heard]
@@ -163,32 +210,24 @@ class Device:
         """The TPDOs that points are shown by."""
         return [heard for heard in self._heard if heard.shown]
 
-    # the HasParameters side
+    # a member of its node
 
     @property
     def is_enabled(self) -> bool:
         """One of its outputs is anything but safe."""
-        return self.outputs is not None and self.outputs.is_moving
+        return any(outputs.is_moving for outputs in self.commanded)
 
     def refusal(self, identity: Identity) -> Text | None:
         """Why ``identity`` may not command it; None where it may."""
-        if self.outputs:
-            return self.outputs.channel.refusal(identity)
-        if identity.role < Role.OPERATOR:
-            return Text.of("request.may_only_read", who=str(identity))
-        return None
+        return self._access.refusal(identity)
 
     @property
     def refused_writes(self) -> int:
-        return self.outputs.channel.refused_writes if self.outputs else self._refused_count
+        return self._access.refused_writes
 
     def on_refused(self, now: float) -> None:
         """A request about it was refused elsewhere."""
-        if self.outputs:
-            self.outputs.channel.on_refused(now)
-            return
-        self._refused_count += 1
-        self._image.set(self._refused, self._refused_count, now)
+        self._access.on_refused(now)
 
     def on_sdo_refused(self, abort_code: int, now: float) -> None:
         """It has refused an SDO that a client had asked for."""

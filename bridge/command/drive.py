@@ -12,7 +12,7 @@ from bridge.command.actual import ActualData
 from bridge.command.commanded import WordTiming
 from bridge.command.deadlines import NOW
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.link import FurtherTpdo
+from bridge.command.link import FurtherTpdo, NodeState
 from bridge.command.meaning_news import MeaningNews
 from bridge.command.messages.event import Event
 from bridge.command.messages.request import Identity
@@ -257,7 +257,22 @@ class Drive(WordTiming):
         self.identification = identification
         self._show(self._identity, [getattr(identification, leaf) for leaf in _IDENTITY], now)
 
-    # the HasParameters side
+    # a member of its node
+
+    @property
+    def commanded(self) -> Sequence[Drive]:
+        return (self,)
+
+    @property
+    def refused_writes(self) -> int:
+        return self.channel.refused_writes
+
+    def begin(self, now: float) -> None:
+        """Show what is known from the start."""
+        self._image.set(self._abort_code, 0, now)
+
+    def on_node(self, state: NodeState, now: float) -> None:
+        self.channel.on_node(state, now)
 
     @property
     def is_enabled(self) -> bool:

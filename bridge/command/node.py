@@ -1,15 +1,16 @@
-"""A configured node: its drives, or the device that it is instead, and what has parameters."""
+"""A configured node and its members: its drives, or the device that it is instead."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Protocol
 
-from bridge.catalogue import NodeSpec
+from bridge.catalogue import MemberSpec, NodeSpec
 from bridge.command.commanded import Commanded
 from bridge.command.device import Device
-from bridge.command.drive import Drive
+from bridge.command.drive import Drive, Identification
 from bridge.command.link import NodeState
 from bridge.command.messages.event import EventQueue
 from bridge.command.messages.request import Action, Identity
@@ -27,6 +28,9 @@ class HasParameters(Protocol):
     """A drive, or a node that is none."""
 
     name: str
+
+    @property
+    def spec(self) -> MemberSpec: ...
 
     @property
     def is_enabled(self) -> bool:
@@ -50,56 +54,73 @@ class HasParameters(Protocol):
         ...
 
 
-class Node:
-    """A configured node and its drives, or the device that it is instead."""
+class Member(HasParameters, Protocol):
+    """A drive or a device of a node: what of it is commanded, and its points. Times are monotonic seconds."""
 
-    def __init__(self, spec: NodeSpec) -> None:
+    @property
+    def commanded(self) -> Sequence[Commanded]: ...
+
+    @property
+    def identification(self) -> Identification:
+        """Identity of its node, by the last boot-up."""
+        ...
+
+    @property
+    def refused_writes(self) -> int:
+        """Requests about it that were refused since the start."""
+        ...
+
+    def begin(self, now: float) -> None:
+        """Show what is known from the start."""
+        ...
+
+    def on_node(self, state: NodeState, now: float) -> None:
+        """Take over the state of its node."""
+        ...
+
+    def on_heard_again(self) -> None:
+        """Go on: its node is heard again, and did not restart in between."""
+        ...
+
+    def look(self, now: float) -> None:
+        """Bring to this moment what changes by itself."""
+        ...
+
+
+class Node:
+    """A configured node with its drives, or the device that it is instead."""
+
+    def __init__(self, spec: NodeSpec, drives: Sequence[Drive], devices: Sequence[Device]) -> None:
         self.spec = spec
         self.name = spec.name
         self.bus, self.table, self.family = spec.bus, spec.table, spec.family
-        self.drives: list[Drive] = []
-        self.device: Device | None = None
+        self.drives, self.devices = drives, devices
+        self.members: Sequence[Member] = (*drives, *devices)
+        self.commanded: Sequence[Commanded] = tuple(
+            chain.from_iterable(one.commanded for one in self.members)
+        )
 
     @property
     def names(self) -> Names:
         """The parameters of the node, or of its first axis."""
         return self.spec.axis_names.of()
 
-    def names_of(self, who: HasParameters) -> Names:
-        """The parameters of one of those that the node has."""
-        return who.spec.names if isinstance(who, Drive) else self.names
-
     def is_of(self, who: HasParameters, ref: ObjectRef) -> bool:
         """An object is that of one who has parameters, and no other drive's of the node: of a node with
         several axes those of its profile."""
-        if not isinstance(who, Drive) or all(one.slot.axis == 1 for one in self.drives):
+        if all(one.spec.axis == 1 for one in self.members):
             return True
-        return ref.index in profile_of(who.slot.axis)
-
-    @property
-    def with_parameters(self) -> Sequence[HasParameters]:
-        return [self.device] if self.device else self.drives
-
-    @property
-    def commanded(self) -> Sequence[Commanded]:
-        """Its drives, or the outputs of the device that it is."""
-        if self.device:
-            return [self.device.outputs] if self.device.outputs else []
-        return self.drives
+        return ref.index in profile_of(who.spec.axis)
 
     def on_state(self, state: NodeState, now: float) -> None:
-        """The node is in another state: what is commanded of it, and what it has as a device."""
-        for drive in self.drives:
-            drive.channel.on_node(state, now)
-        if self.device:
-            self.device.on_node(state, now)
-            if self.device.outputs:
-                self.device.outputs.channel.on_node(state, now)
+        """The node is in another state."""
+        for one in self.members:
+            one.on_node(state, now)
 
     def on_heard_again(self) -> None:
         """The node is heard again, and did not restart in between."""
-        for drive in self.drives:
-            drive.on_heard_again()
+        for one in self.members:
+            one.on_heard_again()
 
 
 @dataclass(frozen=True, slots=True)

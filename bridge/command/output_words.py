@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 
 from bridge.command.messages.request import Code
 from bridge.command.messages.telegram import Refusal, Telegram, not_taken
-from bridge.config import SafeValue
+from bridge.config import NodeTable, SafeValue
 from bridge.image import Value
 from bridge.image.limits import ValueNotTaken
 from bridge.mapping.device import Output
+from bridge.mapping.model import Family
 from bridge.text import Text
 
 _BITS: Final = 16
@@ -47,6 +48,11 @@ class OutputWords:
         self.held: tuple[int, ...] = self.safe([0] * word)
         self.has_let_go = False
         """Somebody has stopped them since they got values: what holds has a value, too."""
+
+    @classmethod
+    def of(cls, node: NodeTable, family: Family) -> Self:
+        """The outputs of a node, safe as the site file says, else its mapping. Drives have none."""
+        return cls(node.name, family.output, node.outputs.on_expiry)
 
     @property
     def all_hold(self) -> bool:

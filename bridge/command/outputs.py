@@ -147,12 +147,12 @@ class Outputs(WordTiming):
         super().__init__(spec.bus)
         node = spec.node
         self.name = self.node_name = node.name
-        self.table = node.outputs
-        self.words = OutputWords(node.name, spec.family.output, node.outputs.on_expiry)
+        self.table = spec.table
+        self.words = OutputWords.of(node, spec.family)
         self.channel = OutputChannel(
             node.name,
             self.words,
-            node.outputs,
+            spec.table,
             node.hold_ms,
             report,
             settled=lambda now: settled(self, now),

@@ -9,11 +9,11 @@ from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Final
+from typing import Final, TypeVar
 
 from bridge.base.guard import Guard
 from bridge.base.ratelimit import RateLimit
-from bridge.catalogue import Catalogue, NodeSpec
+from bridge.catalogue import Catalogue, DeviceSpec, NodeSpec
 from bridge.catalogue.codes import NODE_CODES, NodeState
 from bridge.catalogue.points import CONNECTION_COUNTS
 from bridge.command.audit import AuditTrail, Rejection
@@ -51,6 +51,14 @@ def on_no_bus(request: Request, now: float, reply: Reply) -> bool:
     return False
 
 
+One = TypeVar("One", bound=Commanded)
+Told = tuple[
+    Callable[[Event], None],
+    Callable[[Commanded, float], None],
+    Callable[[float], None],
+    Callable[[float], None],
+]
+"""Callbacks of one that is commanded: ``report``, ``settled``, ``tripped`` and ``due``."""
 _LONGEST_NAME: Final = 80
 """Clients may call anything a drive."""
 _SEVERITY_MISSED, _MISSED_EVENTS, _MISSED_EVERY_S = 700, 3, 60.0
@@ -89,26 +97,20 @@ class Plant:
         """All drives, and the outputs of devices by their nodes."""
         self.nodes = {name: self._node(spec) for name, spec in catalogue.nodes.items()}
         self.drives = {drive.name: drive for node in self.nodes.values() for drive in node.drives}
-        self.devices = {name: node.device for name, node in self.nodes.items() if node.device}
-        """Nodes that are no drives, by their names."""
+        self.members = {one.name: one for node in self.nodes.values() for one in node.members}
+        """Drives, and nodes that are none."""
         self._node_points = {name: self._places_of_node(name) for name in self.nodes}
         self._begin(version)
 
     def _node(self, spec: NodeSpec) -> Node:
         """A node with what it commands."""
-        node = Node(spec)
-        if spec.device:
-            node.device = Device(spec.device, self.image)
-            if spec.device.is_commanded:
-                told = self.report, partial(self._outputs_settled, node), self._tripped, self._due()
-                node.device.outputs = Outputs(spec.device, self.image, *told)
-                self._add(node.device.outputs)
-        for one in spec.drives:
-            told = self.report, partial(self._on_settled, node), self._tripped, self._due()
-            drive = Drive(one, self.image, *told)
-            self._add(drive)
-            node.drives.append(drive)
-        return node
+        drives = [self._added(Drive(one, self.image, *self._told())) for one in spec.drives]
+        devices = [Device(one, self.image, self._outputs(one)) for one in spec.devices]
+        return Node(spec, drives, devices)
+
+    def _outputs(self, spec: DeviceSpec) -> Sequence[Outputs]:
+        """The outputs of a device as one that is commanded; none where it has none."""
+        return [self._added(Outputs(spec, self.image, *self._told()))] if spec.is_commanded else []
 
     def _places_of_node(self, name: str) -> tuple[int, int, int]:
         """Places in the image of the state of a node, its present fault and its last one."""
@@ -127,13 +129,10 @@ class Plant:
             self.image.set(state, NODE_CODES[NodeState.ABSENT], began)
             self.image.set(current, 0.0, began)
             self.image.set(last, 0.0, began)
-            if node.device:
-                node.device.begin(began)
-                if node.device.outputs:
-                    self._outputs_settled(node, node.device.outputs, began)
-            for drive in node.drives:
-                self.set(f"{drive.name}/supervision/sdo_abort_code", 0, began)
-                self._on_settled(node, drive, began)
+            for member in node.members:
+                member.begin(began)
+                for one in member.commanded:
+                    self._on_settled(one, began)
         self.set("bridge/version", version, began)
         self.set("bridge/drives_configured", len(self.drives), began)
         for leaf in CONNECTION_COUNTS:
@@ -143,13 +142,15 @@ class Plant:
     def site(self) -> Site:
         return self.catalogue.site
 
-    def _due(self) -> Callable[[float], None]:
-        """Callback for the deadlines of the next object that is added."""
-        return partial(self._deadlines.due, len(self._commanded))
+    def _told(self) -> Told:
+        """Callbacks of the next one that is added."""
+        due = partial(self._deadlines.due, len(self._commanded))
+        return self.report, self._on_settled, self._tripped, due
 
-    def _add(self, one: Commanded) -> None:
+    def _added(self, one: One) -> One:
         self._deadlines.add(one)
         self._commanded[one.name] = one
+        return one
 
     @property
     def commanded(self) -> Collection[Commanded]:
@@ -229,7 +230,7 @@ class Plant:
                 reply(Outcome(Code.UNKNOWN_TARGET, Text.of("request.no_node", node=request.target)))
             return is_taken
         one = self._commanded.get(request.target)
-        if one is None and request.target not in self.devices:
+        if request.target not in self.members:
             reply = self._counting_refusals(request, now, reply)
             reply(Outcome(Code.UNKNOWN_TARGET, Text.of("request.no_drive", drive=request.target)))
             return False
@@ -333,39 +334,29 @@ class Plant:
                 said = Text.of("watchdog.deadline_missed")
                 self.report(Event(now, Kind.WATCHDOG, one.name, _SEVERITY_MISSED, said))
         self.set("bridge/missed_deadlines", self._deadlines.missed, now)
-        for one in self._commanded.values():
-            one.look(now)
-        for device in self.devices.values():
-            device.on_time(now)
+        for member in self.members.values():
+            member.look(now)
         self.image.tell_kept()
         good = sum(drive.quality is Quality.GOOD for drive in self.drives.values())
         self.set("bridge/drives_good", good, now)
-        refused = sum(drive.channel.refused_writes for drive in self.drives.values())
-        refused += sum(device.refused_writes for device in self.devices.values())
+        refused = sum(member.refused_writes for member in self.members.values())
         self.set("bridge/refused_writes", refused + self._refused_by_others, now)
 
-    def _on_settled(self, node: Node, drive: Drive, now: float) -> None:
-        """Something about a drive has changed: show it, and with it the node's 102.0.
+    def _on_settled(self, one: Commanded, now: float) -> None:
+        """Something about what is commanded has changed: show it, and with it the node's 102.0.
 
         102.0 is there while a controller is silent; it clears by itself and is then the last fault, as
         P170 does.
         """
+        node = self.nodes[one.node_name]
         self._changed[node.bus.name].add(node.name)
-        drive.refresh(now)
-        if drive.stop_check.awaits_sending:
-            self.unsent_stops.add(drive)
-        self._show_node(node, node.drives, node.drives[0].channel.link.node, now)
+        one.refresh(now)
+        if one.stop_check.awaits_sending:
+            self.unsent_stops.add(one)
+        self._show_node(node, node.commanded[0].channel.link.node, now)
 
-    def _outputs_settled(self, node: Node, outputs: Outputs, now: float) -> None:
-        """Something about the outputs of a node has changed."""
-        self._changed[node.bus.name].add(node.name)
-        outputs.refresh(now)
-        if outputs.stop_check.awaits_sending:
-            self.unsent_stops.add(outputs)
-        self._show_node(node, [outputs], outputs.channel.link.node, now)
-
-    def _show_node(self, node: Node, commanded: Sequence[Commanded], is_now: NodeState, now: float) -> None:
-        silent = any(one.channel.is_tripped and one.channel.controller_is_overdue for one in commanded)
+    def _show_node(self, node: Node, is_now: NodeState, now: float) -> None:
+        silent = any(one.channel.is_tripped and one.channel.controller_is_overdue for one in node.commanded)
         fault = node.family.faults.bridge_timeout if silent else 0.0
         state, current, last = self._node_points[node.name]
         self.image.set(state, NODE_CODES[is_now], now)
@@ -416,14 +407,7 @@ class PlantView:
         """Changes are here at once anyway."""
 
     def look(self, drive: str) -> None:
-        now = self._clock()
-        device = self._plant.devices.get(drive)
-        if device is None:
-            self._plant.drives[drive].look(now)
-            return
-        device.on_time(now)
-        if device.outputs:
-            device.outputs.look(now)
+        self._plant.members[drive].look(self._clock())
 
     def submit(self, request: Request, reply: Reply) -> None:
         is_changed = True

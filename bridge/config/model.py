@@ -111,10 +111,15 @@ class AcceptsTable(Table):
     runs_on: Reason | None = Field(None, description="why the drive may run on when the bridge falls silent")
 
 
-class StoppedTable(Table):
-    """What is done about something on a bus that does not follow its stop."""
+class CommandedTable(Table):
+    """Owner of something on a bus, what becomes of it without one, and the reaction to an ignored stop."""
 
     control: Control = Field("none", description="modbus, opcua, zenoh, lease or none")
+    fieldbus_timeout_ms: int | None = Field(
+        None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, like P151"
+    )
+    stop_by_anyone: bool = True
+    accepts: AcceptsTable = Field(default_factory=lambda: AcceptsTable.model_validate({}))
     on_ignored_stop: OnIgnoredStop = Field("stop_node", description="stop_node, reset_node or report")
     ignored_stop_ms: int | None = Field(None, ge=50, le=600_000, description="50…600000 ms")
 
@@ -126,13 +131,10 @@ class StoppedTable(Table):
         return self.on_ignored_stop if is_given or self.control != "none" else "report"
 
 
-class DriveTable(StoppedTable):
+class DriveTable(CommandedTable):
     slot: str = Field(description="the drive as the mapping calls it, such as fu1")
     name: Name | None = None
     unit_id: int | None = Field(None, ge=1, le=247, description="a Modbus unit id, 1…247")
-    fieldbus_timeout_ms: int | None = Field(
-        None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, like P151"
-    )
     life_sign: bool = False
     fieldbus_timeout_writable: bool = False
     fieldbus_timeout_range_ms: TimeoutRange | None = Field(
@@ -142,14 +144,12 @@ class DriveTable(StoppedTable):
     on_expiry: Reaction = Field(
         "disable_voltage", description="disable_voltage, quick_stop, stop, silence or hold"
     )
-    stop_by_anyone: bool = True
     then_silence_ms: int = Field(0, ge=0, le=600_000, description="0 (never) or a time in ms")
     parameters: dict[str, Full] = Field(
         default_factory=dict[str, float], description="scaling, where it is not read from the drive"
     )
     tpdo_deadline_ms: int | None = Field(None, ge=0, le=600_000, description="0 (never late) or a time in ms")
     rtr_poll_ms: int = Field(100, ge=5, le=60_000, description="5…60000 ms")
-    accepts: AcceptsTable = Field(default_factory=lambda: AcceptsTable.model_validate({}))
     rpdo: PdoTables = Field(default_factory=list[PdoTable])
     tpdo: PdoTables = Field(default_factory=list[PdoTable])
 
@@ -171,17 +171,12 @@ class DriveTable(StoppedTable):
 SafeValue = bool | int | float | Literal["hold"]
 
 
-class OutputsTable(StoppedTable):
+class OutputsTable(CommandedTable):
     """Who commands the outputs of a node that is no drive, and what they get when nobody does."""
 
-    fieldbus_timeout_ms: int | None = Field(
-        None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, like P151"
-    )
-    stop_by_anyone: bool = True
     on_expiry: dict[str, SafeValue] = Field(
         default_factory=dict[str, SafeValue], description='for each output a value, or "hold"'
     )
-    accepts: AcceptsTable = Field(default_factory=lambda: AcceptsTable.model_validate({}))
 
 
 class IdentityTable(Table):

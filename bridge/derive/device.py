@@ -30,7 +30,7 @@ _DUMMIES: Final = range(0x0001, 0x0008)
 
 def device_lines(description: Description, source: str, read_only: str = "") -> Iterator[str]:
     """The mapping, line by line; ``read_only`` is why nothing is written into the device."""
-    device = description.device
+    info = description.device_info
     inputs = dict(_signals(description, receives=False))
     outputs = {} if read_only else dict(_signals(description, receives=True))
     yield f"# Made of {one_line(source)} by `drivebridge family new`. A key behind a # is what the file does"
@@ -38,8 +38,8 @@ def device_lines(description: Description, source: str, read_only: str = "") -> 
     yield f"extends = {string(GENERIC)}"
     yield ""
     yield "[family]"
-    yield f"name = {string(device.product or source)}"
-    yield f"vendor = {string(device.vendor or 'unknown')}"
+    yield f"name = {string(info.product or source)}"
+    yield f"vendor = {string(info.vendor or 'unknown')}"
     yield f"source = {string(source)}"
     profile = _profile(description)
     yield f"profile = {profile}" if profile else "# profile = "
@@ -138,10 +138,10 @@ def wanted_identity(description: Description) -> tuple[int | None, int | None]:
     """Vendor and product that a node of this file has to have, None where it need not say: what 1018h does
     not describe the device does not have, whatever stands in [DeviceInfo]. 0 is what a file has that does not
     say."""
-    device = description.device
+    info = description.device_info
     vendor, product = (
         (description.number(0x1018, sub) or other or None) if description.entry(0x1018, sub) else None
-        for sub, other in ((1, device.vendor_id), (2, device.product_code))
+        for sub, other in ((1, info.vendor_id), (2, info.product_code))
     )
     return vendor, product
 
@@ -149,9 +149,9 @@ def wanted_identity(description: Description) -> tuple[int | None, int | None]:
 def is_of(description: Description, vendor: int | None, product: int | None) -> bool:
     """Whether a node with this vendor and product is the device; None is what it does not say. A device whose
     numbers are 0 cannot be told from others."""
-    device = description.device
-    own = description.number(0x1018, 1) or device.vendor_id
-    wanted = description.number(0x1018, 2) or device.product_code
+    info = description.device_info
+    own = description.number(0x1018, 1) or info.vendor_id
+    wanted = description.number(0x1018, 2) or info.product_code
     if not own or own != vendor:
         return False
     if product is None:
@@ -161,14 +161,14 @@ def is_of(description: Description, vendor: int | None, product: int | None) -> 
 
 def identity_lines(description: Description) -> Iterator[str]:
     """1000h and 1018h as far as the file has them."""
-    device = description.device
+    info = description.device_info
     vendor, product = wanted_identity(description)
     facts = (
-        ("vendor_id", 1, vendor, device.vendor_id),
-        ("product_code", 2, product, device.product_code),
+        ("vendor_id", 1, vendor, info.vendor_id),
+        ("product_code", 2, product, info.product_code),
     )
     yield "[identity]"
-    if not (vendor or product or device.vendor_id or device.product_code):
+    if not (vendor or product or info.vendor_id or info.product_code):
         yield "# The file has neither vendor nor product (0/0): any node is taken for this device."
     for key, sub, wanted, other in facts:
         if wanted and other and wanted != other:
@@ -176,7 +176,7 @@ def identity_lines(description: Description) -> Iterator[str]:
         if other and not wanted:
             yield f"# [DeviceInfo] has {key} {word(other, 4)}, and the device no 1018h:{sub:02X} to compare."
         yield f"{key} = {word(wanted, 4)}" if wanted else f"# {key} = 0x"
-    revision = description.number(0x1018, 3) or device.revision
+    revision = description.number(0x1018, 3) or info.revision
     # Another firmware is the same device.
     yield f"# revision = {word(revision, 8)}" if revision else "# revision = 0x"
     yield ""

@@ -72,7 +72,7 @@ def _lines(
     description: Description, source: str, mode: Mode, drives: Sequence[Axis], others: Sequence[Mode]
 ) -> Iterator[str]:
     base = load_family(mode.mapping)
-    device = description.device
+    info = description.device_info
     axes = [drive.view.axis for drive in drives]
     yield f"# Made of {one_line(source)} by `drivebridge family new`. A key behind a # is what the file does"
     yield "# not say: fill it in from the manual, and compare the rest with the device."
@@ -91,8 +91,8 @@ def _lines(
         yield "]"
     yield ""
     yield "[family]"
-    yield f"name = {string(device.product or source)}"
-    yield f"vendor = {string(device.vendor or 'unknown')}"
+    yield f"name = {string(info.product or source)}"
+    yield f"vendor = {string(info.vendor or 'unknown')}"
     yield f"source = {string(source)}"
     yield ""
     yield from _identity(description)

@@ -160,9 +160,9 @@ def _carrier(description: Description, word: int) -> str:
 
 
 def _name(description: Description, source: str) -> str:
-    device = description.device
-    vendor = file_name(device.vendor) or "unknown"
-    return f"{vendor}/{file_name(device.product) or file_name(source.rpartition('.')[0]) or 'device'}"
+    info = description.device_info
+    vendor = file_name(info.vendor) or "unknown"
+    return f"{vendor}/{file_name(info.product) or file_name(source.rpartition('.')[0]) or 'device'}"
 
 
 def describe(path: Path, folders: Sequence[Path] = (), modules: Sequence[str] = ()) -> Family:

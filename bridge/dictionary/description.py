@@ -24,14 +24,14 @@ def dictionary_of(description: Description, node_id: int | None = None) -> Objec
     dictionary = ObjectDictionary()
     dictionary.node_id = node_id
     dictionary.bitrate = description.commissioning.bitrate
-    device, information = description.device, dictionary.device_information
-    information.vendor_name = one_line(device.vendor)
-    information.vendor_number = device.vendor_id
-    information.product_name = one_line(device.product)
-    information.product_number = device.product_code
-    information.revision_number = device.revision
-    information.order_code = one_line(device.order_code)
-    information.allowed_baudrates = set(device.bitrates)
+    info, information = description.device_info, dictionary.device_information
+    information.vendor_name = one_line(info.vendor)
+    information.vendor_number = info.vendor_id
+    information.product_name = one_line(info.product)
+    information.product_number = info.product_code
+    information.revision_number = info.revision
+    information.order_code = one_line(info.order_code)
+    information.allowed_baudrates = set(info.bitrates)
     for one in description.objects:
         _add(dictionary, one, node_id)
     return dictionary

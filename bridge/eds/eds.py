@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.eds.fields import Fields
 from bridge.eds.ini import SPELLING, Section, read_sections, shown, stripped
-from bridge.eds.model import Commissioning, Description, Device, Object, Report
+from bridge.eds.model import Commissioning, Description, DeviceInfo, Object, Report
 from bridge.eds.modules import Modules
 from bridge.eds.objects import ObjectReader
 from bridge.eds.pdos import add_compact_pdos
@@ -47,7 +47,7 @@ def read_eds(text: str, report: Report, names: Sequence[str] = ()) -> Descriptio
     commissioning = reader.commissioning()
     return Description(
         format=reader.format(objects),
-        device=reader.device(),
+        device_info=reader.device_info(),
         commissioning=commissioning,
         objects=tuple(objects[index] for index in sorted(objects)),
         modules=modules.known,
@@ -131,13 +131,13 @@ class _EdsReader:
         configured = any(e.parameter_value is not None for o in objects.values() for e in o.entries)
         return "DCF" if configured or any(name in self._sections for name in _COMMISSIONING) else "EDS"
 
-    def device(self) -> Device:
+    def device_info(self) -> DeviceInfo:
         section = self._sections.get("deviceinfo")
         if section is None:
             self._report.warning(0, "there is no [DeviceInfo]: the device is not named")
-            return Device()
+            return DeviceInfo()
         fields = self._fields
-        return Device(
+        return DeviceInfo(
             vendor=section.text("VendorName"),
             vendor_id=fields.number(section, "VendorNumber"),
             product=section.text("ProductName"),

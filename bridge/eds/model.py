@@ -166,8 +166,9 @@ class Object:
 
 
 @dataclass(frozen=True, slots=True)
-class Device:
-    """Vendor and product. Numbers are None and texts empty if the file does not say."""
+class DeviceInfo:
+    """Vendor and product, as in [DeviceInfo] of an EDS (CiA 306) or DeviceIdentity of an XDD (CiA 311).
+    Numbers are None and texts empty if the file does not say."""
 
     vendor: str = ""
     vendor_id: int | None = None
@@ -209,7 +210,7 @@ class Description:
     objects, by index and sub-index."""
 
     format: str
-    device: Device = field(default_factory=Device)
+    device_info: DeviceInfo = field(default_factory=DeviceInfo)
     commissioning: Commissioning = field(default_factory=Commissioning)
     objects: tuple[Object, ...] = ()
     findings: tuple[Finding, ...] = ()

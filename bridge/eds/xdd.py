@@ -6,7 +6,7 @@ from typing import Final
 
 from bridge.eds.fields import Fields
 from bridge.eds.ini import Section, Text, shown
-from bridge.eds.model import Commissioning, Description, Device, Object, Report
+from bridge.eds.model import Commissioning, Description, DeviceInfo, Object, Report
 from bridge.eds.objects import ObjectReader
 from bridge.eds.xdd_parameters import DEFAULT_ACCESS, Parameters
 from bridge.eds.xml import Element, parse
@@ -44,7 +44,7 @@ class _XddReader:
         configured = any(e.parameter_value is not None for o in objects.values() for e in o.entries)
         return Description(
             format="XDC" if commissioning or configured else "XDD",
-            device=self._device(),
+            device_info=self._device_info(),
             commissioning=self._commissioning(commissioning) if commissioning else Commissioning(),
             objects=tuple(objects[index] for index in sorted(objects)),
         )
@@ -102,11 +102,11 @@ class _XddReader:
             section.keys["accesstype"] = Text(DEFAULT_ACCESS, element.line)
         return section
 
-    def _device(self) -> Device:
+    def _device_info(self) -> DeviceInfo:
         identity = self._root.first("DeviceIdentity")
         if identity is None:
             self._report.warning(0, "there is no DeviceIdentity: the device is not named")
-            return Device()
+            return DeviceInfo()
         texts = {child.tag: Text(child.text.strip(), child.line) for child in identity.children}
         section = Section("DeviceIdentity", identity.line)
         for tag, key in (("vendorID", "vendornumber"), ("productID", "productnumber")):
@@ -118,7 +118,7 @@ class _XddReader:
         vendor, order = texts.get("vendorName"), texts.get("orderNumber")
         if revision and revision.attributes.get("value", "").lower().startswith("0x"):
             section.keys["revisionnumber"] = Text(revision.attributes["value"], revision.line)
-        return Device(
+        return DeviceInfo(
             vendor=vendor.text if vendor else "",
             vendor_id=self._fields.number(section, "VendorNumber"),
             product=product.text if product else "",

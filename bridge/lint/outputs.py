@@ -88,7 +88,7 @@ def _is_commanded(node: NodeView) -> bool:
 
 
 def _words(node: NodeView) -> OutputWords:
-    return OutputWords(node.table.name, node.family.output, node.table.outputs.on_expiry)
+    return OutputWords.of(node.table, node.family)
 
 
 def _rpdos(node: NodeView) -> list[PdoView]:

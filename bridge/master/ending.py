@@ -13,12 +13,12 @@ from bridge.text import Text, render
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """How many drives there are, and nodes with ``outputs``; and names of both. ``ignoring`` were heard and
-    do not follow their stop; ``unheard`` were not heard; ``unproven`` are outputs whose node does not let
-    them be read, each with the reason."""
+    """Number of what is ``commanded``, of which so many are ``drives`` and the others outputs; and names of
+    both. ``ignoring`` were heard and do not follow their stop; ``unheard`` were not heard; ``unproven`` are
+    outputs whose node does not let them be read, each with the reason."""
 
     drives: int = 0
-    outputs: int = 0
+    commanded: int = 0
     ignoring: tuple[str, ...] = ()
     unheard: tuple[str, ...] = ()
     unproven: tuple[str, ...] = ()
@@ -31,14 +31,14 @@ class Ending:
     @property
     def lines(self) -> list[str]:
         """The last lines of the log."""
-        what = "drives and outputs" if self.outputs else "drives"
+        what = "drives" if self.commanded == self.drives else "drives and outputs"
         lines = [f"forwarded, and not known to be followed: {one}" for one in self.unproven]
         if self.ignoring:
             sent = f"; NMT stop was sent to {', '.join(self.nodes_stopped)}" if self.nodes_stopped else ""
             lines.append(f"NOT STOPPED: {', '.join(self.ignoring)} did not follow the stop{sent}")
         if self.unheard:
             lines.append(f"not heard, may be running or not: {', '.join(self.unheard)}")
-        whole = self.drives + self.outputs
+        whole = self.commanded
         rest = whole - len(self.ignoring) - len(self.unheard) - len(self.unproven)
         return [
             *lines,
@@ -66,7 +66,7 @@ def end(plant: Plant, now: float, enforce: Enforce, *, can_send: bool = True) ->
     ]
     return Ending(
         len(plant.drives),
-        len(plant.commanded) - len(plant.drives),
+        len(plant.commanded),
         tuple(one.name for one in ignoring),
         tuple(unheard),
         tuple(f"{name} ({render(why)})" for name, why in unproven.items()),

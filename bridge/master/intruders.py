@@ -104,7 +104,7 @@ class Intruders:
         connected = node.wire.drives
         known = self._known.get(node.table.id)
         if known is None or known[0] is not connected:
-            commands = commands_of(node.node, connected, node.wire.stop_words, node.wire.outputs)
+            commands = commands_of(node.node, connected, node.wire.stop_words, node.wire.output_pdos)
             known = self._known[node.table.id] = connected, commands
         return known[1]
 

@@ -228,7 +228,7 @@ class Network:
 
     def _ask_drive(self, request: Request, now: float, reply: Reply) -> bool:
         for node in self.nodes:
-            for who in node.node.with_parameters:
+            for who in node.node.members:
                 if who.name == request.target:
                     node.parameters.submit(request, who, now, reply)
                     return True

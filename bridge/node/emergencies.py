@@ -10,7 +10,7 @@ from bridge.canopen import emcy
 from bridge.canopen.frame import Frame
 from bridge.command import BusSide, Drive, Event, Kind
 from bridge.command.node import Node
-from bridge.drive import EmergencyReader
+from bridge.drive import EmergencyMeaning, EmergencyReader
 from bridge.node.emergency_log import EmergencyLog
 from bridge.text import Text
 
@@ -59,14 +59,19 @@ class Emergencies:
         told = self._reader.read(emergency.code, emergency.vendor)
         concerned = [one for one in self._node.drives if one.slot.emcy_drive in (None, number)]
         is_of_one_drive = len(concerned) == 1 or any(one.slot.emcy_drive is not None for one in concerned)
-        if self._node.device or (concerned and not is_of_one_drive):
-            severity = _GONE if told.is_gone else _COMES
-            said = Text.of("node.emergency", number=told.code, text=told.said)
-            self._events.report(Event(at, Kind.EMERGENCY, self._node.name, severity, said))
+        if concerned and not is_of_one_drive:
+            self._report(self._node.name, told, at)
+        for device in self._node.devices:
+            self._report(device.name, told, at)
         for drive in concerned:
             drive.channel.on_emcy(told, at, is_its_own=is_of_one_drive)
             drive.refresh(at)
             self._told(drive, at)
+
+    def _report(self, source: str, told: EmergencyMeaning, at: float) -> None:
+        severity = _GONE if told.is_gone else _COMES
+        said = Text.of("node.emergency", number=told.code, text=told.said)
+        self._events.report(Event(at, Kind.EMERGENCY, source, severity, said))
 
     def refresh(self, now: float) -> None:
         top = f"{self._node.name}/node"

@@ -17,7 +17,7 @@ from bridge.command.node import Node
 from bridge.drive import FAULTED
 from bridge.mapping.model import FaultParameter, Parameter
 from bridge.node.boot import parameter_value
-from bridge.node.places.sdo_channels import SdoChannels, channel_of
+from bridge.node.places.sdo_channels import SdoChannels
 
 _LOOK_S: Final = 0.5
 _AGAIN_S: Final = 1.0
@@ -50,7 +50,7 @@ class FaultReading:
         if self._current is None and self._last is None:
             return
         for drive in node.drives:
-            number = channel_of(node, drive.slot)
+            number = drive.spec.sdo_channel
             if number is not None:
                 self._drives[drive.name] = _Watched(drive, sdo[number])
 

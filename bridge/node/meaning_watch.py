@@ -14,7 +14,7 @@ from bridge.command.node import Node
 from bridge.drive import DriveState, Key, ParameterSet
 from bridge.mapping.model import Meaning, ObjectRef, Parameter
 from bridge.node.boot import code_of, deciding_of, meanings_of, parameter_value
-from bridge.node.places.sdo_channels import SdoChannels, channel_of
+from bridge.node.places.sdo_channels import SdoChannels
 
 _EVERY_S: Final = 8.0
 """How old an answer is when it is asked for again: with the time that this takes a change is found within
@@ -83,7 +83,7 @@ class MeaningWatch:
         self._look_at: float | None = None
         self.now = 0.0
         for drive in node.drives:
-            number = channel_of(node, drive.slot)
+            number = drive.spec.sdo_channel
             asked = meanings_of(drive) or any(
                 value.scaled_by or value.when or value.steady for value in drive.family.values_of(drive.slot)
             )

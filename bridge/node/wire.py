@@ -15,6 +15,7 @@ from bridge.canopen.habits import HabitCounter, Odd
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoChannel
 from bridge.command import BusSide, Commanded, Event, Kind
+from bridge.command.device import Device
 from bridge.command.node import Node
 from bridge.node import boot
 from bridge.node.emergencies import Emergencies
@@ -68,14 +69,17 @@ class NodeWire:
         """Length of each TPDO, by its COB-ID."""
         self.faults = FaultReading(node, self.sdo)
         self.meanings = MeaningWatch(node, self.sdo)
-        outputs = node.device.outputs if node.device else None
-        self._read_back = ReadBack(outputs, self.sdo) if outputs else None
+        outputs = [one for device in node.devices for one in device.commanded]
+        self._read_backs = [ReadBack(one, self.sdo) for one in outputs]
+        self._timed = (*node.devices, *self._read_backs)
         self._emergencies = Emergencies(node, side, self.reject, self.faults.on_emcy)
         self.error_control = ErrorControl(node.table, listener.on_duplicate)
         self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
         self.drives: dict[str, DrivePdos] = {}
-        self._left_out: dict[str, Said] = {}
-        self.outputs: OutputPdos | None = None
+        self.output_pdos: dict[str, OutputPdos] = {}
+        """The PDOs of outputs, by their names, as ``drives`` has those of drives."""
+        self._no_rpdo: dict[str, Said] = {one.name: Text.of("unsent.no_rpdo") for one in outputs}
+        self._left_out = self._no_rpdo
         self._emcy_id: int | None = cobid.EMCY + node.table.id
         self.routes: dict[int, Handler] = self._basic_routes()
         self.routes_changed = True
@@ -96,19 +100,16 @@ class NodeWire:
 
     def carries(self, one: Commanded) -> bool:
         """The boot-up has found RPDOs by which it is commanded."""
-        return self.outputs is not None or one.name in self.drives
+        return one.name in self.drives or one.name in self.output_pdos
 
     @property
     def pdos(self) -> Sequence[DrivePdos | OutputPdos]:
         """By which the node is commanded."""
-        return [self.outputs] if self.outputs else [*self.drives.values()]
+        return [*self.drives.values(), *self.output_pdos.values()]
 
     def why_left_out(self, one: Commanded) -> Text:
         """Reason why the boot-up has found no PDOs by which ``one`` can be commanded."""
-        if self._node.device:
-            return Text.of("unsent.no_rpdo")
-        why = self._left_out.get(one.name, "")
-        return Text.of("unsent.no_pdos_because", why=why) if why else Text.of("unsent.no_pdos")
+        return self._left_out.get(one.name) or Text.of("unsent.no_pdos")
 
     def take_routes(self) -> dict[int, Handler]:
         """Who gets which identifier; no news any more until it changes."""
@@ -149,15 +150,15 @@ class NodeWire:
 
     def send_stopped(self) -> None:
         self._frames += self.stop_words.frames(self.drives, self._listener.is_foreign)
-        if self.outputs:
-            frames = self.outputs.frames_with_stop()
+        for pdos in self.output_pdos.values():
+            frames = pdos.frames_with_stop()
             self._frames += [frame for frame in frames if not self._listener.is_foreign(frame.can_id)]
 
     def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
         unmatched, late = channel.unmatched, channel.late
         self.meanings.now = frame.time
-        if self._read_back:
-            self._read_back.now = frame.time
+        for one in self._read_backs:
+            one.now = frame.time
         channel.on_frame(frame)
         if len(frame.data) != _SDO_BYTES:
             self.habits.note(Odd.SDO_LENGTH, len(frame.data), _SDO_BYTES)
@@ -196,10 +197,8 @@ class NodeWire:
         self._emergencies.on_time(now)
         self.faults.on_time(now)
         self.meanings.on_time(now)
-        if self._node.device:
-            self._node.device.on_time(now)
-        if self._read_back:
-            self._read_back.on_time(now)
+        for one in self._timed:
+            one.on_time(now)
         self.sdo.on_time(now)
         self.send_put_off(now)
 
@@ -224,8 +223,7 @@ class NodeWire:
             self.faults.next_deadline(),
             self.meanings.next_deadline(),
             self.put_off.next_deadline(),
-            self._node.device.next_deadline() if self._node.device else None,
-            self._read_back.next_deadline() if self._read_back else None,
+            *[one.next_deadline() for one in self._timed],
         )
         return min((time for time in times if time is not None), default=None)
 
@@ -249,21 +247,28 @@ class NodeWire:
         self._emcy_id = self._usable_emcy_id(result)
         self._image.put(f"{self._node.name}/node/software_version", result.software_version, now)
         self.drives = connect(self._node, result, self.reject, self._listener.is_taken, now)
-        self._left_out = {name: plan.problem for name, plan in result.drives.items()}
+        self._left_out = self._no_rpdo | {
+            name: Text.of("unsent.no_pdos_because", why=plan.problem)
+            for name, plan in result.drives.items()
+            if plan.problem
+        }
         self._mapped_bytes = {pdo.cob_id: pdo.codec.length for pdo in _tpdos(result)}
         self.routes = self._basic_routes()
         for pdos in self.drives.values():
             self.routes |= pdos.handlers
         sync_ms = self._node.bus.sync_period_ms
         self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
-        if self._node.device:
-            self._node.device.identification = result.identification
-        if self._node.device and result.inputs:
-            self.routes |= connect_inputs(self._node.device, result.inputs, sync_ms, self.reject, now)
-        if self._node.device and self._node.device.outputs and result.outputs:
-            outputs = self._node.device.outputs
-            self.outputs = connect_outputs(outputs, result.outputs, result, self._listener.is_taken, now)
+        for device in self._node.devices:
+            self._connect_device(device, result, now)
         self.routes_changed = True
+
+    def _connect_device(self, device: Device, result: boot.BootResult, now: float) -> None:
+        plan, sync_ms = result.devices[device.name], self._node.bus.sync_period_ms
+        device.identification = result.identification
+        self.routes |= connect_inputs(device, plan.tpdos, sync_ms, self.reject, now)
+        for outputs in device.commanded:
+            pdos = connect_outputs(outputs, plan.rpdos, result, self._listener.is_taken, now)
+            self.output_pdos = {outputs.name: pdos} if pdos else {}
 
     def _usable_emcy_id(self, result: boot.BootResult) -> int | None:
         """Where emergency messages come, unless that is somebody else's."""
@@ -285,5 +290,5 @@ def _tpdos(result: boot.BootResult) -> Iterator[boot.PdoPlan]:
         yield from plan.tpdos
     for of_node in result.node_tpdos:
         yield of_node.pdo
-    if result.inputs:
-        yield from result.inputs.pdos
+    for device in result.devices.values():
+        yield from device.tpdos.pdos

@@ -106,6 +106,16 @@ class WatchedDrive:
         force; 0 where nothing is promised."""
         return promised_ms(timeout_ms, self.beside_ms)
 
+    def promise(self, *, has_numbers: bool) -> str:
+        """The bounds to which it is held; without telegrams' numbers a silent controller is not judged."""
+        stop_ms = self.stop_ms(self.timeout_ms) if has_numbers else 0
+        controller = f"{stop_ms} ms" if stop_ms else "not judged"
+        own = "" if self.silent_ms else " (the drive's own time-out is not known, give --own-timeout-ms)"
+        return (
+            f"{self.name}: dead controller: {controller}, "
+            f"dead bridge: {self.silent_ms or UNKNOWN_MS} ms{own}, stop followed within {self.follow_ms} ms"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class WatchedOutputs:
@@ -139,6 +149,15 @@ class WatchedOutputs:
         nothing is promised."""
         return promised_ms(self.timeout_ms, self.beside_ms)
 
+    def promise(self, *, has_numbers: bool) -> str:
+        """The bounds to which they are held; without telegrams' numbers a silent controller is not judged."""
+        if self.why_unknown:
+            return f"{self.name}: its outputs are not judged: {self.why_unknown}"
+        controller = f"{self.stop_ms} ms" if has_numbers and self.stop_ms else "not judged"
+        own = "" if self.silent_ms else " (the node's own time-out is not known, give --own-timeout-ms)"
+        bridge = self.why_active or f"{self.silent_ms or UNKNOWN_MS} ms{own}"
+        return f"{self.name}: outputs: dead controller: {controller}, dead bridge: {bridge}"
+
 
 def promised_ms(timeout_ms: int, beside_ms: int | None) -> int:
     """Longest time in ms from an owner's last telegram to the last RPDO that enables; 0 where nothing is
@@ -157,6 +176,16 @@ class WatchedBus:
     beats: dict[int, tuple[str, int]]
     nodes: dict[int, float] = field(default_factory=dict[int, float])
     outputs: tuple[WatchedOutputs, ...] = ()
+
+    @property
+    def watched(self) -> tuple[WatchedDrive | WatchedOutputs, ...]:
+        """All that is commanded on it."""
+        return (*self.drives, *self.outputs)
+
+    @property
+    def written(self) -> dict[int, frozenset[int]]:
+        """Objects that move outputs or make them safe, by the node's id."""
+        return {one.node_id: one.written for one in self.outputs}
 
     @property
     def judged_outputs(self) -> list[WatchedOutputs]:

@@ -73,8 +73,7 @@ class Watch:
         self._by_outputs = {can_id: one for one in self._outputs for can_id in one.identifiers}
         owners = [track.owner for track in self._tracks.values()] + [one.owner for one in self._outputs]
         self._owners = {owner.name: owner for owner in owners}
-        written = {one.node_id: one.written for one in bus.outputs}
-        self._services = Services(bus.nodes, self._told_to_run, written)
+        self._services = Services(bus.nodes, self._told_to_run, bus.written)
         self._by_guard: dict[int, list[_Track]] = {}
         for track in self._tracks.values():
             if track.drive.node_id:

@@ -79,7 +79,7 @@ def _not_served(bench: DerivedBench) -> Iterator[str]:
         point = image.read(f"{name}/status/status_word")
         if point.quality is not Quality.GOOD:
             yield f"the status word is {point.quality.label}"
-    for device in bench.plant.devices.values():
+    for device in (one for node in bench.plant.nodes.values() for one in node.devices):
         for signal in device.family.input:
             point = image.read(f"{device.name}/input/{signal.name}")
             if point.quality is not Quality.GOOD and not point.reason:

@@ -136,6 +136,14 @@ class SignalPlan:
     unserved: dict[ObjectRef, Text] = field(default_factory=dict[ObjectRef, Text])
 
 
+@dataclass(slots=True)
+class DevicePlan:
+    """The PDOs of a device: TPDOs bring its inputs, RPDOs take its outputs."""
+
+    tpdos: SignalPlan
+    rpdos: SignalPlan
+
+
 UNREADABLE: Final = Text.of("meaning.cannot_be_read")
 
 
@@ -156,8 +164,7 @@ class BootResult:
     drives: dict[str, DrivePlan] = field(default_factory=dict[str, DrivePlan])
     words: dict[str, WordFacts] = field(default_factory=dict[str, WordFacts])
     node_tpdos: list[NodePdoPlan] = field(default_factory=list[NodePdoPlan])
-    inputs: SignalPlan | None = None
-    outputs: SignalPlan | None = None
+    devices: dict[str, DevicePlan] = field(default_factory=dict[str, DevicePlan])
     held: dict[str, int] = field(default_factory=dict[str, int])
     """What outputs hold that are to hold it, as integers without sign, by their names."""
     bridge_stop: tuple[int, Said] = (0, "")

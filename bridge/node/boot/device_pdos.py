@@ -16,7 +16,7 @@ from bridge.node.boot.actions import (
     U16,
     Action,
     BootResult,
-    Do,
+    DevicePlan,
     PdoPlan,
     SignalPlan,
     Step,
@@ -37,16 +37,16 @@ NONE: Final[Mapping[ObjectRef, Signal]] = MappingProxyType({})
 Plan = Generator[Action, bytes | None, SignalPlan]
 
 
-def plan_device(node: Node, result: BootResult) -> Do:
+def plan_device(node: Node, result: BootResult) -> Generator[Action, bytes | None, DevicePlan]:
     """Every PDO that is switched on and carries one of the family's inputs or outputs."""
     family = node.family
     yield Step(Text.of("boot_step.pdos"), "J")
     inputs = {one.object: one for one in family.input}
     outputs = {one.object: one for one in family.output}
     # A TPDO that carries an output tells whether a stop of it is followed.
-    result.inputs = yield from _plan("TPDO", inputs, result, also=outputs)
-    if outputs:
-        result.outputs = yield from _plan("RPDO", outputs, result)
+    tpdos = yield from _plan("TPDO", inputs, result, also=outputs)
+    rpdos = yield from _plan("RPDO", outputs, result)
+    return DevicePlan(tpdos, rpdos)
 
 
 def _plan(

@@ -14,6 +14,7 @@ from typing import Final
 from bridge.canopen.dialogue import Read, optional
 from bridge.command.node import Node
 from bridge.command.output_words import OutputWords, Place
+from bridge.command.outputs import Outputs
 from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, judge
 from bridge.mapping.fields import ObjectRef
 from bridge.node.boot.actions import Action, BootResult, Step, number
@@ -33,12 +34,10 @@ def read_held(words: OutputWords, result: BootResult) -> Generator[Action, bytes
                 result.held[name] = number(data) & ((1 << place.output.size) - 1)
 
 
-def judge_outputs(
-    node: Node, words: OutputWords, result: BootResult
-) -> Generator[Action, bytes | None, None]:
+def judge_outputs(node: Node, outputs: Outputs, result: BootResult) -> Generator[Action, bytes | None, None]:
     """Into ``result.bridge_stop``; what ``own_timeout_ms`` says is written first where ``enforce`` is true
     and the node holds something else. Raises BootError J where a value that is enforced is not taken."""
-    if words.all_hold:
+    if outputs.words.all_hold:
         result.bridge_stop = 0, Text.of("outputs.all_hold")
         return
     needed_by = "enforce" if node.table.enforce else ""
@@ -46,10 +45,10 @@ def judge_outputs(
     raws = yield from bring_node(node, result)
     own = judge(node.family, raws, node.bus, node.table)
     why = "" if own.verdict is OwnVerdict.STOPS else own.because
-    for place in words.places.values():
+    for place in outputs.words.places.values():
         if not why and place.safe is not None:
             why = yield from read_why_not_safe(place, place.safe)
-    accepted = node.table.outputs.accepts.runs_on or ""
+    accepted = outputs.table.accepts.runs_on or ""
     result.own[node.name] = replace(keeps_outputs(own, why) if why else own, accepted=accepted)
     stays = Text.plain(accepted) if accepted else why
     result.bridge_stop = (0, stays) if why else (own.bridge_ms, "")

@@ -8,8 +8,7 @@ from functools import partial
 from bridge.base.sdo_texts import text_of
 from bridge.canopen.dialogue import Read, optional
 from bridge.canopen.sdo import SdoError
-from bridge.catalogue import DriveSpec, NodeSpec
-from bridge.command import Drive
+from bridge.catalogue import MemberSpec, NodeSpec
 from bridge.command.node import Node
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_supervision import judge
@@ -17,7 +16,7 @@ from bridge.mapping.model import Family
 from bridge.mapping.own_places import OwnPlace, OwnWant, places, wanted
 from bridge.node.boot.actions import Action, BootResult, Do, Step, told_as, wish, write_number
 from bridge.node.boot.status import BootError
-from bridge.node.places.sdo_channels import FIRST, channel_of
+from bridge.node.places.sdo_channels import FIRST
 from bridge.parameter import ParameterError
 from bridge.text import Said, Text
 
@@ -30,7 +29,9 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
 
     Raises BootError J where a value that is enforced is not taken.
     """
-    if node.device or not node.family.own_supervision:
+    if not node.drives:
+        return
+    if not node.family.own_supervision:
         for drive in node.drives:
             result.own[drive.name] = OwnJudgement(accepted=drive.table.accepts.runs_on or "")
         return
@@ -38,8 +39,8 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
     yield Step(Text.of("boot_step.own_supervision"), "J", needed_by=needed_by)
     of_node = yield from bring_node(node, result)
     for drive in node.drives:
-        of_drive = yield from read_places(node, drive, read=_reader(node, result))
-        channel = channel_of(node, drive.slot)
+        of_drive = yield from read_places(node, drive.spec, read=_reader(node, result))
+        channel = drive.spec.sdo_channel
         for want in wanted(drive.family, node.bus, node.table):
             if want.place.per_drive and want.place.key in of_drive and channel is not None:
                 yield from _bring(node, want, of_drive, channel, drive.name, result)
@@ -69,19 +70,20 @@ def _reader(node: Node, result: BootResult) -> Reader:
 
 def read_places(
     node: Node | NodeSpec,
-    drive: Drive | DriveSpec | None,
+    member: MemberSpec | None,
     *,
     link: bool = False,
     read: Reader = optional,
 ) -> Generator[Read, bytes | None, Raws]:
-    """The node's own objects, or those that each drive has for itself. What cannot be read is left out."""
+    """Values of the node's own objects, or of those that each drive has for itself, and a device not. What
+    cannot be read is left out."""
     raw: Raws = {}
-    channel = FIRST if drive is None else channel_of(node, drive.slot)
+    channel = FIRST if member is None else member.sdo_channel
     if channel is None:
         return raw
-    family = node.family if drive is None else drive.family
+    family = node.family if member is None else member.family
     for place in places(family, link=link):
-        if place.per_drive is not (drive is not None):
+        if place.per_drive is not (member is not None):
             continue
         try:
             data = yield from read(place.ref.index, place.ref.sub, channel)

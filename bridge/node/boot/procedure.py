@@ -72,11 +72,11 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
         result.drives[drive.name] = yield from plan_drive(node, drive, result)
     refuse_doubles(result)
     yield from plan_node_tpdos(node, result)
-    if node.device:
-        yield from plan_device(node, result)
-        if node.device.outputs:
-            yield from read_held(node.device.outputs.words, result)
-            yield from judge_outputs(node, node.device.outputs.words, result)
+    for device in node.devices:
+        result.devices[device.name] = yield from plan_device(node, result)
+        for outputs in device.commanded:
+            yield from read_held(outputs.words, result)
+            yield from judge_outputs(node, outputs, result)
     yield from set_own_supervision(node, result)
     yield Step(Text.of("boot_step.words"), "J")
     for drive in node.drives:

@@ -13,7 +13,7 @@ from bridge.command.node import Node
 from bridge.drive import Codes, deciding, is_scale, no_scale
 from bridge.mapping.model import Family, Meaning, ObjectRef, Parameter
 from bridge.node.boot.actions import Action, BootResult, WordFacts, go_on_without
-from bridge.node.places.sdo_channels import FIRST, channel_of
+from bridge.node.places.sdo_channels import FIRST
 from bridge.text import Text, render
 
 
@@ -63,7 +63,7 @@ def code_of(family: Family, meaning: Meaning, data: bytes | None) -> int | None:
 def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action, bytes | None, WordFacts]:
     """Over the SDO channel that reaches this drive."""
     found = WordFacts()
-    channel = channel_of(node, drive.slot)
+    channel = drive.spec.sdo_channel
     asked = meanings_of(drive)
     found.codes = {one.leaf: [None] * drive.family.sets for one, _, _ in asked}
     if channel is None:

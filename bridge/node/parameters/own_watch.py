@@ -26,7 +26,7 @@ class OwnWatch:
         """Why this is not written: a drive of the site is stopped by silence, and would not stop."""
         key = entry.address.index, entry.address.sub
         silent: list[str] = []
-        for one in self._concerned(drive, entry):
+        for one in self._owners(drive, entry) or self._node.drives:
             place = next((place for place in self._places[one.name] if place.key == key), None)
             raw = None if place is None else _raw(place, entry, value)
             if one.table.falls_silent and raw is not None and ends_own_watch(one.family, key, raw):
@@ -41,16 +41,14 @@ class OwnWatch:
         if not self._protection.tells_own_supervision(entry.address):
             return
         why = Text.of("own.changed" if is_certain else "own.may_have_changed", parameter=entry.name)
-        for one in self._concerned(drive, entry):
+        for one in self._owners(drive, entry) or self._node.commanded:
             one.on_own_supervision_changed(why, now)
-        device = self._node.device
-        if device is not None and device.outputs is not None:
-            device.outputs.on_own_supervision_changed(why, now)
 
-    def _concerned(self, drive: HasParameters, entry: Entry) -> Sequence[Drive]:
-        """Whom the object is about: ``drive``, another axis, whose object it is, or all of the node."""
+    def _owners(self, drive: HasParameters, entry: Entry) -> Sequence[Drive]:
+        """Drives that have the object for themselves: ``drive``, or another axis; none where it is the
+        node's."""
         having = [one for one in self._node.drives if self._is_own(one, entry)]
-        return [one for one in having if one is drive] or having or self._node.drives
+        return [one for one in having if one is drive] or having
 
     def _is_own(self, drive: Drive, entry: Entry) -> bool:
         index = entry.address.index

@@ -54,7 +54,7 @@ class ParameterPolling:
 
     def start(self, drives: Sequence[HasParameters], now: float) -> None:
         """Begin with all points of ``drives``."""
-        of_drives = [[(drive, entry) for entry in self._node.names_of(drive).points()] for drive in drives]
+        of_drives = [[(drive, entry) for entry in drive.spec.names.points()] for drive in drives]
         self._places = [place for in_turn in zip(*of_drives, strict=True) for place in in_turn]
         self._due = [(now, place) for place in range(len(self._places))]
         self._next_at = now

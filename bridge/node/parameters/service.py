@@ -35,7 +35,7 @@ from bridge.node.parameters.own_watch import OwnWatch
 from bridge.node.parameters.polling import Came, ParameterPolling
 from bridge.node.parameters.run import Procedure, run
 from bridge.node.parameters.view import NO_CHANNEL, ParameterView
-from bridge.node.places.sdo_channels import FIRST, SdoChannels, parameter_places
+from bridge.node.places.sdo_channels import FIRST, SdoChannels
 from bridge.parameter import (
     DriveParameters,
     Entry,
@@ -77,19 +77,18 @@ class NodeParameters:
         self._sdo = sdo
         self._now = side.began
         self._state = NodeState.ABSENT
-        self._who = parameter_places(node)
         self._access = {
-            place.who.name: DriveParameters(
-                place.who.name,
+            one.name: DriveParameters(
+                one.name,
                 node.name,
                 node.family,
-                node.names_of(place.who),
+                one.spec.names,
                 side.eeprom_writes,
-                on_first=place.on_first,
+                on_first=one.spec.is_on_first,
             )
-            for place in self._who
+            for one in node.members
         }
-        self._channels = {place.who.name: place.channel for place in self._who}
+        self._channels = {one.name: one.spec.sdo_channel for one in node.members}
         self._own_watch = OwnWatch(node)
         self._view = ParameterView(node, side.image)
         self._polling = ParameterPolling(node, len(side.nodes), self._poll)
@@ -114,8 +113,9 @@ class NodeParameters:
         if state is NodeState.OPERATIONAL:
             for access in self._access.values():
                 access.forget()
-            self._view.unreached([place.who for place in self._who if not place.channel], now)
-            self._polling.start([place.who for place in self._who if place.channel], now)
+            members = self._node.members
+            self._view.unreached([one for one in members if not one.spec.sdo_channel], now)
+            self._polling.start([one for one in members if one.spec.sdo_channel], now)
 
     def on_time(self, now: float) -> None:
         self._now = max(now, self._now)
@@ -195,7 +195,7 @@ class NodeParameters:
     def _gate(self, identity: Identity, drive: HasParameters, entry: Entry) -> Gate:
         """What is not of the drive's own axis may move every one that the same channel reaches."""
         channel = self._channels[drive.name]
-        sharing = [place.who for place in self._who if place.channel == channel]
+        sharing = [one for one in self._node.members if one.spec.sdo_channel == channel]
         moved = [drive] if self._node.is_of(drive, entry.address) else sharing
         return Gate(identity.role >= Role.ENGINEER, lambda: any(one.is_enabled for one in moved))
 
@@ -279,7 +279,7 @@ class NodeParameters:
 
     def _as_listed(self, drive: HasParameters, entry: Entry, reading: Reading) -> Reading | ParameterError:
         """What was written as bytes, as the value that it is of."""
-        listed = self._node.names_of(drive).resolve(str(entry.address))
+        listed = drive.spec.names.resolve(str(entry.address))
         held = self._access[drive.name].held(entry)
         if listed.definition is None or listed.definition == reading.entry.definition or held is None:
             return reading
@@ -332,7 +332,7 @@ class NodeParameters:
             return
         self._view.show(drive.name, result)
         name = entry.definition.name if entry.definition else ""
-        if name in self._deciding and entry.address == self._node.names_of(drive).resolve(name).address:
+        if name in self._deciding and entry.address == drive.spec.names.resolve(name).address:
             # It decides what the process data mean, which follow at once.
             drive.on_parameter(name, float(result.value), self._now)
 

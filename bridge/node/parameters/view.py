@@ -27,8 +27,8 @@ class ParameterView:
         self._hold_s = node.table.hold_ms / 1000
         self._indices: dict[tuple[str, ObjectRef], int] = {
             (who.name, entry.address): image.index[f"{who.name}/parameter/{entry.leaf}"]
-            for who in node.with_parameters
-            for entry in node.names_of(who).points()
+            for who in node.members
+            for entry in who.spec.names.points()
         }
         self._dead_at: float | None = None
 

@@ -6,18 +6,17 @@ Each has one transfer at a time; channels do not wait for each other.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final, NamedTuple
+from typing import Final
 
 from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoChannel
 from bridge.canopen.sdo_block import Learned
+from bridge.catalogue import FIRST_CHANNEL as FIRST
 from bridge.catalogue import NodeSpec
-from bridge.command import HasParameters
 from bridge.command.node import Node
-from bridge.mapping.model import SdoServer, Slot
+from bridge.mapping.model import SdoServer
 
-FIRST: Final = 1
 _SEGMENT_BITS: Final = 135
 """A frame of eight bytes with the most stuff bits and the pause behind it (ISO 11898-1)."""
 _SHARE: Final = 0.5
@@ -28,29 +27,6 @@ def opened_servers(node: Node | NodeSpec) -> list[SdoServer]:
     """The further servers that the site file wants to be used, in its order."""
     servers = {server.number: server for server in node.family.sdo}
     return [servers[number] for number in node.table.sdo_channels if number in servers]
-
-
-def channel_of(node: Node | NodeSpec, slot: Slot) -> int | None:
-    """The number of the channel that reaches this drive's parameters, or None where none is open."""
-    return node.family.sdo_channel(slot, node.table.sdo_channels)
-
-
-class ParameterPlace(NamedTuple):
-    """Who has parameters, and the number of the SDO channel that reaches them; None where none is open."""
-
-    who: HasParameters
-    channel: int | None
-    on_first: bool = True
-    """Its objects are those of the node's first channel."""
-
-
-def parameter_places(node: Node) -> list[ParameterPlace]:
-    if node.device:
-        return [ParameterPlace(node.device, FIRST)]
-    return [
-        ParameterPlace(drive, channel_of(node, drive.slot), drive.slot.parameters_by_sdo)
-        for drive in node.drives
-    ]
 
 
 class SdoChannels:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
 
 from bridge.command.node import Node
 from bridge.drive import ControlWords
@@ -12,6 +14,8 @@ from bridge.node.process.outputs import OutputPdos, OutputRpdo
 from bridge.node.process.process_data import DrivePdos, Rpdo
 from bridge.node.process.stop_words import StopWords
 from bridge.text import Text, Words
+
+NO_OUTPUTS: Final[Mapping[str, OutputPdos]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +43,13 @@ class Command:
 
 
 def commands_of(
-    node: Node, connected: Mapping[str, DrivePdos], stop_words: StopWords, outputs: OutputPdos | None = None
+    node: Node,
+    connected: Mapping[str, DrivePdos],
+    stop_words: StopWords,
+    output_pdos: Mapping[str, OutputPdos] = NO_OUTPUTS,
 ) -> dict[int, Command]:
     """By COB-ID: of drives that are ``connected`` the RPDOs that the node has; of the others those under
-    which they may listen; of drives that the site leaves out those of the factory."""
+    which they may listen; of drives that the site leaves out those of the factory; and those of outputs."""
     family = node.family
     words, count = ControlWords(family.control_word), len(family.process.rpdo)
     drives = {drive.slot.name: drive for drive in node.drives}
@@ -65,8 +72,7 @@ def commands_of(
             label = Text.of("frame.rpdo", owner=drive.name)
         for rpdo in rpdos:
             found.setdefault(rpdo.cob_id, Command(label, words, rpdo))
-    if outputs:
-        words = outputs.control_words
-        label = Text.of("frame.rpdo", owner=node.name)
-        return {rpdo.cob_id: Command(label, words, rpdo) for rpdo in outputs.rpdos}
+    for name, pdos in output_pdos.items():
+        label = Text.of("frame.rpdo", owner=name)
+        found |= {rpdo.cob_id: Command(label, pdos.control_words, rpdo) for rpdo in pdos.rpdos}
     return found

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge import __version__
-from bridge.catalogue import NodeSpec
+from bridge.catalogue import FIRST_CHANNEL, NodeSpec
 from bridge.config import BusTable
 from bridge.northbound.gateway.session import Net
 
@@ -31,7 +31,4 @@ def net_of(bus: BusTable, number: int, nodes: Iterable[NodeSpec], tap: Path) -> 
 
 def _on_first(node: NodeSpec) -> str | None:
     """Name of the drive, or of a node that is none, whose parameters the node's first SDO channel reaches."""
-    if node.device:
-        return node.device.name
-    drives = (drive.name for drive in node.drives if drive.slot.parameters_by_sdo)
-    return next(drives, None)
+    return next((one.name for one in node.members if one.sdo_channel == FIRST_CHANNEL), None)

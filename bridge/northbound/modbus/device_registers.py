@@ -53,9 +53,9 @@ class SignalBit:
 
 
 class DeviceMap:
-    """The map of one device. ``bits`` and ``inputs`` are its discrete inputs and input registers, ``coils``
-    and ``outputs`` its coils and holding registers, ``parameters`` those from register 1000 on. ``texts`` is
-    what device identification knows, by object id."""
+    """The map of one device, by the tables of Modbus: inputs are discrete inputs and input registers, outputs
+    coils and holding registers. ``parameters`` are the holding registers from 1000 on. ``texts`` is what
+    device identification knows, by object id."""
 
     def __init__(self, device: DeviceSpec, allows: Allows | None = None) -> None:
         """``allows`` is for the access column; without it, the access is what the mapping offers."""
@@ -67,9 +67,9 @@ class DeviceMap:
         self.texts = {0: family.family.vendor, 1: family.family.name, 6: device.name}
         self.has_outputs = device.is_commanded
         own = {point.name[len(device.name) + 1 :]: point for point in device.points}
-        self.bits, self.inputs = _signals("input", family.input, own, "r")
+        self.discrete_inputs, self.input_registers = _signals("input", family.input, own, "r")
         access = "rw" if allows.may_command else "r"
-        self.coils, self.outputs = _signals("output", family.output, own, access)
+        self.coils, self.holding_registers = _signals("output", family.output, own, access)
         writable = [
             leaf
             for leaf, point in own.items()
@@ -80,7 +80,7 @@ class DeviceMap:
 
     def end(self, table: Table) -> int:
         """First address behind its inputs or outputs."""
-        rows = self.inputs if table is Table.INPUT_REGISTER else self.outputs
+        rows = self.input_registers if table is Table.INPUT_REGISTER else self.holding_registers
         return rows[-1].address + rows[-1].size if rows else VALUES
 
     @property
@@ -104,11 +104,11 @@ class DeviceMap:
         yield row(VALUES_NOT_GOOD, "values_not_good", "uint32", "", not_good)
         if self.has_outputs:
             yield row(TELEGRAMS, "supervision/telegrams", "uint16", "", "counts the owner's valid telegrams")
-        yield from self.inputs
+        yield from self.input_registers
         yield from self._command_rows()
-        yield from self.outputs
+        yield from self.holding_registers
         yield from self.parameters
-        for address, bit in enumerate(self.bits):
+        for address, bit in enumerate(self.discrete_inputs):
             yield Row(Table.DISCRETE_INPUT, address, bit.name, "bool", "r")
         for address, bit in enumerate(self.coils):
             yield Row(Table.COIL, address, bit.name, "bool", "rw" if self._allows.may_command else "r")

@@ -81,10 +81,13 @@ class DeviceUnit(Unit):
         self._abort: Final = place(ABORT_CODE)
         leaves = _SUPERVISION if device_map.has_outputs else ()
         self._supervision: Final = [place(f"supervision/{leaf}") for leaf in leaves]
-        self._bits: Final = {Table.DISCRETE_INPUT: bits(device_map.bits), Table.COIL: bits(device_map.coils)}
+        self._bits: Final = {
+            Table.DISCRETE_INPUT: bits(device_map.discrete_inputs),
+            Table.COIL: bits(device_map.coils),
+        }
         self._rows: Final = {
-            Table.INPUT_REGISTER: rows(device_map.inputs),
-            Table.HOLDING_REGISTER: rows(device_map.outputs),
+            Table.INPUT_REGISTER: rows(device_map.input_registers),
+            Table.HOLDING_REGISTER: rows(device_map.holding_registers),
         }
         self._parameters: Final = Values32(device_map.parameters, name, view.image, words32, PARAMETERS)
         self._all: Final = sorted(
@@ -199,7 +202,8 @@ class DeviceUnit(Unit):
         return self._telegram([self._request(Write(values), caller)])
 
     def plan_mask(self, write: MaskWrite, caller: Identity) -> list[Request]:
-        row = next((row for row in self._map.outputs if row.address == write.address and row.size == 1), None)
+        registers = self._map.holding_registers
+        row = next((row for row in registers if row.address == write.address and row.size == 1), None)
         if row is None:
             raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
         (now_there,) = self.read_words(Table.HOLDING_REGISTER, write.address, 1, caller)
@@ -218,7 +222,7 @@ class DeviceUnit(Unit):
             return self._commands(start, words, caller)
         self._check_range(Table.HOLDING_REGISTER, start, end)
         values: dict[str, Value] = {}
-        for row in self._map.outputs:
+        for row in self._map.holding_registers:
             if start <= row.address < end:
                 written = words[row.address - start : row.address - start + row.size]
                 values[row.name.removeprefix("output/")] = value_of(row, written, self._words32)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
-from bridge.catalogue import Catalogue, DeviceSpec, DriveSpec, Source, rights_of
+from bridge.catalogue import Catalogue, MemberSpec, Source, rights_of
 from bridge.northbound.modbus.device_registers import DeviceMap
 from bridge.northbound.modbus.registers import Allows, DriveMap, Row, Table, row_maker
 
@@ -25,7 +25,7 @@ def drive_maps(catalogue: Catalogue) -> tuple[DriveMap, ...]:
     return tuple(DriveMap(drive, _allows(catalogue, drive)) for drive in drives)
 
 
-def _allows(catalogue: Catalogue, one: DriveSpec | DeviceSpec) -> Allows:
+def _allows(catalogue: Catalogue, one: MemberSpec) -> Allows:
     rights = rights_of(catalogue, Source.MODBUS)
     write = partial(rights.may_write, catalogue)
     return Allows(write, may_command=rights.may_command(one), may_stop=rights.may_stop(one))

@@ -66,14 +66,10 @@ class Holder:
 
 def holders_of(catalogue: Catalogue) -> dict[str, Holder]:
     """Drives and devices with parameters, by the names that commands have for them."""
-    found: dict[str, Holder] = {}
-    for node in catalogue.nodes.values():
-        if one := catalogue.devices.get(node.name):
-            found[one.name] = Holder(one.name, one.node, one.family, one.names, on_first=True)
-        for drive in node.drives:
-            on_first = drive.family.is_on_first(drive.slot)
-            found[drive.name] = Holder(drive.name, drive.node, drive.family, drive.names, on_first)
-    return found
+    return {
+        name: Holder(name, one.node, one.family, one.names, one.is_on_first)
+        for name, one in catalogue.members.items()
+    }
 
 
 class Parameters:

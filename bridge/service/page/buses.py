@@ -10,8 +10,9 @@ from typing import Any, Final
 
 from bridge.base.errors import OperationFailed
 from bridge.bustools.decode import Decoder
-from bridge.bustools.decode_device import DevicePdoView, device_views
-from bridge.bustools.decode_pdo import PdoView, views
+from bridge.bustools.decode_device import DevicePdoView
+from bridge.bustools.decode_pdo import PdoView
+from bridge.bustools.pdo_views import pdo_views, without_pdos
 from bridge.can.listener import Listener, listener_of
 from bridge.can.wirebits import exact_bits
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
@@ -37,8 +38,7 @@ class Buses:
         self._project = project
         self._epoch_ns = epoch_ns
         self._tables = {table.name: table for table in project.site.bus}
-        devices = [name for name, family in project.families.items() if family.is_device]
-        self._descriptions = family_dictionaries(devices, project.path)
+        self._descriptions = family_dictionaries(without_pdos(project.families), project.path)
 
     def taps(self) -> list[tuple[str, int, BusTap]]:
         """Name, bit rate in bit/s and tap of each bus."""
@@ -94,9 +94,7 @@ class Buses:
     def _pdos(self, table: BusTable, name: str) -> Iterator[dict[str, Any]]:
         node = next(node for node in table.node if node.name == name)
         family = self._project.families[node.mapping_key]
-        found: dict[int, PdoView | DevicePdoView] = dict(views(node, family))
-        if family.is_device:
-            found |= device_views(node, family, self._descriptions.get(node.mapping_key))
+        found = pdo_views(node, family, self._descriptions.get(node.mapping_key))
         for cob_id, view in sorted(found.items(), key=lambda pair: pair[1].label):
             parts = _words(view) if isinstance(view, PdoView) else _signals(view)
             yield {"cob_id": f"{cob_id:03X}", "label": view.label, "bytes": view.codec.length, "parts": parts}

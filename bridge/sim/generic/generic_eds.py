@@ -90,18 +90,18 @@ def _is_word(entry: Entry | None) -> bool:
 
 
 def _identity(description: Description, node_id: int) -> DeviceIdentity:
-    device = description.device
+    info = description.device_info
 
     def number(index: int, sub: int, otherwise: int | None) -> int:
         return description.number(index, sub, node_id) or otherwise or 0
 
     return DeviceIdentity(
         device_type=number(0x1000, 0, None),
-        vendor_id=number(0x1018, 1, device.vendor_id),
-        product_code=number(0x1018, 2, device.product_code),
-        revision=number(0x1018, 3, device.revision),
+        vendor_id=number(0x1018, 1, info.vendor_id),
+        product_code=number(0x1018, 2, info.product_code),
+        revision=number(0x1018, 3, info.revision),
         serial=number(0x1018, 4, 1),
-        device_name=device.product.encode("ascii", "replace").decode() or "simulation",
+        device_name=info.product.encode("ascii", "replace").decode() or "simulation",
         hardware_version="SIM",
         software_version="1.0",
     )

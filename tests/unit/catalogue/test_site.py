@@ -40,7 +40,7 @@ def test_what_a_drive_has_is_among_the_points_of_the_site() -> None:
 def test_a_node_that_is_no_drive_has_its_points_and_those_of_a_node(tmp_path: Path) -> None:
     catalogue = device_plant(tmp_path, IO_BLOCK, OUTPUTS).catalogue
     device = catalogue.devices["shaft"]
-    assert catalogue.nodes["shaft"].device is device
+    assert catalogue.nodes["shaft"].members == (device,)
     assert device.points == tuple(one for one in catalogue.points if one.name.startswith("shaft/"))
     assert {"shaft/output/valves", "shaft/node/state"} <= {one.name for one in device.points}
 

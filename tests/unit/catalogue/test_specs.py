@@ -30,18 +30,18 @@ def test_a_drive_is_commanded_by_whom_the_site_file_says() -> None:
 
 def test_a_drives_parameters_are_reached_by_an_open_channel() -> None:
     """SDO1 of a SK TU4-CAO reaches FU1 (BU 2500 §6.4)."""
-    assert [one.has_parameters for one in catalogue().drives.values()] == [True, False]
+    assert [one.sdo_channel for one in catalogue().drives.values()] == [1, None]
     opened = catalogue(node="sdo_channels = [2]")
-    assert [one.has_parameters for one in opened.drives.values()] == [True, True]
+    assert [one.sdo_channel for one in opened.drives.values()] == [1, 2]
 
 
 def test_inputs_are_commanded_by_nobody(tmp_path: Path) -> None:
     one = device(tmp_path)
-    assert (one.control, one.stop_by_anyone, one.is_commanded, one.has_parameters) == (
+    assert (one.control, one.stop_by_anyone, one.is_commanded, one.sdo_channel) == (
         "none",
         False,
         False,
-        True,
+        1,
     )
 
 

@@ -17,18 +17,19 @@ from tests.support.nodes import device_plant, node_of
 def test_a_node_of_drives_is_commanded_by_them_and_has_their_parameters() -> None:
     node = node_of(sites.drive("fu1", "none", 0, ""), sites.drive("fu2", "none", 0, ""))
     assert [one.name for one in node.commanded] == ["conveyor/fu1", "conveyor/fu2"]
-    assert list(node.with_parameters) == list(node.drives)
+    assert list(node.members) == list(node.drives)
     assert node.name == "conveyor"
 
 
 def test_a_device_is_commanded_where_it_has_outputs(tmp_path: Path) -> None:
     encoder = device_plant(tmp_path / "a", ENCODER).nodes["shaft"]
-    assert encoder.device is not None
     assert list(encoder.commanded) == []
-    assert list(encoder.with_parameters) == [encoder.device]
+    assert list(encoder.members) == list(encoder.devices)
+    assert [one.name for one in encoder.members] == ["shaft"]
     block = device_plant(tmp_path / "b", IO_BLOCK, OUTPUTS).nodes["shaft"]
-    assert block.device is not None
-    assert list(block.commanded) == [block.device.outputs]
+    (device,) = block.devices
+    (outputs,) = device.commanded
+    assert list(block.commanded) == [outputs]
 
 
 def with_axes() -> Node:
@@ -54,4 +55,4 @@ def test_of_drives_with_one_axis_each_any_object_may_be_anybodys() -> None:
     (drive,) = node.drives
     assert node.is_of(drive, ObjectRef(0x6040, 0))
     assert node.is_of(drive, ObjectRef(0x2066, 1))
-    assert node.names_of(drive).resolve("P102").address == node.names.resolve("P102").address
+    assert drive.spec.names.resolve("P102").address == node.names.resolve("P102").address

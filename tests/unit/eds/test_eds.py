@@ -51,16 +51,16 @@ def test_a_file_as_the_standard_has_it_has_no_findings() -> None:
     description = read(HEAD)
     assert description.findings == ()
     assert description.format == "EDS"
-    assert description.device.vendor_id == 0x3B
-    assert description.device.revision == 0x10002
-    assert description.device.bitrates == (250_000, 500_000)
+    assert description.device_info.vendor_id == 0x3B
+    assert description.device_info.revision == 0x10002
+    assert description.device_info.bitrates == (250_000, 500_000)
     assert description.number(0x1000) == 0x10192
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "utf-8", "utf-8-sig", "utf-16"])
 def test_umlauts_are_read_however_they_were_saved(encoding: str) -> None:
     description = read(HEAD.replace("Mover", "Überströmer").encode(encoding))
-    assert description.device.product == "Überströmer"
+    assert description.device_info.product == "Überströmer"
     assert all(finding.severity is Severity.WARNING for finding in description.findings)
 
 

@@ -47,8 +47,8 @@ def test_an_xdc_is_read_without_findings() -> None:
     description = read_device(XDD.encode(), "test.xdc")
     assert description.findings == ()
     assert description.format == "XDC"
-    assert (description.device.vendor, description.device.vendor_id) == ("Acme", 0x3B)
-    assert (description.device.product_code, description.device.bitrates) == (7, (250_000,))
+    assert (description.device_info.vendor, description.device_info.vendor_id) == ("Acme", 0x3B)
+    assert (description.device_info.product_code, description.device_info.bitrates) == (7, (250_000,))
     assert (description.commissioning.node_id, description.commissioning.bitrate) == (6, 250_000)
     assert [one.index for one in description.objects] == [0x1000, 0x1800, 0x2000]
     assert description.number(0x1800, 1) == 0x185

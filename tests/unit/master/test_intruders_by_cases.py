@@ -58,7 +58,7 @@ class Node:
         self.commands = {one: Command(f"RPDO {one:X}") for one in commands}
         self.wire = SimpleNamespace(
             drives={},
-            outputs=None,
+            output_pdos={},
             stop_words=SimpleNamespace(given_ids=given),
             sdo=[SimpleNamespace(request_id=0x600 + node_id)],
             pdos=[SimpleNamespace(rpdos=[], tpdos=[pdo])],

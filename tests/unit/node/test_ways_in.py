@@ -129,9 +129,9 @@ def by_command_line(block: Block, name: str) -> None:
     """``drivebridge parameters write --force``, which asks the node itself whether an output is active."""
     node = block.bench.plant.nodes["shaft"]
     access = DriveParameters("shaft", "shaft", node.family, node.names, Ledger())
-    assert node.device
-    assert node.device.outputs
-    guard = Standstill(node.names, node.family, None, None, force=True, outputs=node.device.outputs.words)
+    (device,) = node.devices
+    (outputs,) = device.commanded
+    guard = Standstill(node.names, node.family, None, None, force=True, outputs=outputs.words)
     channel = SdoChannel(0x600 + 20, 0x580 + 20, 0.2)
     results: list[Written | ParameterError] = []
     entry = node.names.resolve(name).as_bytes

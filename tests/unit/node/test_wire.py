@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.drive.own_supervision import judge
 from bridge.master.network import Network
+from bridge.node.boot.actions import BootResult, DrivePlan, WordFacts
 from bridge.node.node import NodeCore
-from bridge.text import render
+from bridge.text import Text, render
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
 from tests.support.nodes import device_plant
 from tests.support.quick import Quick, quick_site
@@ -35,3 +37,17 @@ def test_outputs_that_the_boot_up_has_found_are_carried(tmp_path: Path) -> None:
 def test_a_drive_that_has_not_been_found_is_left_out(tmp_path: Path) -> None:
     core = Quick(quick_site(tmp_path, 1)).core(1)
     assert why_not_carried(core) == "no PDOs of the drive can be used"
+
+
+def test_the_reason_is_that_of_the_last_boot_up(tmp_path: Path) -> None:
+    core = Quick(quick_site(tmp_path, 1)).core(1)
+    (drive,) = core.node.drives
+    told: list[str] = []
+    for problem in (Text.of("boot.id_taken"), ""):
+        plans = {drive.name: DrivePlan(problem=problem)}
+        own = {drive.name: judge(drive.family, {}, core.node.bus, core.node.table)}
+        words = {drive.name: WordFacts()}
+        core.wire.connect(BootResult(drives=plans, own=own, words=words), 1.0)
+        told.append(why_not_carried(core))
+    assert told[0].startswith("no PDOs of the drive can be used: ")
+    assert told[1] == "no PDOs of the drive can be used"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from bridge.lint import lint
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names
 from bridge.project import load_project
-from bridge.witness.plan import Speed, UnknownFamily, WatchedBus, WatchedDrive, plan
+from bridge.witness.plan import Speed, UnknownFamily, WatchedBus, WatchedDrive, WatchedOutputs, Word, plan
 from tests.support import sites
 from tests.support.devices import DEVICES
 
@@ -290,3 +291,34 @@ def test_a_foreign_interface_has_a_queue(tmp_path: Path) -> None:
 def test_the_identifiers_of_the_site_file_count_where_it_has_them(tmp_path: Path) -> None:
     drive = watched(tmp_path, "nord/sk-tu4-cao", "fu1", "tpdo = { event_ms = 100 }")
     assert drive.tpdo == 0x185
+
+
+def test_a_drive_is_held_to_what_is_known_of_its_times() -> None:
+    word = Word(0, 2, 0x0F, 0x0F)
+    known = WatchedDrive("a/drive", 1, 0x205, 0x185, word, word, 200, 100, 500, 700)
+    assert known.promise(has_numbers=True) == (
+        "a/drive: dead controller: 300 ms, dead bridge: 500 ms, stop followed within 700 ms"
+    )
+    unknown = replace(known, silent_ms=0)
+    assert unknown.promise(has_numbers=False) == (
+        "a/drive: dead controller: not judged, dead bridge: 3000 ms (the drive's own time-out is not known, "
+        "give --own-timeout-ms), stop followed within 700 ms"
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "has_numbers", "promise"),
+    [
+        ({}, True, "io: outputs: dead controller: 300 ms, dead bridge: 500 ms"),
+        ({}, False, "io: outputs: dead controller: not judged, dead bridge: 500 ms"),
+        ({"why_active": "they stay"}, True, "io: outputs: dead controller: 300 ms, dead bridge: they stay"),
+        ({"why_unknown": "no file"}, True, "io: its outputs are not judged: no file"),
+    ],
+)
+def test_outputs_are_held_to_what_is_known_of_them(
+    changes: dict[str, str], has_numbers: bool, promise: str
+) -> None:
+    outputs = WatchedOutputs("io", 1, 20, timeout_ms=200, beside_ms=100, silent_ms=500)
+    bus = WatchedBus("can", "can0", (), {}, outputs=(replace(outputs, **changes),))
+    assert [one.promise(has_numbers=has_numbers) for one in bus.watched] == [promise]
+    assert bus.written == {20: frozenset()}

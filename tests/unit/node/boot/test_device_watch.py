@@ -8,6 +8,7 @@ import pytest
 
 from bridge.command.node import Node
 from bridge.command.output_words import OutputWords, Place
+from bridge.command.outputs import Outputs
 from bridge.config import SafeValue
 from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, Watch
 from bridge.mapping.device import Output
@@ -100,12 +101,12 @@ def test_what_is_to_hold_is_read_so_that_the_first_frame_changes_nothing() -> No
     assert nothing.held == {}
 
 
-def block(folder: Path, outputs: str = "") -> tuple[Node, OutputWords]:
+def block(folder: Path, outputs: str = "") -> tuple[Node, Outputs]:
     more = OUTPUTS.replace("[modbus]", f"{outputs}\n[modbus]")
     node = device_plant(folder, IO_BLOCK, more).nodes["shaft"]
-    assert node.device is not None
-    assert node.device.outputs is not None
-    return node, node.device.outputs.words
+    (device,) = node.devices
+    (commanded,) = device.commanded
+    return node, commanded
 
 
 SAFE = {
@@ -119,9 +120,9 @@ SAFE = {
 
 
 def judged(folder: Path, objects: dict[tuple[int, int], bytes], outputs: str = "") -> BootResult:
-    node, words = block(folder, outputs)
+    node, commanded = block(folder, outputs)
     result = BootResult()
-    Answering(objects).run(judge_outputs(node, words, result))
+    Answering(objects).run(judge_outputs(node, commanded, result))
     return result
 
 
@@ -151,8 +152,8 @@ def test_what_the_site_accepts_is_no_note(tmp_path: Path) -> None:
 
 
 def test_where_all_hold_nothing_is_read(tmp_path: Path) -> None:
-    node, words = block(tmp_path, 'on_expiry = { valves = "hold", speed = "hold" }')
+    node, commanded = block(tmp_path, 'on_expiry = { valves = "hold", speed = "hold" }')
     asked, result = Answering(SAFE), BootResult()
-    asked.run(judge_outputs(node, words, result))
+    asked.run(judge_outputs(node, commanded, result))
     assert asked.reads == []
     assert result.bridge_stop == (0, Text.of("outputs.all_hold"))

@@ -19,7 +19,7 @@ class Case:
         self.asked: list[str] = []
         self.done: list[Callable[[Came], None]] = []
         self.polling = ParameterPolling(self.node, nodes, self._ask)
-        self.names = [entry.name for entry in self.node.names_of(self.node.drives[0]).points()]
+        self.names = [entry.name for entry in self.node.drives[0].spec.names.points()]
 
     def _ask(self, who: HasParameters, entry: Entry, done: Callable[[Came], None]) -> None:
         self.asked.append(entry.name)

@@ -21,7 +21,7 @@ class Case:
         node = self.plant.nodes["conveyor"]
         self.view = ParameterView(node, self.plant.image)
         self.drive = node.drives[0]
-        numbers = [one for one in node.names_of(self.drive).points() if one.definition is not None]
+        numbers = [one for one in self.drive.spec.names.points() if one.definition is not None]
         self.entry: Entry = numbers[0]
         self.hold_s = node.table.hold_ms / 1000
 

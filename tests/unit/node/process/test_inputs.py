@@ -19,8 +19,7 @@ from tests.support.nodes import device_plant
 class Case:
     def __init__(self, folder: Path, kind: int = 255, event_ms: int = 100) -> None:
         self.plant = device_plant(folder, ENCODER)
-        device = self.plant.nodes["shaft"].device
-        assert device is not None
+        (device,) = self.plant.nodes["shaft"].devices
         device.on_node(NodeState.OPERATIONAL, 9.0)
         entries = (PdoEntry(0x6004, 0, 32), PdoEntry(0x0005, 0, 8))
         codec = PdoCodec(entries, {(0x6004, 0)})

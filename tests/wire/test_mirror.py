@@ -43,6 +43,7 @@ from bridge.mirror import client as mirror_client
 from bridge.mirror.client import UNREACHABLE
 from bridge.mirror.endpoint import socket_path
 from bridge.northbound.view import View
+from bridge.text import Text
 from bridge.zenohlink import IncomingQuery, Message, ZenohLink, zenoh_config
 from tests.support.outcomes import in_english
 from tests.support.views import view_of
@@ -167,7 +168,7 @@ async def test_the_socket_is_for_us_alone(endpoint: str) -> None:
 
 async def test_ten_thousand_changes_lead_to_the_same_image(endpoint: str) -> None:
     plant = make_plant()
-    chance = random.Random(7)
+    chance, whys = random.Random(7), ("", Text.plain("because"))
     async with publishing(endpoint, plant), front(endpoint) as client, front(endpoint) as second:
         followed = client.image.feed()
         followed.take(10**6)
@@ -176,7 +177,7 @@ async def test_ten_thousand_changes_lead_to_the_same_image(endpoint: str) -> Non
             zero = plant.image.points[index].data_type.zero
             value = type(zero)(chance.randrange(2 if isinstance(zero, bool) else 200))
             quality = chance.choice(list(Quality))
-            plant.image.set(index, value, time.monotonic(), quality, chance.choice(["", "because"]))
+            plant.image.set(index, value, time.monotonic(), quality, chance.choice(whys))
             if count % 100 == 0:
                 await asyncio.sleep(0.001)
         for other in (client, second):
@@ -307,7 +308,7 @@ async def test_events_arrive_with_wall_clock_time(endpoint: str) -> None:
     heard: list[Event] = []
     async with publishing(endpoint, plant), front(endpoint) as client:
         client.on_event(heard.append)
-        plant.report(Event(time.monotonic(), Kind.BUS, "can0", 900, "bus-off"))
+        plant.report(Event(time.monotonic(), Kind.BUS, "can0", 900, Text.plain("bus-off")))
         await until(lambda: heard, "the event")
         assert (heard[0].kind, heard[0].source, heard[0].message) == (Kind.BUS, "can0", "bus-off")
         assert abs(heard[0].time - time.time()) < 5
@@ -374,7 +375,9 @@ async def test_a_killed_bus_process_leaves_every_point_dead_until_it_is_back(end
         first.kill()
         begin = time.monotonic()
         await until(
-            lambda: all((r[1], r[2]) == (Quality.DEAD, UNREACHABLE) for r in shown(client.image)), "dead", 2.0
+            lambda: all((r[1], r[2]) == (Quality.DEAD, str(UNREACHABLE)) for r in shown(client.image)),
+            "dead",
+            2.0,
         )
         assert time.monotonic() - begin < 2
         assert not in_step(client)

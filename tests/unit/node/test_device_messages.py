@@ -25,4 +25,4 @@ def test_its_emergencies_are_events(tmp_path: Path) -> None:
 def test_the_gateway_asks_the_node_itself(tmp_path: Path) -> None:
     bench = device_bench(tmp_path, encoder())
     (node,) = bench.plant.nodes.values()
-    assert net_of(node.bus, 1, [node], Path("tap")).nodes == {20: ("shaft", "shaft")}
+    assert net_of(node.bus, 1, [node.spec], Path("tap")).nodes == {20: ("shaft", "shaft")}

@@ -115,7 +115,7 @@ def by_gateway(identity: Identity) -> Way:
 
     def write(block: Block, name: str) -> None:
         bench = block.bench
-        net = net_of(bench.network.bus, 1, bench.plant.nodes.values(), Path("tap"))
+        net = net_of(bench.network.bus, 1, bench.plant.catalogue.nodes.values(), Path("tap"))
         session = Session(net, identity, bench.view.submit)
         line = f"[1] 1 20 w 0x{name[:4]} 0x{name[5:]} u8 1\r\n"
         session.receive(line.encode(), bench.now)

@@ -9,8 +9,8 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 import sys  # noqa: E402
 
-from bridge.cli.leaving import leave_after  # noqa: E402
-from bridge.cli.signals import ending_signals  # noqa: E402
+from bridge.cli.ending_signals import ending_signals  # noqa: E402
+from bridge.cli.process_exit import leave_after  # noqa: E402
 
 _STAY_UP = ("run", "demo", "simulate")
 

@@ -15,7 +15,7 @@ from bridge.catalogue import Catalogue, Source, rights_of
 from bridge.dbc import BusDescription, describe
 from bridge.image.point import Point
 from bridge.lint import family_dictionaries
-from bridge.lint.bus import view_bus
+from bridge.lint.checked_bus import view_bus
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row
 from bridge.northbound.modbus.units import device_maps, drive_maps, units_of
 from bridge.northbound.zenoh.keys import KeySpace
@@ -27,7 +27,7 @@ _MODBUS: Final = ("unit_id", "drive", "table", "address", "reference", "name", *
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ExportTable:
     """``rows`` have a cell for each of ``columns``."""
 
     columns: tuple[str, ...]
@@ -49,7 +49,7 @@ class Table:
         return json.dumps(self.facts, indent=2) + "\n"
 
 
-def modbus_table(project: Project) -> Table:
+def modbus_table(project: Project) -> ExportTable:
     """Every register: unit, table, 0-based address, 1-based reference, name, type, access, unit."""
     catalogue = _catalogue(project)
     rows = [
@@ -63,10 +63,10 @@ def modbus_table(project: Project) -> Table:
         for row in device.rows
     ]
     rows += [(BRIDGE_UNITS[0], "bridge", *_register(row)) for row in units_of(catalogue).bridge_rows]
-    return Table(_MODBUS, list(rows))
+    return ExportTable(_MODBUS, list(rows))
 
 
-def opcua_table(project: Project) -> Table:
+def opcua_table(project: Project) -> ExportTable:
     """Every variable: NodeId, data type, unit, access, description."""
     catalogue = _catalogue(project)
     rights = rights_of(catalogue, Source.OPCUA)
@@ -74,10 +74,10 @@ def opcua_table(project: Project) -> Table:
         (f"nsu={_NAMESPACE};s={point.name}", *_point(point, is_writable=rights.may_write(catalogue, point)))
         for point in catalogue.points
     ]
-    return Table(("node_id", *_POINT), list(rows))
+    return ExportTable(("node_id", *_POINT), list(rows))
 
 
-def zenoh_table(project: Project) -> Table:
+def zenoh_table(project: Project) -> ExportTable:
     """Every key: data type, unit, access, description. Raises ``OperationFailed`` without zenoh."""
     if project.site.zenoh is None:
         raise OperationFailed(f"{project.path} has no [zenoh] table")
@@ -89,7 +89,7 @@ def zenoh_table(project: Project) -> Table:
         (key, *_point(point, is_writable=rights.may_write(catalogue, point)))
         for key, point in zip(space.keys, points, strict=True)
     ]
-    return Table(("key", *_POINT), list(rows))
+    return ExportTable(("key", *_POINT), list(rows))
 
 
 def dbc_file(project: Project, bus: int, *, words: bool = False) -> str:

@@ -11,12 +11,12 @@ from bridge.base.errors import FileFaults
 from bridge.config import NodeTable, Site, read_site
 from bridge.config.download import Download
 from bridge.derive import describe
-from bridge.drive.own_supervision import judge, why_silence_does_not_stop
+from bridge.drive.own_judgement import judge, why_silence_does_not_stop
 from bridge.eds import read_configurations
 from bridge.mapping import Family
 from bridge.mapping.model import Slot
 from bridge.mapping.own_places import Raw, channels_needed, offline
-from bridge.mapping.site import load_site_and_families
+from bridge.mapping.site_families import load_site_and_families
 from bridge.text import Text
 from bridge.tomlfile import Key
 

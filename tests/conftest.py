@@ -11,7 +11,7 @@ from pathlib import Path
 import bridge.catalogue.site
 import bridge.mapping
 import bridge.mapping.loader
-import bridge.mapping.site
+import bridge.mapping.site_families
 from bridge.mapping import Family
 from bridge.mapping.loader import is_template, load_family, mappings_dir
 from bridge.parameter import AxisNames
@@ -29,7 +29,7 @@ def _load_family(name: str, folders: Sequence[Path] = ()) -> Family:
     return _load_own(name) if is_own else load_family(name, folders)
 
 
-bridge.mapping.load_family = bridge.mapping.site.load_family = _load_family
+bridge.mapping.load_family = bridge.mapping.site_families.load_family = _load_family
 
 _OWN = mappings_dir()
 _is_own_template = cache(is_template)

@@ -14,9 +14,9 @@ from typing import Final
 
 from bridge.command.leg.state import ANY_TRIP, MEANING, NORMAL, STARTING, Motion, Stage
 from bridge.command.leg.table import TABLE, Deed, Stimulus
-from bridge.command.leg.words import REACTION_STOPS, WORD_TABLE
+from bridge.command.leg.word_table import REACTION_STOPS, WORD_TABLE
 from bridge.command.stop_check import table as judge
-from bridge.command.stop_check.state import PLACES, LastStop, Place
+from bridge.command.stop_check.state import PLACES, LastStop, StopPlace
 from tools.marks import replaced
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "reference" / "decision-tables.md"
@@ -76,25 +76,25 @@ def _words(stage: Stage, motion: Motion) -> str:
 
 def judge_tables() -> str:
     """The places of a stop; then what each event makes of the place, and each finding of the outcome."""
-    places = _table([["place", "what it is"], *([f"**{place}**", PLACES[place]] for place in Place)])
-    news = [[news.value, *(_place(place, news) for place in Place)] for news in judge.News]
+    places = _table([["place", "what it is"], *([f"**{place}**", PLACES[place]] for place in StopPlace)])
+    news = [[news.value, *(_place(place, news) for place in StopPlace)] for news in judge.News]
     outcomes = [LastStop.FORWARDED, LastStop.FOLLOWED, LastStop.IGNORED]
-    found = [[finding.value, *(_outcome(one, finding) for one in outcomes)] for finding in judge.Finding]
+    found = [[finding.value, *(_outcome(one, finding) for one in outcomes)] for finding in judge.Evidence]
     return "\n\n".join(
         (
             places,
-            _table([["event", *Place], *news]),
+            _table([["event", *StopPlace], *news]),
             _table([["what is found of a stop on the bus", *(one.label for one in outcomes)], *found]),
         )
     )
 
 
-def _place(place: Place, news: judge.News) -> str:
+def _place(place: StopPlace, news: judge.News) -> str:
     after, deed = judge.PLACE_TABLE[place, news]
     return deed.value if after is place else f"→ **{after}**: {deed}"
 
 
-def _outcome(outcome: LastStop, finding: judge.Finding) -> str:
+def _outcome(outcome: LastStop, finding: judge.Evidence) -> str:
     after, deeds = judge.OUTCOME_TABLE[outcome, finding]
     shown = "; ".join(deeds) or judge.PlaceDeed.NOTHING.value
     return shown if after is outcome else f"→ **{after.label}**: {shown}"

@@ -26,15 +26,15 @@ from asyncua.client.client import Client
 from bridge.base import clock
 from bridge.can.virtual import VirtualWire
 from bridge.canopen.frame import Frame
-from bridge.command import Kind
+from bridge.command import EventKind
 from bridge.mirror.client import MirrorClient
 from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.zenoh import ZenohServer
 from bridge.project import load_project
-from bridge.service.bus_process import Service
+from bridge.service.bus_process import BusProcess
 from bridge.sim.nord.nord_tu4 import NordTu4
-from bridge.sim.shell import Simulation
+from bridge.sim.runner import Simulation
 from bridge.zenohlink import zenoh_config
 from tools.marks import replaced
 from tools.trace import Rest, Threads, Trace
@@ -90,21 +90,21 @@ class Way(NamedTuple):
 
 _IMAGE: Final = Rest("image/image.py", "Image.set_values")
 _LINK, _WORKER = "zenohlink/link.py", "zenohlink/worker.py"
-_SESSION: Final = "northbound/modbus/session.py"
+_SESSION: Final = "northbound/modbus/connection.py"
 _TO_A_FRONT: Final = (
     _IMAGE,
     Rest(_LINK, "ZenohLink.send"),
     Rest(_LINK, "_publish", "ZenohLink.send"),
-    Rest(_WORKER, "Inbox.take_in"),
+    Rest(_WORKER, "CallQueue.take_in"),
     Rest("image/image.py", "Image.set"),
 )
 WAYS: Final = {
     "A TPDO into a Modbus register": Way(
-        _READ, (_IMAGE, Rest(_SESSION, "Conversation._on_answer"), Rest(_SESSION, "Session.serve"))
+        _READ, (_IMAGE, Rest(_SESSION, "Conversation._on_answer"), Rest(_SESSION, "ModbusConnection.serve"))
     ),
     "A TPDO into an OPC UA node": Way(
         _READ,
-        (*_TO_A_FRONT, Rest("northbound/opcua/values.py", "present_value", gives=True)),
+        (*_TO_A_FRONT, Rest("northbound/opcua/data_values.py", "present_value", gives=True)),
     ),
     "A TPDO to a zenoh key": Way(
         _READ,
@@ -135,7 +135,7 @@ _IN: Final = {
     "northbound/modbus/drive_unit.py": "lays the words out as registers",
     "northbound/modbus/dispatch.py": "finds the unit that is asked",
     "northbound/modbus/pdu.py": "makes the answer's PDU",
-    "northbound/modbus/session.py": "frames the answer and sends it",
+    "northbound/modbus/connection.py": "frames the answer and sends it",
     "northbound/zenoh/publication.py": "takes what was marked and somebody subscribes to",
     "northbound/zenoh/keys.py": "writes it as JSON",
     "zenohlink/link.py": "hands it to zenoh's thread, and there to zenoh",
@@ -144,10 +144,10 @@ _IN: Final = {
     "mirror/publisher.py": "takes what was marked",
     "mirror/protocol.py": "encodes it as MessagePack, and decodes it in the other process",
     "mirror/client.py": "stores it in the other process's image",
-    "northbound/opcua/values.py": "is the node's value: the reading as a DataValue",
+    "northbound/opcua/data_values.py": "is the node's value: the reading as a DataValue",
 }
 _OUT: Final = {
-    "northbound/modbus/session.py": "finds the request's frame in the stream",
+    "northbound/modbus/connection.py": "finds the request's frame in the stream",
     "northbound/modbus/dispatch.py": "plans the write with its unit, and submits it",
     "northbound/modbus/pdu.py": "parses the PDU",
     "northbound/modbus/drive_unit.py": "makes requests of the registers",
@@ -155,7 +155,7 @@ _OUT: Final = {
     "command/channel.py": "keeps the state of the drive's leg",
     "command/leg/step.py": "does what the request asks, if it may",
     "command/messages/telegram.py": "decodes names and values into words",
-    "command/leg/turn.py": "decides what is sent: these words or a stop",
+    "command/leg/draft.py": "decides what is sent: these words or a stop",
     "node/process/process_data.py": "packs the words into the RPDO",
     "master/line.py": "compares it with what the bus repeats, and hands it over",
     "can/softbus.py": "sends it, and repeats it",
@@ -251,9 +251,9 @@ async def running(folder: Path) -> AsyncIterator[Bridge]:
     path.write_text(_SITE.format(folder=folder, **ports), encoding="utf-8")
     wire = VirtualWire()
     project = load_project(path)
-    service = Service(project, lambda table: wire.end(table.name), fronts=())
+    service = BusProcess(project, lambda table: wire.end(table.name), fronts=())
     booted = asyncio.Event()
-    service.plant.on_event(lambda event: booted.set() if event.kind is Kind.NODE_BACK else None)
+    service.plant.on_event(lambda event: booted.set() if event.kind is EventKind.NODE_BACK else None)
     async with AsyncExitStack() as stack:
         for work in (Simulation(wire.end("simulation"), [NordTu4(5)]).run(), service.run()):
             stack.push_async_callback(_end, asyncio.create_task(work))
@@ -320,7 +320,7 @@ def _counted(files: Iterable[str]) -> str:
 
 
 def _list(heading: str, steps: Iterable[tuple[str, str]], does: dict[str, str]) -> str:
-    lines = [f"{file:<34}{function.replace('.<locals>', ''):<30}{does[file]}" for file, function in steps]
+    lines = [f"{file:<34}{function.replace('.<locals>', ''):<32}{does[file]}" for file, function in steps]
     return "\n".join((f"**{heading}**", "", "```text", *lines, "```"))
 
 

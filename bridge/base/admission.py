@@ -19,7 +19,7 @@ Tell = Callable[[str, str, str], object]
 """Given a kind, a source and a detail for the log."""
 
 
-class Stage(IntEnum):
+class ConnectionStage(IntEnum):
     """Stage of a connection. Each protocol says what its own steps are; in a session it has been let
     in, and makes room for nobody."""
 
@@ -48,7 +48,7 @@ class Limits:
     connections: int
     of_address: int
     waiting: int
-    deadlines: Mapping[Stage, Deadline] = field(default_factory=dict[Stage, Deadline])
+    deadlines: Mapping[ConnectionStage, Deadline] = field(default_factory=dict[ConnectionStage, Deadline])
     held_bytes: int | None = None
     kept: int = 0
     slow_s: float = _SLOW_S
@@ -62,7 +62,7 @@ class Visitor:
     source: str
     since: float
     """Time from which it has been without a session, or where there are no sessions, was last heard."""
-    stage: Callable[[], Stage]
+    stage: Callable[[], ConnectionStage]
     close: Callable[[], None]
     held: Callable[[], int] = lambda: 0
     """Bytes of messages and answers that are kept for it."""
@@ -70,7 +70,7 @@ class Visitor:
     """True if it may do more than read."""
 
     def is_waiting(self) -> bool:
-        return self.stage() is not Stage.SESSION
+        return self.stage() is not ConnectionStage.SESSION
 
 
 class Admission:
@@ -130,7 +130,7 @@ class Admission:
         for visitor in tuple(self._visitors):
             stage = visitor.stage()
             deadline = self._limits.deadlines.get(stage)
-            if stage is Stage.SESSION:
+            if stage is ConnectionStage.SESSION:
                 visitor.since = now
             elif deadline is not None and now - visitor.since >= deadline.seconds:
                 detail = f"no {deadline.missing} within {deadline.seconds:g} s"

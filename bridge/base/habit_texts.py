@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from bridge.canopen.habits import Odd, Shown
+from bridge.canopen.habits import HabitCount, Odd
 from bridge.text import Text
 
 _ONE: Final[Mapping[Odd, Callable[[int, int, int], Text]]] = {
@@ -30,7 +30,7 @@ _MANY: Final[Mapping[Odd, Callable[[int, int, int], Text]]] = {
 }
 
 
-def text_of_habit(shown: Shown) -> Text:
+def text_of_habit(shown: HabitCount) -> Text:
     """Number of times it has shown, and what is right."""
     texts = _ONE if shown.count == 1 else _MANY
     return texts[shown.odd](shown.count, shown.has, shown.due)

@@ -79,7 +79,7 @@ class Pauses:
 
 
 @dataclass(slots=True)
-class _Kept(Generic[Item]):
+class _LimitState(Generic[Item]):
     """State of one kind and source since ``at``: ``lines`` is the number of those reported, ``last`` the
     newest of those that were not."""
 
@@ -94,7 +94,7 @@ class Repeats(Generic[Item]):
     there are more."""
 
     def __init__(self) -> None:
-        self._told: dict[Hashable, dict[Hashable, _Kept[Item]]] = {}
+        self._told: dict[Hashable, dict[Hashable, _LimitState[Item]]] = {}
 
     def admits(self, kind: Hashable, source: Hashable, item: Item, now: float, first: int = 1) -> bool:
         """Whether ``item`` is reported now, as one of the ``first``; else it is counted."""
@@ -106,7 +106,7 @@ class Repeats(Generic[Item]):
             source = None
         told = sources.get(source)
         if told is None or self._is_over(told, now):
-            sources[source] = _Kept(now)
+            sources[source] = _LimitState(now)
             return True
         if told.lines < first:
             told.lines += 1
@@ -123,10 +123,10 @@ class Repeats(Generic[Item]):
             for source, told in sources.items():
                 if told.last is not None and now - told.at >= PAUSE_S:
                     found.append((told.last, told.left_out))
-                    sources[source] = _Kept(now)
+                    sources[source] = _LimitState(now)
         return found
 
-    def _is_over(self, told: _Kept[Item], now: float) -> bool:
+    def _is_over(self, told: _LimitState[Item], now: float) -> bool:
         return told.last is None and now - told.at >= PAUSE_S
 
     def _forget(self, now: float) -> None:

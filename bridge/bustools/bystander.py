@@ -7,13 +7,13 @@ from collections.abc import Generator, Iterable
 from bridge.bustools.drop_test import ForeignMaster
 from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
-from bridge.command.output_words import OutputWords, Place
+from bridge.command.output_words import OutputPlace, OutputWords
 from bridge.config import NodeTable
 from bridge.drive import MOVING, StatusWords
 from bridge.mapping.model import Family, Slot
-from bridge.parameter import Entry, Names, ParameterError, Transfer, TransferFailed, Why
-from bridge.parameter.effect import Verdict, judge
+from bridge.parameter import Names, ParameterEntry, ParameterError, Transfer, TransferFailed, Why
 from bridge.parameter.protection import Gate
+from bridge.parameter.write_effect import WriteVerdict, judge
 from bridge.text import Text
 
 _WORD_BYTES = 2
@@ -76,11 +76,11 @@ class Standstill:
         """Gate for a user at the machine: an engineer; the drive itself is asked whether it moves."""
         return Gate(is_engineer=True, is_moving=lambda: False, asks=self.check)
 
-    def concerns(self, entry: Entry) -> bool:
+    def concerns(self, entry: ParameterEntry) -> bool:
         effect = self._names.protection.effect(entry.address)
-        return judge(effect, is_engineer=True, is_moving=True) is Verdict.NOT_AT_REST
+        return judge(effect, is_engineer=True, is_moving=True) is WriteVerdict.NOT_AT_REST
 
-    def check(self, entries: Iterable[Entry]) -> Generator[Transfer, tuple[bytes, float], None]:
+    def check(self, entries: Iterable[ParameterEntry]) -> Generator[Transfer, tuple[bytes, float], None]:
         """Check that all of them may be written now. Raises ``ParameterError`` with the names of the
         others."""
         concerned = ", ".join(entry.name for entry in entries if self.concerns(entry))
@@ -129,7 +129,7 @@ class Standstill:
         return int.from_bytes(word, "little")
 
 
-def _is_active(place: Place, data: bytes) -> bool:
+def _is_active(place: OutputPlace, data: bytes) -> bool:
     """True if an output that holds these bytes is anything but safe."""
     raw = int.from_bytes(data, "little") & ((1 << place.output.size) - 1)
     return raw != (place.safe or 0)

@@ -34,7 +34,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class RuleResult:
     """Result of one rule. ``clause`` is that of CiA 301; ``seen`` is what the node did."""
 
     clause: str
@@ -44,7 +44,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ProbeStep:
     """Send ``frames``, and wait for ``count`` frames that ``fit``, ``within_s`` at most."""
 
     frames: tuple[Frame, ...]
@@ -69,7 +69,7 @@ class SetPdo:
 
 
 Answers = list[Frame]
-Check = Generator[Step, Answers, None]
+Check = Generator[ProbeStep, Answers, None]
 
 
 class Slave:
@@ -78,7 +78,7 @@ class Slave:
     def __init__(self, node_id: int, timeout_s: float) -> None:
         self.id = node_id
         self.timeout_s = timeout_s
-        self.findings: list[Finding] = []
+        self.findings: list[RuleResult] = []
         self.tpdos: list[SetPdo] = []
         self.rpdos: list[SetPdo] = []
         """RPDOs that are on."""
@@ -90,10 +90,10 @@ class Slave:
         """Longest time that an SDO answer has taken."""
 
     def found(self, clause: str, rule: str, ok: bool, seen: str = "") -> None:
-        self.findings.append(Finding(clause, rule, Verdict.PASSED if ok else Verdict.FAILED, seen))
+        self.findings.append(RuleResult(clause, rule, Verdict.PASSED if ok else Verdict.FAILED, seen))
 
     def skipped(self, clause: str, rule: str, seen: str, verdict: Verdict = Verdict.NOT_OFFERED) -> None:
-        self.findings.append(Finding(clause, rule, verdict, seen))
+        self.findings.append(RuleResult(clause, rule, verdict, seen))
 
     # SDO, byte by byte
 
@@ -103,12 +103,12 @@ class Slave:
     def is_reply(self, frame: Frame) -> bool:
         return frame.can_id == cobid.SDO_REPLY + self.id
 
-    def ask(self, data: bytes) -> Generator[Step, Answers, bytes]:
+    def ask(self, data: bytes) -> Generator[ProbeStep, Answers, bytes]:
         """The answer to one request, empty where none came."""
-        answers = yield Step((self.request(data),), self.is_reply, self.timeout_s)
+        answers = yield ProbeStep((self.request(data),), self.is_reply, self.timeout_s)
         return answers[0].data if answers else b""
 
-    def read(self, index: int, sub: int = 0) -> Generator[Step, Answers, bytes]:
+    def read(self, index: int, sub: int = 0) -> Generator[ProbeStep, Answers, bytes]:
         """The answer to an initiated upload; what is more than four bytes is broken off."""
         answer = yield from self.ask(b"\x40" + MUX.pack(index, sub))
         if answer and answer[0] & 0xE2 == 0x40:
@@ -118,12 +118,12 @@ class Slave:
     def break_off(self, index: int, sub: int) -> Check:
         """An abort of the client, which nobody answers."""
         data = bytes((ABORT,)) + MUX.pack(index, sub) + U32.pack(abort.GENERAL)
-        yield Step((self.request(data),), lambda _: False, 0.0)
+        yield ProbeStep((self.request(data),), lambda _: False, 0.0)
 
-    def number(self, index: int, sub: int = 0) -> Generator[Step, Answers, int | None]:
+    def number(self, index: int, sub: int = 0) -> Generator[ProbeStep, Answers, int | None]:
         return plain((yield from self.read(index, sub)))
 
-    def write(self, index: int, sub: int, data: bytes) -> Generator[Step, Answers, bytes]:
+    def write(self, index: int, sub: int, data: bytes) -> Generator[ProbeStep, Answers, bytes]:
         """The answer to an expedited download of one to four bytes."""
         command = 0x23 | (4 - len(data)) << 2
         return (yield from self.ask(bytes((command,)) + MUX.pack(index, sub) + data))
@@ -163,19 +163,19 @@ def shown(answer: bytes) -> str:
     return answer.hex(" ").upper() if size is None else f"{plain(answer):0{2 * size}X}h"
 
 
-def is_state(slave: Slave, *states: NmtState) -> Step:
+def is_state(slave: Slave, *states: NmtState) -> ProbeStep:
     """Step that waits for a heartbeat with one of these states."""
 
     def fits(frame: Frame) -> bool:
         one = frame.can_id == cobid.ERROR_CONTROL + slave.id and len(frame.data) == 1
         return one and (not states or nmt.state_of(frame.data[0]) in states)
 
-    return Step((), fits, REACTION_S)
+    return ProbeStep((), fits, REACTION_S)
 
 
-def send(*frames: Frame) -> Step:
+def send(*frames: Frame) -> ProbeStep:
     """Step that sends and waits for no frame."""
-    return Step(frames, lambda _: False, 0.05)
+    return ProbeStep(frames, lambda _: False, 0.05)
 
 
 class Conformance(BusTask):
@@ -192,7 +192,7 @@ class Conformance(BusTask):
         self._last: Check | None = last
         self._now = now
         self._running: Check | None = None
-        self._step: Step | None = None
+        self._step: ProbeStep | None = None
         self._since = now
         self._came: Answers = []
         self._next(now)
@@ -244,6 +244,6 @@ class Conformance(BusTask):
             except StopIteration:
                 self.done += 1
 
-    def _begin(self, step: Step, now: float) -> None:
+    def _begin(self, step: ProbeStep, now: float) -> None:
         self._step, self._since = step, now
         self._frames += step.frames

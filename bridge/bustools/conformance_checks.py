@@ -7,8 +7,8 @@ from typing import Final
 from bridge.bustools.conformance import (
     REACTION_S,
     Check,
+    ProbeStep,
     Slave,
-    Step,
     Verdict,
     aborted,
     expedited_bytes,
@@ -169,7 +169,7 @@ def heartbeat(slave: Slave) -> Check:
         slave.skipped(clause, rule, f"1017h cannot be written: {shown(answer)}", Verdict.NOT_SEEN)
         return
     yield is_state(slave)
-    beats = yield Step((), is_state(slave).fits, (_BEATS + 5) * _BEAT_MS / 1000, _BEATS)
+    beats = yield ProbeStep((), is_state(slave).fits, (_BEATS + 5) * _BEAT_MS / 1000, _BEATS)
     if len(beats) < _BEATS:
         slave.found(clause, rule, ok=False, seen=f"{len(beats)} came in {(_BEATS + 5) * _BEAT_MS} ms")
         return
@@ -196,7 +196,7 @@ def guarding(slave: Slave) -> Check:
     question = Frame(cobid.ERROR_CONTROL + slave.id | REMOTE)
     seen: list[int] = []
     for _ in range(3):
-        came = yield Step((question,), is_state(slave).fits, slave.timeout_s)
+        came = yield ProbeStep((question,), is_state(slave).fits, slave.timeout_s)
         seen += [frame.data[0] for frame in came]
     toggles = [octet >> 7 for octet in seen]
     ok = len(seen) == 3 and toggles[0] == toggles[2] != toggles[1]
@@ -213,7 +213,7 @@ def stopping(slave: Slave) -> Check:
     ):
         frames = (nmt.command(command, slave.id),)
         if has_beat:
-            told = yield Step(frames, is_state(slave, state).fits, REACTION_S)
+            told = yield ProbeStep(frames, is_state(slave, state).fits, REACTION_S)
             slave.found("§7.2.8.2.1", f"the heartbeat says {state.words} when it is told so", bool(told))
         else:
             yield send(*frames)
@@ -239,7 +239,7 @@ def boot_up(slave: Slave) -> Check:
         return frame.can_id == cobid.ERROR_CONTROL + slave.id and frame.data == b"\0"
 
     command = nmt.command(NmtCommand.RESET_COMMUNICATION, slave.id)
-    came = yield Step((command,), fits, _BOOT_UP_S)
+    came = yield ProbeStep((command,), fits, _BOOT_UP_S)
     seen = "" if came else f"none within {_BOOT_UP_S:g} s"
     slave.found("§7.2.8.3.3", "reset communication ends with a boot-up message", bool(came), seen)
     answer = yield from slave.read(0x1000)

@@ -11,9 +11,9 @@ from bridge.bustools.conformance import (
     REACTION_S,
     Answers,
     Check,
+    ProbeStep,
     SetPdo,
     Slave,
-    Step,
     Verdict,
     aborted,
     expedited_bytes,
@@ -124,7 +124,7 @@ def operation(slave: Slave) -> Check:
     if slave.heartbeat_ms is None:
         yield send(*frames)
     else:
-        told = yield Step(frames, is_state(slave, NmtState.OPERATIONAL).fits, REACTION_S)
+        told = yield ProbeStep(frames, is_state(slave, NmtState.OPERATIONAL).fits, REACTION_S)
         words = NmtState.OPERATIONAL.words
         slave.found("§7.2.8.2.1", f"the heartbeat says {words} when it is told so", bool(told))
     answer = yield from slave.read(0x1000)
@@ -137,7 +137,7 @@ def operation(slave: Slave) -> Check:
     yield from _silent(slave, syncs, "no PDO comes any more when it is pre-operational again")
 
 
-def _syncs(slave: Slave) -> Generator[Step, Answers, Iterator[Frame] | None]:
+def _syncs(slave: Slave) -> Generator[ProbeStep, Answers, Iterator[Frame] | None]:
     """SYNC messages that the node waits for; None where it produces them itself."""
     cob_id = yield from slave.number(0x1005)
     overflow = yield from slave.number(0x1019)
@@ -152,7 +152,7 @@ def _silent(slave: Slave, syncs: Iterator[Frame] | None, rule: str) -> Check:
     if not slave.tpdos:
         return
     ids = {pdo.cob_id for pdo in slave.tpdos}
-    came = yield Step((next(syncs),) if syncs else (), lambda frame: frame.can_id in ids, _QUIET_S)
+    came = yield ProbeStep((next(syncs),) if syncs else (), lambda frame: frame.can_id in ids, _QUIET_S)
     slave.found("§7.3.2.2", rule, not came, f"{came[0].can_id:03X}h" if came else "")
 
 
@@ -181,7 +181,7 @@ def _comes_by_sync(slave: Slave, pdo: SetPdo, syncs: Iterator[Frame] | None) -> 
         return
     after: list[int] = []
     for number in range(1, 2 * every + 1):
-        came = yield Step((next(syncs),), _of(pdo), _SYNC_S)
+        came = yield ProbeStep((next(syncs),), _of(pdo), _SYNC_S)
         if came:
             after.append(number)
         if len(after) == 2:
@@ -197,7 +197,7 @@ def _comes_on_request(slave: Slave, pdo: SetPdo, syncs: Iterator[Frame] | None) 
         slave.skipped(clause, rule, "bit 30 of its COB-ID: not on request")
         return
     frames = (Frame(pdo.cob_id | REMOTE),)
-    came = yield Step((next(syncs), *frames) if syncs else frames, _of(pdo), REACTION_S)
+    came = yield ProbeStep((next(syncs), *frames) if syncs else frames, _of(pdo), REACTION_S)
     slave.found(clause, rule, bool(came), "" if came else "no answer")
 
 
@@ -209,7 +209,7 @@ def _comes_by_timer(slave: Slave, pdo: SetPdo) -> Check:
     if period_ms > _LONGEST_EVENT_MS:
         slave.skipped("§7.5.2.37", rule, "so long is not waited", Verdict.NOT_SEEN)
         return
-    came = yield Step((), _of(pdo), (_EVENTS + 1) * period_ms / 1000, _EVENTS)
+    came = yield ProbeStep((), _of(pdo), (_EVENTS + 1) * period_ms / 1000, _EVENTS)
     gaps_ms = [1000 * (after.time - before.time) for before, after in pairwise(came)]
     ok = bool(gaps_ms) and max(gaps_ms) <= (1 + _SLACK) * period_ms
     slave.found("§7.5.2.37", rule, ok, _gaps(gaps_ms))
@@ -232,7 +232,7 @@ def _is_told(slave: Slave, pdo: SetPdo) -> Check:
     def fits(frame: Frame) -> bool:
         return frame.can_id == cobid.EMCY + slave.id and frame.data[:2] == _TOO_SHORT
 
-    came = yield Step((Frame(pdo.cob_id, b""),), fits, slave.timeout_s)
+    came = yield ProbeStep((Frame(pdo.cob_id, b""),), fits, slave.timeout_s)
     if came:
         slave.found("§7.2.7.1", rule, ok=True)
     else:

@@ -8,8 +8,8 @@ from typing import Final
 from bridge.bustools.conformance import (
     Answers,
     Check,
+    ProbeStep,
     Slave,
-    Step,
     Verdict,
     aborted,
     expedited_bytes,
@@ -24,7 +24,9 @@ _NAME: Final = 0x1008
 _MOST_SEGMENTS: Final = 200
 
 
-def _whole(slave: Slave, index: int) -> Generator[Step, Answers, tuple[bytes | None, int | None, str, bytes]]:
+def _whole(
+    slave: Slave, index: int
+) -> Generator[ProbeStep, Answers, tuple[bytes | None, int | None, str, bytes]]:
     """Segmented upload of an object of any length: data, length announced in bytes, error, and the last
     answer."""
     answer = yield from slave.ask(b"\x40" + MUX.pack(index, 0))
@@ -87,20 +89,20 @@ def block(slave: Slave) -> Check:
         return
     has_crc = bool(answer[0] & 4)
     data, number, is_last = b"", 0, False
-    came = yield Step((slave.request(b"\xa3"),), slave.is_reply, slave.timeout_s)
+    came = yield ProbeStep((slave.request(b"\xa3"),), slave.is_reply, slave.timeout_s)
     while came and not is_last and number < _MOST_SEGMENTS:
         number += 1
         if came[0].data[0] & 0x7F != number:
             break
         data, is_last = data + came[0].data[1:], bool(came[0].data[0] & 0x80)
         if not is_last:
-            came = yield Step((), slave.is_reply, slave.timeout_s)
+            came = yield ProbeStep((), slave.is_reply, slave.timeout_s)
     end = (yield from slave.ask(bytes((0xA2, number, 127)))) if is_last else b""
     if not end or end[0] & 0xE3 != 0xC1:
         slave.found(clause, rule, ok=False, seen=f"after {number} segments: {shown(end)}")
         yield from slave.break_off(_NAME, 0)
         return
-    yield Step((slave.request(b"\xa1"),), slave.is_reply, 0.0)
+    yield ProbeStep((slave.request(b"\xa1"),), slave.is_reply, 0.0)
     data = data[: len(data) - (end[0] >> 2 & 7)]
     slave.found(clause, f"{rule}, and is the same as by segments", data == wanted, f"{len(data)} bytes")
     if has_crc:

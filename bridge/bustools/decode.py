@@ -49,7 +49,7 @@ _OTHERS: Final = (
 """First and last COB-ID of services that the bridge has no part in (CiA 301 §7.3.5)."""
 
 
-class Kind(StrEnum):
+class FrameKind(StrEnum):
     NMT = "nmt"
     SYNC = "sync"
     TIME = "time"
@@ -63,11 +63,11 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Meaning:
+class FrameMeaning:
     """Meaning of one frame. ``node`` is the node id that it is about, 0 for all or none; ``label`` the name
     of its COB-ID; ``values`` the facts by name, for scripts."""
 
-    kind: Kind
+    kind: FrameKind
     node: int
     label: str
     text: str
@@ -98,17 +98,17 @@ class Decoder:
                 self._families[node.id] = family
                 self._pdos.update(pdo_views(node, family, (descriptions or {}).get(node.mapping_key)))
 
-    def decode(self, frame: Frame) -> Meaning:
+    def decode(self, frame: Frame) -> FrameMeaning:
         """Meaning of ``frame``; every frame has one."""
         cob_id = frame.can_id & STANDARD_MASK
         if frame.can_id & EXTENDED:
-            return Meaning(Kind.OTHER, 0, "29-bit", frame.data.hex(" ").upper())
+            return FrameMeaning(FrameKind.OTHER, 0, "29-bit", frame.data.hex(" ").upper())
         if frame.can_id & REMOTE:
             return self._remote(cob_id)
         view = self._pdos.get(cob_id)
         if view is not None:
             text, values = view.said(frame.data)
-            return Meaning(Kind.PDO, view.node_id, view.label, text, values)
+            return FrameMeaning(FrameKind.PDO, view.node_id, view.label, text, values)
         if cob_id == cobid.NMT:
             return self._nmt(frame.data)
         if cob_id == cobid.SYNC:
@@ -132,9 +132,9 @@ class Decoder:
         """The node as the site calls it, or its address."""
         return self._names.get(node_id, f"node {node_id}")
 
-    def _of_node(self, base: int, node_id: int, data: bytes) -> Meaning:
+    def _of_node(self, base: int, node_id: int, data: bytes) -> FrameMeaning:
         """A COB-ID of the pre-defined connection set: function code and node id."""
-        decoders: dict[int, Callable[[int, bytes], Meaning]] = {
+        decoders: dict[int, Callable[[int, bytes], FrameMeaning]] = {
             cobid.EMCY: self._emcy,
             cobid.SDO_REPLY: self._sdo_reply,
             cobid.SDO_REQUEST: self._sdo_request,
@@ -144,37 +144,39 @@ class Decoder:
             return decoders[base](node_id, data)
         raw = data.hex(" ").upper()
         if node_id and base in _PDOS:
-            return Meaning(Kind.PDO, node_id, f"{_PDOS[base]} {self.name(node_id)}", raw)
+            return FrameMeaning(FrameKind.PDO, node_id, f"{_PDOS[base]} {self.name(node_id)}", raw)
         for first, last, label in _OTHERS:
             if first <= base + node_id <= last:
-                return Meaning(Kind.OTHER, 0, label, f"{raw} (the bridge has no part in it)".lstrip())
-        return Meaning(Kind.OTHER, 0, "unknown", raw)
+                return FrameMeaning(
+                    FrameKind.OTHER, 0, label, f"{raw} (the bridge has no part in it)".lstrip()
+                )
+        return FrameMeaning(FrameKind.OTHER, 0, "unknown", raw)
 
-    def _remote(self, cob_id: int) -> Meaning:
+    def _remote(self, cob_id: int) -> FrameMeaning:
         base, node_id = cob_id & ~0x7F, cob_id & 0x7F
         if base == cobid.ERROR_CONTROL and node_id:
-            return Meaning(
-                Kind.HEARTBEAT, node_id, f"guarding {self.name(node_id)}", "asked for its NMT state"
+            return FrameMeaning(
+                FrameKind.HEARTBEAT, node_id, f"guarding {self.name(node_id)}", "asked for its NMT state"
             )
         view, asked = self._pdos.get(cob_id), "asked for by remote frame"
         if view is not None:
-            return Meaning(Kind.PDO, view.node_id, view.label, asked)
+            return FrameMeaning(FrameKind.PDO, view.node_id, view.label, asked)
         if base in _PDOS and node_id:
-            return Meaning(Kind.PDO, node_id, f"{_PDOS[base]} {self.name(node_id)}", asked)
-        return Meaning(Kind.OTHER, 0, "remote frame", "asked for")
+            return FrameMeaning(FrameKind.PDO, node_id, f"{_PDOS[base]} {self.name(node_id)}", asked)
+        return FrameMeaning(FrameKind.OTHER, 0, "remote frame", "asked for")
 
-    def _nmt(self, data: bytes) -> Meaning:
+    def _nmt(self, data: bytes) -> FrameMeaning:
         if len(data) != 2:
-            return Meaning(Kind.NMT, 0, "NMT", f"{len(data)} bytes instead of 2")
+            return FrameMeaning(FrameKind.NMT, 0, "NMT", f"{len(data)} bytes instead of 2")
         target = "all nodes" if data[1] == 0 else self.name(data[1])
         command = nmt.command_name(data[0])
-        return Meaning(Kind.NMT, data[1], "NMT", f"{command}: {target}", (("command", command),))
+        return FrameMeaning(FrameKind.NMT, data[1], "NMT", f"{command}: {target}", (("command", command),))
 
-    def _emcy(self, node_id: int, data: bytes) -> Meaning:
+    def _emcy(self, node_id: int, data: bytes) -> FrameMeaning:
         label = f"EMCY {self.name(node_id)}"
         found = emcy.decode(data)
         if found is None:
-            return Meaning(Kind.EMCY, node_id, label, f"{len(data)} bytes are no emergency message")
+            return FrameMeaning(FrameKind.EMCY, node_id, label, f"{len(data)} bytes are no emergency message")
         family = self._families.get(node_id)
         if family:
             text = EmergencyReader(family).read(found.code, found.vendor).text
@@ -189,7 +191,7 @@ class Decoder:
         )
         drive = self._emcy_drive(family, data)
         sentence = f"{found.code:04X}h {text}{drive}, register {found.register:02X}h, {vendor}"
-        return Meaning(Kind.EMCY, node_id, label, sentence, values)
+        return FrameMeaning(FrameKind.EMCY, node_id, label, sentence, values)
 
     @staticmethod
     def _emcy_drive(family: Family | None, data: bytes) -> str:
@@ -200,47 +202,49 @@ class Decoder:
         slots = [slot.name for slot in family.slot if slot.emcy_drive == data[byte]]
         return f" ({slots[0]})" if slots else ""
 
-    def _sdo_request(self, node_id: int, data: bytes) -> Meaning:
+    def _sdo_request(self, node_id: int, data: bytes) -> FrameMeaning:
         said = self._sdo.setdefault(node_id, SdoListener()).request(data)
-        return Meaning(Kind.SDO, node_id, f"SDO → {self.name(node_id)}", said.text, said.values)
+        return FrameMeaning(FrameKind.SDO, node_id, f"SDO → {self.name(node_id)}", said.text, said.values)
 
-    def _sdo_reply(self, node_id: int, data: bytes) -> Meaning:
+    def _sdo_reply(self, node_id: int, data: bytes) -> FrameMeaning:
         said = self._sdo.setdefault(node_id, SdoListener()).reply(data)
-        return Meaning(Kind.SDO, node_id, f"SDO ← {self.name(node_id)}", said.text, said.values)
+        return FrameMeaning(FrameKind.SDO, node_id, f"SDO ← {self.name(node_id)}", said.text, said.values)
 
-    def _error_control(self, node_id: int, data: bytes) -> Meaning:
+    def _error_control(self, node_id: int, data: bytes) -> FrameMeaning:
         name = self.name(node_id)
         if len(data) != 1:
-            return Meaning(Kind.HEARTBEAT, node_id, f"heartbeat {name}", f"{len(data)} bytes instead of 1")
+            return FrameMeaning(
+                FrameKind.HEARTBEAT, node_id, f"heartbeat {name}", f"{len(data)} bytes instead of 1"
+            )
         state = nmt.state_of(data[0])
         if state is NmtState.INITIALISING:
-            return Meaning(
-                Kind.HEARTBEAT, node_id, f"boot-up {name}", "has started", (("nmt_state", "boot_up"),)
+            return FrameMeaning(
+                FrameKind.HEARTBEAT, node_id, f"boot-up {name}", "has started", (("nmt_state", "boot_up"),)
             )
         is_known = state is not NmtState.UNKNOWN
         text = state.label.replace("_", " ") if is_known else f"unknown state {data[0]:02X}h"
         toggle = ", toggle bit 1" if data[0] & 0x80 else ""
-        return Meaning(
-            Kind.HEARTBEAT, node_id, f"heartbeat {name}", text + toggle, (("nmt_state", state.label),)
+        return FrameMeaning(
+            FrameKind.HEARTBEAT, node_id, f"heartbeat {name}", text + toggle, (("nmt_state", state.label),)
         )
 
 
-def _sync(data: bytes) -> Meaning:
+def _sync(data: bytes) -> FrameMeaning:
     if not data:
-        return Meaning(Kind.SYNC, 0, "SYNC", "")
-    return Meaning(Kind.SYNC, 0, "SYNC", f"counter {data[0]}", (("counter", data[0]),))
+        return FrameMeaning(FrameKind.SYNC, 0, "SYNC", "")
+    return FrameMeaning(FrameKind.SYNC, 0, "SYNC", f"counter {data[0]}", (("counter", data[0]),))
 
 
-def _time(data: bytes) -> Meaning:
+def _time(data: bytes) -> FrameMeaning:
     epoch_ms = time_stamp.decode(data)
     if epoch_ms is None:
-        return Meaning(Kind.TIME, 0, "TIME", f"{len(data)} bytes instead of 6")
+        return FrameMeaning(FrameKind.TIME, 0, "TIME", f"{len(data)} bytes instead of 6")
     moment = _EPOCH + timedelta(milliseconds=epoch_ms)
     # Whose time zone it is, the message does not say.
     text = moment.replace(tzinfo=None).isoformat(" ", "milliseconds")
-    return Meaning(Kind.TIME, 0, "TIME", text, (("time", text),))
+    return FrameMeaning(FrameKind.TIME, 0, "TIME", text, (("time", text),))
 
 
-def _lss(cob_id: int, data: bytes) -> Meaning:
+def _lss(cob_id: int, data: bytes) -> FrameMeaning:
     text, values = decode_lss.said(data, by_master=cob_id == lss.REQUEST_ID)
-    return Meaning(Kind.LSS, 0, _LSS[cob_id], text, values)
+    return FrameMeaning(FrameKind.LSS, 0, _LSS[cob_id], text, values)

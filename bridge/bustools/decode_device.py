@@ -11,7 +11,7 @@ from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.config import NodeTable
 from bridge.eds import Description
 from bridge.eds.pdos import PdoSummary, pdos
-from bridge.mapping.device import Signal
+from bridge.mapping.device_signals import Signal
 from bridge.mapping.model import Family, ObjectRef
 
 _DIGITS: Final = 6

@@ -12,7 +12,7 @@ from bridge.config import NodeTable
 from bridge.drive import ParameterSet, StatusWords, ValueCodec, default_codecs
 from bridge.mapping.model import Family, Pdo, Slot
 from bridge.node.boot import factory_entries, layouts, match_words
-from bridge.node.places.words import WordMap
+from bridge.node.places.word_map import WordMap
 
 _DIGITS: Final = 6
 

@@ -19,7 +19,7 @@ from bridge.bustools.task import BusTask
 from bridge.canopen import cobid, nmt
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
-from bridge.command import Drive, Event, Kind, Plant
+from bridge.command import Drive, Event, EventKind, Plant
 from bridge.command.node import Node
 from bridge.command.outputs import Outputs
 from bridge.drive import FAULTED, MOVING, DriveState, OwnJudgement
@@ -237,7 +237,7 @@ class DropTest:
 
     def _on_event(self, event: Event) -> None:
         """An emergency message, whose event has the time of its frame."""
-        if self.phase is not Phase.SILENT or event.kind is not Kind.EMERGENCY or event.severity < _COMES:
+        if self.phase is not Phase.SILENT or event.kind is not EventKind.EMERGENCY or event.severity < _COMES:
             return
         for outcome in self.outcomes:
             if outcome.drive == event.source:

@@ -10,7 +10,7 @@ from typing import Final
 from bridge.canopen import width
 from bridge.drive import Explained, FaultWords
 from bridge.mapping.model import Family, ObjectRef
-from bridge.parameter import DriveParameters, Entry, ParameterError, Transfer, TransferFailed, Why
+from bridge.parameter import DriveParameters, ParameterEntry, ParameterError, Transfer, TransferFailed, Why
 from bridge.text import Text
 
 _HISTORY: Final = 0x1003
@@ -49,7 +49,7 @@ def fault_memory(access: DriveParameters, family: Family, words: FaultWords, now
     return found + (yield from _history(words))
 
 
-def fault_parameters(access: DriveParameters, family: Family) -> list[Entry]:
+def fault_parameters(access: DriveParameters, family: Family) -> list[ParameterEntry]:
     """The parameter with the present fault, and the last one with what stands beside it in its array."""
     faults = family.faults
     found = [access.names.resolve(faults.current.parameter)] if faults.current else []

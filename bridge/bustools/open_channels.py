@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from bridge.bustools.task import SdoTasks
 from bridge.canopen import nmt
-from bridge.canopen.dialogue import Dialogue, Read, Write, ask
+from bridge.canopen.dialogue import Dialogue, SdoRead, SdoWrite, ask
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoError
 from bridge.catalogue import NodeSpec
-from bridge.node.boot import Action, BootError, BootResult, Nmt
+from bridge.node.boot import Action, BootError, BootResult, SendNmt
 from bridge.node.boot.sdo_servers import open_sdo_servers
 from bridge.node.places.sdo_channels import FIRST, SdoChannels
 from bridge.text import render
@@ -37,10 +37,10 @@ class OpenChannels(SdoTasks):
         return [render(note) for note in self._result.notes]
 
     def _do(self, step: Action, now: float) -> bool:
-        if isinstance(step, Read | Write):
+        if isinstance(step, SdoRead | SdoWrite):
             ask(step, self._sdo[FIRST], now, lambda answer: self._dialogue.go_on(answer, self._now))
             return True
-        if isinstance(step, Nmt):
+        if isinstance(step, SendNmt):
             self._frames.append(nmt.command(step.command, self._node_id))
         return False
 

@@ -6,21 +6,21 @@ from collections.abc import Generator, Mapping, Sequence
 
 from bridge.bustools.task import SdoTasks
 from bridge.canopen import dialogue
-from bridge.canopen.dialogue import Dialogue, Read
+from bridge.canopen.dialogue import Dialogue, SdoRead
 from bridge.canopen.sdo import SdoError
 from bridge.catalogue import MemberSpec, NodeSpec
 from bridge.command.output_words import OutputWords
 from bridge.drive import OwnJudgement
-from bridge.drive.own_supervision import judge
+from bridge.drive.own_judgement import judge
 from bridge.node.boot import BootError
 from bridge.node.boot.device_watch import keeps_outputs, read_why_not_safe
-from bridge.node.boot.own_supervision import read_places
+from bridge.node.boot.own_supervision_setup import read_places
 from bridge.node.places.sdo_channels import SdoChannels
 
 Judgements = dict[str, OwnJudgement]
 
 
-def ask(node: NodeSpec) -> Generator[Read, bytes | None, Judgements]:
+def ask(node: NodeSpec) -> Generator[SdoRead, bytes | None, Judgements]:
     """Judgement of each drive of the node, by the drive's name, or of the node itself with its outputs."""
     of_node = yield from read_places(node, None, link=True)
     found: Judgements = {}
@@ -31,7 +31,7 @@ def ask(node: NodeSpec) -> Generator[Read, bytes | None, Judgements]:
 
 def _judged(
     node: NodeSpec, one: MemberSpec, of_node: Mapping[tuple[int, int], int]
-) -> Generator[Read, bytes | None, OwnJudgement]:
+) -> Generator[SdoRead, bytes | None, OwnJudgement]:
     of_one = yield from read_places(node, one, link=True)
     own = judge(one.family, {**of_node, **of_one}, node.bus, node.table, one.table.accepts.runs_on or "")
     for place in OutputWords.of(node.table, one.family).places.values():
@@ -54,7 +54,7 @@ class OwnCheck(SdoTasks):
             self._begin(node, sdo)
 
     def _begin(self, node: NodeSpec, sdo: SdoChannels) -> None:
-        def do(step: Read, now: float) -> bool:
+        def do(step: SdoRead, now: float) -> bool:
             dialogue.ask(step, sdo[step.channel], now, lambda answer: asking.go_on(answer, self._now))
             return True
 
@@ -65,7 +65,7 @@ class OwnCheck(SdoTasks):
             else:
                 self.failed[node.name] = str(end)
 
-        asking = Dialogue[Read, bytes | None, Judgements, SdoError | BootError](
+        asking = Dialogue[SdoRead, bytes | None, Judgements, SdoError | BootError](
             ask(node), do, done, (SdoError, BootError)
         )
         asking.go_on(None, self._now)

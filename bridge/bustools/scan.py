@@ -15,7 +15,7 @@ from typing import Final
 from bridge.bustools.task import BusTask
 from bridge.canopen import cobid, nmt, width
 from bridge.canopen.datatypes import readable
-from bridge.canopen.dialogue import Dialogue, Read, ask, attempt
+from bridge.canopen.dialogue import Dialogue, SdoRead, ask, attempt
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.nmt import NmtState
 from bridge.canopen.sdo import Result, SdoChannel, SdoError
@@ -31,11 +31,11 @@ _LEAST_STEP_S: Final = 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class Guard:
+class GuardRequest:
     """Ask for the NMT state by remote frame."""
 
 
-Interview = Generator[Read | Guard, bytes | None, None]
+Interview = Generator[SdoRead | GuardRequest, bytes | None, None]
 
 
 @dataclass(slots=True)
@@ -83,7 +83,7 @@ def _interview(node: FoundNode) -> Interview:
     if _is_silence(answer):
         # A stopped node has no SDO and still answers to guarding.
         if not node.is_heard:
-            yield Guard()
+            yield GuardRequest()
         return
     node.answers += 1
     node.device_type = _number(answer)
@@ -110,7 +110,7 @@ def _interview(node: FoundNode) -> Interview:
     # The first remote frame would start the node's life guarding, and we send no second one.
     guarded = (_number(guard_time, 2) or 0) * (_number((yield from attempt(0x100D)), 1) or 0)
     if not node.is_heard and not guarded:
-        yield Guard()
+        yield GuardRequest()
 
 
 class Scanner(BusTask):
@@ -133,7 +133,7 @@ class Scanner(BusTask):
         super().__init__()
         self._nodes = {node_id: FoundNode(node_id) for node_id in _IDS}
         self._channels: dict[int, SdoChannel] = {}
-        self._interviews: dict[int, Dialogue[Read | Guard, bytes | None, None, SdoError]] = {}
+        self._interviews: dict[int, Dialogue[SdoRead | GuardRequest, bytes | None, None, SdoError]] = {}
         self._now = now
         self._guarding: dict[int, float] = {}
         self._timeout_s = timeout_s
@@ -196,8 +196,8 @@ class Scanner(BusTask):
             cobid.SDO_REQUEST + node_id, cobid.SDO_REPLY + node_id, self._timeout_s
         )
 
-        def do(step: Read | Guard, now: float) -> bool:
-            if isinstance(step, Read):
+        def do(step: SdoRead | GuardRequest, now: float) -> bool:
+            if isinstance(step, SdoRead):
                 ask(step, channel, now, lambda answer: interview.go_on(answer, self._now))
             else:
                 # DLC 1, as the answer has it.

@@ -40,7 +40,7 @@ class _Wish:
 
 
 @dataclass(slots=True)
-class _Job:
+class _KernelBurst:
     """Burst that the kernel has taken; it surely runs until ``until``."""
 
     wish: _Wish
@@ -71,7 +71,7 @@ class KernelBursts:
         self.refusal = ""
         """Reason why the bursts have been given up; empty while the kernel takes them."""
         self._manager: Manager | None = None
-        self._jobs: dict[int, _Job] = {}
+        self._jobs: dict[int, _KernelBurst] = {}
         self._held: set[int] = set()
         """Identifiers of the bursts that the kernel holds, whether they still run or not."""
         self._wishes: dict[int, _Wish] = {}
@@ -157,7 +157,7 @@ class KernelBursts:
         self._soft.end(can_id)
         if count:
             # The last frame of a burst comes up to a period before its count of periods is over.
-            self._jobs[can_id] = _Job(wish, now + (count - 2) * wish.burst.period_s)
+            self._jobs[can_id] = _KernelBurst(wish, now + (count - 2) * wish.burst.period_s)
         else:
             self._jobs.pop(can_id, None)
         return True

@@ -25,7 +25,7 @@ _FASTER: Final = 1.1
 _MOST_PAST: Final = 256
 
 
-class _Count:
+class _FrameBudget:
     """Number of our own frames that may come: ``left`` now, ``rate`` a second more, and those sent beside
     that.
 
@@ -91,7 +91,7 @@ class _Stream:
     past: dict[bytes, float] = field(default_factory=dict[bytes, float])
     """Data that is no longer in force, and until when it may still come."""
     most_past: int = _MOST_PAST
-    count: _Count = field(default_factory=_Count)
+    count: _FrameBudget = field(default_factory=_FrameBudget)
 
     def retire(self, data: Iterable[bytes], now: float) -> None:
         for one in data:

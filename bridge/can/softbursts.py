@@ -15,7 +15,7 @@ _ROUNDING: Final = 1e-6
 
 
 @dataclass(slots=True)
-class _Job:
+class _SoftBurst:
     burst: Burst
     left: int
     due: float
@@ -40,7 +40,7 @@ class SoftBursts:
 
     def __init__(self, *, in_step: bool = False) -> None:
         self._in_step = in_step
-        self._jobs: dict[int, _Job] = {}
+        self._jobs: dict[int, _SoftBurst] = {}
         self._next = inf
         """Time at which the first of them is due."""
 
@@ -49,7 +49,7 @@ class SoftBursts:
         job = self._jobs.get(burst.can_id)
         if job is None or job.burst.period_s != burst.period_s:
             due = self._step_after(now, burst.period_s) if self._in_step else now + burst.period_s
-            job = self._jobs[burst.can_id] = _Job(burst, burst.total - 1, due)
+            job = self._jobs[burst.can_id] = _SoftBurst(burst, burst.total - 1, due)
             self._look()
             return job.take(now)
         if len(burst.frames) != len(job.burst.frames):

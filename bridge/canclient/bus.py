@@ -22,8 +22,8 @@ from bridge.canclient.hearing import Hearing
 from bridge.canopen import abort, cobid
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.canopen.nmt import NmtCommand
-from bridge.sim.core.abort import SdoAbort
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.sdo_abort import SdoAbort
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 
 _log = logging.getLogger(__name__)
 
@@ -120,7 +120,9 @@ class DrivebridgeBus(can.BusABC):
             ) from error
         except OSError as error:
             raise can.CanInitializationError(f"{path}: {error.strerror or error}") from error
-        self._servers = {node: SdoServer(_Objects(self._gateway, node), _BLOCK_SEGMENTS) for node in _NODES}
+        self._servers = {
+            node: SimulatedSdoServer(_Objects(self._gateway, node), _BLOCK_SEGMENTS) for node in _NODES
+        }
         self._received: queue.SimpleQueue[can.Message | can.CanOperationError] = queue.SimpleQueue()
         self._epoch = time.time() - time.monotonic()
         self._hearing = self._hear() if hears else None

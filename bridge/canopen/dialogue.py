@@ -1,7 +1,7 @@
 """Dialogues with a node: generators that yield one step after the other and are sent its result.
 
-The generator's author decides what a step is. ``Read`` and ``Write`` are steps for an SDO channel. An error
-is thrown into the generator at the step that it belongs to.
+The generator's author decides what a step is. ``SdoRead`` and ``SdoWrite`` are steps for an SDO channel. An
+error is thrown into the generator at the step that it belongs to.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
 
 
 @dataclass(frozen=True, slots=True)
-class Read:
+class SdoRead:
     """Read an object over one of the node's SDO channels, by number."""
 
     index: int
@@ -23,7 +23,7 @@ class Read:
 
 
 @dataclass(frozen=True, slots=True)
-class Write:
+class SdoWrite:
     index: int
     sub: int
     data: bytes
@@ -31,31 +31,31 @@ class Write:
 
 
 def ask(
-    step: Read | Write,
+    step: SdoRead | SdoWrite,
     sdo: SdoChannel,
     now: float,
     answered: Callable[[Result], None],
     priority: Priority = Priority.COMMAND,
 ) -> None:
     """Have ``sdo`` carry out ``step``; ``answered`` is called once, possibly before this returns."""
-    if isinstance(step, Read):
+    if isinstance(step, SdoRead):
         sdo.read(step.index, step.sub, now, answered, priority=priority)
     else:
         sdo.write(step.index, step.sub, step.data, now, answered, priority=priority)
 
 
-def attempt(index: int, sub: int = 0) -> Generator[Read, bytes | None, Result]:
+def attempt(index: int, sub: int = 0) -> Generator[SdoRead, bytes | None, Result]:
     """The result of reading an object, which may be an error."""
     try:
-        return (yield Read(index, sub)) or b""
+        return (yield SdoRead(index, sub)) or b""
     except SdoError as error:
         return error
 
 
-def optional(index: int, sub: int = 0, channel: int = 1) -> Generator[Read, bytes | None, bytes | None]:
+def optional(index: int, sub: int = 0, channel: int = 1) -> Generator[SdoRead, bytes | None, bytes | None]:
     """An object that the node need not have: None if it aborts. A time-out is still an error."""
     try:
-        return (yield Read(index, sub, channel))
+        return (yield SdoRead(index, sub, channel))
     except SdoError as error:
         if error.by_server:
             return None

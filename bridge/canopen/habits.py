@@ -30,7 +30,7 @@ class Odd(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Habit:
+class HabitWording:
     """Sentences about one kind of odd frame: of ``one`` or of ``many``, and what is right.
 
     ``count`` is their number; the last of them ``has`` so many bytes or ms where ``due`` are right.
@@ -45,34 +45,34 @@ class Habit:
         return template.format(count=count, has=has, due=due)
 
 
-HABITS: Final[Mapping[Odd, Habit]] = MappingProxyType(
+HABITS: Final[Mapping[Odd, HabitWording]] = MappingProxyType(
     {
-        Odd.SDO_LENGTH: Habit(
+        Odd.SDO_LENGTH: HabitWording(
             "{count} SDO answer of {has} bytes",
             "{count} SDO answers of {has} bytes",
             "not CiA 301 §7.2.4.3, an SDO has {due}",
         ),
-        Odd.HEARTBEAT_LENGTH: Habit(
+        Odd.HEARTBEAT_LENGTH: HabitWording(
             "{count} heartbeat of {has} bytes",
             "{count} heartbeats of {has} bytes",
             "not CiA 301 §7.2.8.3, a heartbeat has {due}",
         ),
-        Odd.EMCY_LENGTH: Habit(
+        Odd.EMCY_LENGTH: HabitWording(
             "{count} emergency message of {has} bytes",
             "{count} emergency messages of {has} bytes",
             "not CiA 301 §7.2.7, an emergency message has {due}",
         ),
-        Odd.TPDO_LENGTH: Habit(
+        Odd.TPDO_LENGTH: HabitWording(
             "{count} TPDO of {has} bytes",
             "{count} TPDOs of {has} bytes",
             "not CiA 301 §7.2.2, the mapping has {due}",
         ),
-        Odd.TPDO_LENGTH_BY_FILE: Habit(
+        Odd.TPDO_LENGTH_BY_FILE: HabitWording(
             "{count} TPDO of {has} bytes",
             "{count} TPDOs of {has} bytes",
             "the mapping file has {due}",
         ),
-        Odd.SDO_LATE: Habit(
+        Odd.SDO_LATE: HabitWording(
             "{count} SDO answer {has} ms after the request",
             "{count} SDO answers {has} ms after the request",
             "sdo_timeout_ms is {due}",
@@ -82,7 +82,7 @@ HABITS: Final[Mapping[Odd, Habit]] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class HabitCount:
     """Number of times that one has shown, and the numbers of the last frame; ``str()`` is the sentence."""
 
     odd: Odd
@@ -95,7 +95,7 @@ class Shown:
 
 
 @dataclass(slots=True)
-class _Count:
+class _HabitCounter:
     count: int = 0
     has: int = 0
     due: int = 0
@@ -106,29 +106,29 @@ class HabitCounter:
     """Odd frames of one node, counted since the first."""
 
     def __init__(self) -> None:
-        self._counts: dict[Odd, _Count] = {}
+        self._counts: dict[Odd, _HabitCounter] = {}
         self.has_news = False
         """``take_news`` has something to tell."""
 
     def note(self, odd: Odd, has: int, due: int) -> None:
         """A frame that ``has`` so many bytes, or came after so many milliseconds, where ``due`` are right."""
-        counted = self._counts.setdefault(odd, _Count())
+        counted = self._counts.setdefault(odd, _HabitCounter())
         counted.count += 1
         counted.has, counted.due = has, due
         self.has_news |= counted.count >= counted.news_from
 
-    def said(self, least: int = 1) -> list[Shown]:
+    def said(self, least: int = 1) -> list[HabitCount]:
         """Each habit that has shown at least ``least`` times."""
         return [_shown(odd, one) for odd, one in self._counts.items() if one.count >= least]
 
-    def habits(self) -> list[Shown]:
+    def habits(self) -> list[HabitCount]:
         """Habits of ``said`` that are too frequent for a disturbance."""
         return self.said(_NAMED_FROM)
 
-    def take_news(self) -> list[Shown]:
+    def take_news(self) -> list[HabitCount]:
         """New ones of ``habits`` since the last call, and those that are ten times as frequent."""
         self.has_news = False
-        news: list[Shown] = []
+        news: list[HabitCount] = []
         for odd, one in self._counts.items():
             if one.count >= one.news_from:
                 news.append(_shown(odd, one))
@@ -137,5 +137,5 @@ class HabitCounter:
         return news
 
 
-def _shown(odd: Odd, counted: _Count) -> Shown:
-    return Shown(odd, counted.count, counted.has, counted.due)
+def _shown(odd: Odd, counted: _HabitCounter) -> HabitCount:
+    return HabitCount(odd, counted.count, counted.has, counted.due)

@@ -20,9 +20,9 @@ from bridge.canopen.sdo_transfer import (
     ABORT,
     MUX,
     U32,
-    Exchange,
     Result,
     SdoError,
+    SdoExchange,
     Transfer,
     abort_request,
 )
@@ -89,7 +89,7 @@ class SdoChannel:
         self._told_of_block = bool(why_no_block)
         self._job: SdoJob | None = None
         self._transfer: Transfer | None = None
-        self._exchange: Exchange | None = None
+        self._exchange: SdoExchange | None = None
         self._deadline: float | None = None
         self._frames: list[Frame] = []
         self._unsent: deque[bytes] = deque()
@@ -265,7 +265,7 @@ class SdoChannel:
         transfer = self._transfer = job.start(self._block)
         self._resume(next, transfer, now)
 
-    def _resume(self, step: Callable[[T], Exchange], argument: T, now: float) -> None:
+    def _resume(self, step: Callable[[T], SdoExchange], argument: T, now: float) -> None:
         """Resume the transfer and send its frames."""
         transfer = self._transfer
         if transfer is None:

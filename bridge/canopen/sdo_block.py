@@ -16,9 +16,9 @@ from bridge.canopen.sdo_transfer import (
     BlockAck,
     BlockSegment,
     BlockStart,
-    Exchange,
     Reply,
     SdoError,
+    SdoExchange,
     Transfer,
     abort_request,
     announced_bytes,
@@ -28,7 +28,7 @@ from bridge.canopen.sdo_transfer import (
     upload,
     upload_segments,
 )
-from bridge.canopen.sdo_ways_back import Stage, WayBack, way_back
+from bridge.canopen.sdo_ways_back import BlockStage, WayBack, way_back
 
 BLOCK_FROM_BYTES: Final = 112
 """Sixteen segments: for fewer, opening and closing a block transfer costs more frames than it saves."""
@@ -86,7 +86,7 @@ class BlockUse:
 class _Progress:
     """Stage of the block transfer under way."""
 
-    stage: Stage = Stage.BEGIN
+    stage: BlockStage = BlockStage.BEGIN
 
 
 def read_object(index: int, sub: int, block: BlockUse) -> Transfer:
@@ -134,7 +134,7 @@ def _by_segments(transfer: Transfer, failure: SdoError) -> Transfer:
     """``transfer`` after a block transfer that ended in ``failure``, which is the more telling error where
     nothing is answered now. A server that has not aborted the block transfer itself is told first."""
     if not failure.by_server:
-        yield Exchange((abort_request(failure.index, failure.sub, failure.code),), None)
+        yield SdoExchange((abort_request(failure.index, failure.sub, failure.code),), None)
     try:
         return (yield from transfer)
     except SdoError as error:
@@ -148,29 +148,29 @@ def block_upload(index: int, sub: int, block: BlockUse, progress: _Progress) -> 
     mux = MUX.pack(index, sub)
     give_up = abort_request(index, sub, abort.GENERAL)
     request = bytes((_UPLOAD,)) + mux + bytes((block.segments, 0, 0, 0))
-    reply = yield Exchange((give_up, request), BlockStart(mux))
+    reply = yield SdoExchange((give_up, request), BlockStart(mux))
     if reply[0] & 0xE1 != 0xC0:
         # An ordinary upload, which our request ruled out (pst = 0), or a repeated answer.
         raise SdoError(index, sub, abort.GENERAL, by_server=False)
     with_crc = bool(reply[0] & _CRC)
     announced = announced_bytes(index, sub, reply) if reply[0] & 2 else None
-    progress.stage = Stage.BLOCKS
+    progress.stage = BlockStage.BLOCKS
     data, last = yield from _upload_blocks(index, sub, announced, block)
-    progress.stage = Stage.END_UPLOAD
+    progress.stage = BlockStage.END_UPLOAD
     ack = bytes((_UPLOAD_ACK, last[0] & 0x7F, block.segments)) + bytes(5)
-    end = yield Exchange((ack,), Reply(0xE1, 0xC1, before=last))
+    end = yield SdoExchange((ack,), Reply(0xE1, 0xC1, before=last))
     if unused := end[0] >> 2 & 7:
         del data[-unused:]
     check_length(index, sub, len(data), announced)
     if with_crc and int.from_bytes(end[1:3], "little") != crc16(data):
         raise SdoError(index, sub, abort.CRC, by_server=False)
-    yield Exchange((_UPLOAD_DONE,), None)
+    yield SdoExchange((_UPLOAD_DONE,), None)
     return bytes(data)
 
 
 def _upload_blocks(
     index: int, sub: int, announced: int | None, block: BlockUse
-) -> Generator[Exchange, bytes, tuple[bytearray, bytes]]:
+) -> Generator[SdoExchange, bytes, tuple[bytearray, bytes]]:
     """All data of an upload, padded to whole segments, and the frame of the last segment, which has not been
     acknowledged yet."""
     most = (MOST_BYTES if announced is None else announced) + SEGMENT
@@ -192,7 +192,7 @@ def _upload_blocks(
         request = bytes((_UPLOAD_ACK, len(frames), block.segments)) + bytes(5)
 
 
-def _upload_block(request: bytes, size: int) -> Generator[Exchange, bytes, list[bytes]]:
+def _upload_block(request: bytes, size: int) -> Generator[SdoExchange, bytes, list[bytes]]:
     """The segments of one block up to the first missing one.
 
     After a time-out the segments that came are acknowledged. If none came, ``request`` may have been lost and
@@ -203,7 +203,7 @@ def _upload_block(request: bytes, size: int) -> Generator[Exchange, bytes, list[
     while True:
         due = len(frames) + 1
         try:
-            frame = yield Exchange(requests, BlockSegment(due, size))
+            frame = yield SdoExchange(requests, BlockSegment(due, size))
         except SdoError as error:
             if not error.by_server and frames:
                 return frames
@@ -221,12 +221,12 @@ def _upload_block(request: bytes, size: int) -> Generator[Exchange, bytes, list[
 
 def block_download(
     index: int, sub: int, data: bytes, progress: _Progress
-) -> Generator[Exchange, bytes, None]:
+) -> Generator[SdoExchange, bytes, None]:
     """Write by blocks."""
     mux = MUX.pack(index, sub)
     request = bytes((_DOWNLOAD,)) + mux + U32.pack(len(data))
-    reply = yield Exchange((request,), Reply(0xE3, 0xA0, mux))
-    progress.stage = Stage.BLOCKS
+    reply = yield SdoExchange((request,), Reply(0xE3, 0xA0, mux))
+    progress.stage = BlockStage.BLOCKS
     segments = [data[start : start + SEGMENT] for start in range(0, len(data), SEGMENT)]
     with_crc = bool(reply[0] & _CRC)
     size, done, repeats = reply[4], 0, 0
@@ -243,8 +243,8 @@ def block_download(
     command = _DOWNLOAD_END | (SEGMENT - len(segments[-1])) << 2
     crc = crc16(data) if with_crc else 0
     end = bytes((command,)) + crc.to_bytes(2, "little") + bytes(5)
-    progress.stage = Stage.END_DOWNLOAD
-    yield Exchange((end,), Reply(0xE3, 0xA1))
+    progress.stage = BlockStage.END_DOWNLOAD
+    yield SdoExchange((end,), Reply(0xE3, 0xA1))
 
 
 def _download_block(part: list[bytes], is_last: bool, with_crc: bool) -> Transfer:
@@ -257,8 +257,8 @@ def _download_block(part: list[bytes], is_last: bool, with_crc: bool) -> Transfe
     if is_last:
         frames[-1] = bytes((frames[-1][0] | _LAST,)) + frames[-1][1:]
     try:
-        return (yield Exchange(tuple(frames), BlockAck(len(frames))))
+        return (yield SdoExchange(tuple(frames), BlockAck(len(frames))))
     except SdoError as error:
         if error.by_server or not with_crc:
             raise
-    return (yield Exchange((frames[-1],), BlockAck(len(frames))))
+    return (yield SdoExchange((frames[-1],), BlockAck(len(frames))))

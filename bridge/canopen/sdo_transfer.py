@@ -110,7 +110,7 @@ class BlockAck:
 
 
 @dataclass(frozen=True, slots=True)
-class Exchange:
+class SdoExchange:
     """Frames to be sent in order (none: just wait), and the answer that ends the exchange (None: the transfer
     goes on at once)."""
 
@@ -118,7 +118,7 @@ class Exchange:
     reply: Reply | BlockStart | BlockSegment | BlockAck | None
 
 
-Transfer = Generator[Exchange, bytes, bytes]
+Transfer = Generator[SdoExchange, bytes, bytes]
 Result = bytes | SdoError
 
 
@@ -152,10 +152,10 @@ def segment(data: bytes) -> bytes:
     return data[1 : 8 - (data[0] >> 1 & 7)]
 
 
-def initiate_upload(index: int, sub: int) -> Generator[Exchange, bytes, tuple[bytes | None, int | None]]:
+def initiate_upload(index: int, sub: int) -> Generator[SdoExchange, bytes, tuple[bytes | None, int | None]]:
     """Ask for an object. Returns its value if the answer contains it, else the announced length."""
     mux = MUX.pack(index, sub)
-    reply = yield Exchange((bytes((_UPLOAD,)) + mux + bytes(4),), Reply(0xE0, 0x40, mux))
+    reply = yield SdoExchange((bytes((_UPLOAD,)) + mux + bytes(4),), Reply(0xE0, 0x40, mux))
     if reply[0] & 2:
         return expedited(reply), None
     return None, announced_bytes(index, sub, reply) if reply[0] & 1 else None
@@ -174,7 +174,7 @@ def upload_segments(index: int, sub: int, announced: int | None) -> Transfer:
     most = MOST_BYTES if announced is None else announced
     while True:
         request = bytes((_UPLOAD_SEGMENT | toggle,)) + bytes(7)
-        reply = yield Exchange((request,), Reply(0xE0, 0x00, before=reply))
+        reply = yield SdoExchange((request,), Reply(0xE0, 0x00, before=reply))
         if reply[0] & _TOGGLE != toggle:
             raise SdoError(index, sub, abort.TOGGLE, by_server=False)
         part = segment(reply)
@@ -196,16 +196,16 @@ def download(index: int, sub: int, data: bytes) -> Transfer:
     done = Reply(0xE0, 0x60, mux)
     if 0 < len(data) <= 4:
         command = _EXPEDITED | (4 - len(data)) << 2
-        yield Exchange((bytes((command,)) + mux + data.ljust(4, b"\0"),), done)
+        yield SdoExchange((bytes((command,)) + mux + data.ljust(4, b"\0"),), done)
         return b""
-    yield Exchange((bytes((_DOWNLOAD,)) + mux + U32.pack(len(data)),), done)
+    yield SdoExchange((bytes((_DOWNLOAD,)) + mux + U32.pack(len(data)),), done)
     toggle, reply = 0, b""
     for start in range(0, max(len(data), 1), SEGMENT):
         part = data[start : start + SEGMENT]
         last = start + SEGMENT >= len(data)
         command = toggle | (SEGMENT - len(part)) << 1 | last
         request = bytes((command,)) + part.ljust(SEGMENT, b"\0")
-        reply = yield Exchange((request,), Reply(0xE0, 0x20, before=reply))
+        reply = yield SdoExchange((request,), Reply(0xE0, 0x20, before=reply))
         if reply[0] & _TOGGLE != toggle:
             raise SdoError(index, sub, abort.TOGGLE, by_server=False)
         toggle ^= _TOGGLE

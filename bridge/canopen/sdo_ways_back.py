@@ -16,7 +16,7 @@ from bridge.canopen import abort
 from bridge.canopen.sdo_transfer import SdoError
 
 
-class Stage(Enum):
+class BlockStage(Enum):
     """Stage of a block transfer (CiA 301 §7.2.4.3.9–15)."""
 
     BEGIN = "A4h or C6h has been sent"
@@ -33,13 +33,13 @@ class WayBack:
     ``codes``: abort codes of CiA 301 table 22, any where there are none.
     """
 
-    stage: Stage
+    stage: BlockStage
     by_server: bool
     codes: frozenset[int]
     name: str
     says: str
 
-    def fits(self, stage: Stage, error: SdoError) -> bool:
+    def fits(self, stage: BlockStage, error: SdoError) -> bool:
         is_of_kind = self.stage is stage and self.by_server is error.by_server
         return is_of_kind and (not self.codes or error.code in self.codes)
 
@@ -57,20 +57,22 @@ _OF_THE_PROTOCOL: Final = (
 """Abort codes by which a server refuses the end of a download without having looked at the value."""
 
 WAYS_BACK: Final = (
-    WayBack(Stage.BEGIN, True, _ANY, "refused", "the node refuses it"),
-    WayBack(Stage.BEGIN, False, _SILENCE, "no_answer", "the node does not answer when it is asked for it"),
-    WayBack(Stage.BEGIN, False, frozenset((abort.GENERAL,)), "segments", "the node answers by segments"),
-    WayBack(Stage.BLOCKS, True, _ANY, "aborted", "the node aborts it within the blocks"),
-    WayBack(Stage.BLOCKS, False, _SILENCE, "silent", "the node falls silent within the blocks"),
-    WayBack(Stage.BLOCKS, False, _OUT_OF_STEP, "out_of_step", "the node loses step within the blocks"),
-    WayBack(Stage.END_UPLOAD, True, _ANY, "aborted_at_end", "the node aborts it at its end"),
-    WayBack(Stage.END_UPLOAD, False, _SILENCE, "silent_at_end", "the node falls silent at its end"),
-    WayBack(Stage.END_UPLOAD, False, frozenset((abort.CRC,)), "crc", "the node's CRC is wrong"),
-    WayBack(Stage.END_UPLOAD, False, _LENGTHS, "length", "the node's length is wrong"),
-    WayBack(Stage.END_DOWNLOAD, True, _OF_THE_PROTOCOL, "end_refused", "the node refuses its end"),
+    WayBack(BlockStage.BEGIN, True, _ANY, "refused", "the node refuses it"),
+    WayBack(
+        BlockStage.BEGIN, False, _SILENCE, "no_answer", "the node does not answer when it is asked for it"
+    ),
+    WayBack(BlockStage.BEGIN, False, frozenset((abort.GENERAL,)), "segments", "the node answers by segments"),
+    WayBack(BlockStage.BLOCKS, True, _ANY, "aborted", "the node aborts it within the blocks"),
+    WayBack(BlockStage.BLOCKS, False, _SILENCE, "silent", "the node falls silent within the blocks"),
+    WayBack(BlockStage.BLOCKS, False, _OUT_OF_STEP, "out_of_step", "the node loses step within the blocks"),
+    WayBack(BlockStage.END_UPLOAD, True, _ANY, "aborted_at_end", "the node aborts it at its end"),
+    WayBack(BlockStage.END_UPLOAD, False, _SILENCE, "silent_at_end", "the node falls silent at its end"),
+    WayBack(BlockStage.END_UPLOAD, False, frozenset((abort.CRC,)), "crc", "the node's CRC is wrong"),
+    WayBack(BlockStage.END_UPLOAD, False, _LENGTHS, "length", "the node's length is wrong"),
+    WayBack(BlockStage.END_DOWNLOAD, True, _OF_THE_PROTOCOL, "end_refused", "the node refuses its end"),
 )
 
 
-def way_back(stage: Stage, error: SdoError) -> WayBack | None:
+def way_back(stage: BlockStage, error: SdoError) -> WayBack | None:
     """The first row that fits; None where segments would be no way on."""
     return next((way for way in WAYS_BACK if way.fits(stage, error)), None)

@@ -6,7 +6,7 @@ from typing import Final
 
 from bridge.image.point import DataType, Point
 from bridge.mapping.model import Parameter
-from bridge.parameter import Entry, Names
+from bridge.parameter import Names, ParameterEntry
 
 _MOST_STATES: Final = 256
 """An enumeration is shown as a list of texts from code 0 on (OPC UA Part 8 §5.3.3.3)."""
@@ -17,7 +17,7 @@ def parameter_points(name: str, names: Names) -> list[Point]:
     return [_point(f"{name}/parameter/{entry.leaf}", entry) for entry in names.points()]
 
 
-def _point(name: str, entry: Entry) -> Point:
+def _point(name: str, entry: ParameterEntry) -> Point:
     definition = entry.definition
     if definition is None:
         return Point(name=name, data_type=DataType.UINT32, description=entry.name)

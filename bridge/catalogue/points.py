@@ -19,7 +19,7 @@ from bridge.catalogue.parameter_points import parameter_points
 from bridge.config import BusTable, DriveTable, NodeTable, Site
 from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec, scales_of
 from bridge.image.point import DataType, Point
-from bridge.mapping.device import Signal
+from bridge.mapping.device_signals import Signal
 from bridge.mapping.model import Family, Poll, ProcessValue
 from bridge.parameter import Names
 

@@ -16,10 +16,10 @@ import typer
 from bridge.base.errors import OperationFailed
 from bridge.bustools.open_channels import OpenChannels
 from bridge.catalogue import Catalogue
-from bridge.cli import drop_report, drop_test, exchange_report
-from bridge.cli.bus import AsJson, CliBus, carry_out, tell
-from bridge.cli.exchange_report import Exchange
-from bridge.cli.own_check import audit_drives, audit_facts
+from bridge.cli import drop_report, drop_test_command, exchange_report
+from bridge.cli.audit_command import audit_drives, audit_facts
+from bridge.cli.bus_runner import AsJson, CliBus, carry_out, tell
+from bridge.cli.exchange_report import DeviceExchange
 from bridge.cli.parameter_backup import (
     Wait,
     content_for,
@@ -41,7 +41,7 @@ _ALL_BITS = 0xFFFF_FFFF
 
 
 @dataclass(frozen=True, slots=True)
-class _Options:
+class _ExchangeOptions:
     """Options of one call; ``wait_s`` is the time to wait for the node."""
 
     site: Path
@@ -55,7 +55,7 @@ class _Options:
 
 
 @dataclass(frozen=True, slots=True)
-class _Place:
+class _DriveBackup:
     """One drive of the node, and the backup that it gets."""
 
     target: Target
@@ -87,16 +87,16 @@ def exchange(
     as_json: AsJson = False,
 ) -> None:
     """After NODE was exchanged: restore its backups, save, do the drop test, audit, and write a report."""
-    options = _Options(site, files, at_the_machine, same_serial, force, operator, wait, as_json)
+    options = _ExchangeOptions(site, files, at_the_machine, same_serial, force, operator, wait, as_json)
     project = load_project(site)
-    bus, table = drop_test.find_node(project, node)
+    bus, table = drop_test_command.find_node(project, node)
     if not table.drive:
         raise typer.BadParameter(
             f"{node} is no drive: `drivebridge parameters restore` gives it its settings, and `drop-test` "
             "proves what becomes of its outputs"
         )
     places = _places(project, site, table, files)
-    drop_test.refuse_company(project, bus, table)
+    drop_test_command.refuse_company(project, bus, table)
     occasion, done = _begin(project, table, places, options)
     _open_channels(project, bus, node)
     for place in places:
@@ -109,13 +109,13 @@ def exchange(
 
 
 def _begin(
-    project: Project, table: NodeTable, places: Sequence[_Place], options: _Options
-) -> tuple[drop_report.Occasion, Exchange]:
+    project: Project, table: NodeTable, places: Sequence[_DriveBackup], options: _ExchangeOptions
+) -> tuple[drop_report.Occasion, DeviceExchange]:
     """Judge the new device and ask for consent, then begin the exchange or go on with one."""
     identity: dict[str, int] = {}
     places[0].target.run(lambda now: backups.identify(identity))
     _judge(options.site, table, places, identity, same_serial=options.same_serial)
-    consent = drop_test.agree(
+    consent = drop_test_command.agree(
         places[0].target.one,
         at_the_machine=options.at_the_machine,
         first=f"The settings of {table.name} are overwritten with those of the backups. ",
@@ -134,12 +134,12 @@ def _prove(
     project: Project,
     bus: BusTable,
     table: NodeTable,
-    places: Sequence[_Place],
+    places: Sequence[_DriveBackup],
     occasion: drop_report.Occasion,
-    done: Exchange,
+    done: DeviceExchange,
 ) -> tuple[dict[str, Any], str]:
     """Do the drop test and the audit. Returns the facts of the report, and why the test has no result."""
-    plant, test = drop_test.perform(project, bus, table)
+    plant, test = drop_test_command.perform(project, bus, table)
     dropped = drop_report.facts(occasion, plant.nodes[table.name], test)
     audited = list(audit_drives(project, bus.name, [], of_node=table.name))
     facts = exchange_report.facts(
@@ -154,7 +154,7 @@ def _prove(
     return facts, test.failure
 
 
-def _report(done: Exchange, facts: dict[str, Any], *, as_json: bool) -> None:
+def _report(done: DeviceExchange, facts: dict[str, Any], *, as_json: bool) -> None:
     """Write the report and print it. Raises ``OperationFailed`` where it cannot be written."""
     try:
         written = done.end(facts)
@@ -168,13 +168,13 @@ def _report(done: Exchange, facts: dict[str, Any], *, as_json: bool) -> None:
         tell(f"report: {written[0]}, {written[1]}")
 
 
-def _places(project: Project, site: Path, node: NodeTable, files: Sequence[Path]) -> list[_Place]:
+def _places(project: Project, site: Path, node: NodeTable, files: Sequence[Path]) -> list[_DriveBackup]:
     """Each drive of the node with its file. Raises ``BadParameter`` where one has none, or two."""
     family = project.families[node.mapping_key]
     targets = {
         name: find(site, name) for name in (f"{node.name}/{family.leaf_of(one)}" for one in node.drive)
     }
-    found: dict[str, _Place] = {}
+    found: dict[str, _DriveBackup] = {}
     for file in files:
         if file.suffix.lower() in DESCRIPTIONS:
             raise typer.BadParameter(f"{file} is a device description, and no backup")
@@ -186,13 +186,13 @@ def _places(project: Project, site: Path, node: NodeTable, files: Sequence[Path]
             )
         if content.drive in found:
             raise typer.BadParameter(f"{file} and {found[content.drive].file} are both of {content.drive}")
-        found[content.drive] = _Place(targets[content.drive], file, content)
+        found[content.drive] = _DriveBackup(targets[content.drive], file, content)
     if lacking := [name for name in targets if name not in found]:
         raise typer.BadParameter(f"no backup is given of {', '.join(lacking)}")
     return [found[name] for name in targets]
 
 
-def _old(places: Sequence[_Place]) -> dict[str, int]:
+def _old(places: Sequence[_DriveBackup]) -> dict[str, int]:
     """Identity of the old device by the files."""
     for place in places:
         if place.content.identity:
@@ -201,7 +201,12 @@ def _old(places: Sequence[_Place]) -> dict[str, int]:
 
 
 def _judge(
-    site: Path, node: NodeTable, places: Sequence[_Place], identity: dict[str, int], *, same_serial: bool
+    site: Path,
+    node: NodeTable,
+    places: Sequence[_DriveBackup],
+    identity: dict[str, int],
+    *,
+    same_serial: bool,
 ) -> None:
     """Raises ``FileFaults`` where a file is of another kind of node, and ``OperationFailed`` unless the node
     is a new device that the site file lets be used."""
@@ -232,7 +237,7 @@ def _open_channels(project: Project, bus: BusTable, name: str) -> None:
         raise OperationFailed(f"{name}: {task.failure}")
 
 
-def _restore(place: _Place, done: Exchange, options: _Options) -> None:
+def _restore(place: _DriveBackup, done: DeviceExchange, options: _ExchangeOptions) -> None:
     """Show the differences, write the backup, and keep what was written also where it ends early. Raises
     ``OperationFailed``."""
     found = differences(place.target, place.content.all)
@@ -261,7 +266,7 @@ def _facts(restored: backups.Restored) -> dict[str, Any]:
     return restored_facts(restored) | {"warnings": sorted(warnings)}
 
 
-def _save(target: Target, done: Exchange) -> None:
+def _save(target: Target, done: DeviceExchange) -> None:
     """Have the node keep what was written; one that has no command for that may keep it by itself."""
     if not done.is_unsaved:
         return

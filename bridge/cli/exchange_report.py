@@ -20,7 +20,7 @@ _Facts = dict[str, Any]
 
 
 @dataclass(slots=True)
-class Exchange:
+class DeviceExchange:
     """One exchange of a node's device. It is kept in ``folder`` until ``end``, so that whoever begins again
     with the same device and files reports also what was written before."""
 
@@ -83,12 +83,12 @@ def begin(
     node: str,
     identity: dict[str, int],
     files: Sequence[Path],
-) -> Exchange:
+) -> DeviceExchange:
     """The exchange that was begun with this device and these files, or a new one. Raises
     ``OperationFailed`` where it cannot be kept."""
     now = occasion.at.astimezone(UTC).isoformat(timespec="seconds")
     sums = {str(file.resolve()): hashlib.sha256(file.read_bytes()).hexdigest() for file in sorted(files)}
-    found = Exchange(state_dir / _FOLDER, node, now, now, sums, identity)
+    found = DeviceExchange(state_dir / _FOLDER, node, now, now, sums, identity)
     kept = _kept(found)
     if kept.get("files") == sums and kept.get("identity") == identity:
         for name in ("began", "drives", "is_unsaved", "warnings"):
@@ -97,7 +97,7 @@ def begin(
     return found
 
 
-def _kept(new: Exchange) -> _Facts:
+def _kept(new: DeviceExchange) -> _Facts:
     """Empty where nothing was kept, or only half a file."""
     try:
         content: object = json.loads(new.path.read_text("utf-8"))
@@ -110,7 +110,7 @@ def _kept(new: Exchange) -> _Facts:
 
 def facts(
     occasion: drop_report.Occasion,
-    done: Exchange,
+    done: DeviceExchange,
     node: NodeTable,
     old: Mapping[str, int],
     dropped: _Facts,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bridge.exports import Table, dbc_file, modbus_table, opcua_table, zenoh_table
+from bridge.exports import ExportTable, dbc_file, modbus_table, opcua_table, zenoh_table
 from bridge.project import load_project
 
 app = typer.Typer(
@@ -52,6 +52,6 @@ def dbc(
     print(dbc_file(project, 0 if bus is None else names.index(bus), words=words), end="")
 
 
-def _print(table: Table, as_json: bool) -> None:
+def _print(table: ExportTable, as_json: bool) -> None:
     """CSV for spreadsheets, or a JSON list of objects."""
     print(table.as_json() if as_json else table.as_csv(), end="")

@@ -14,13 +14,13 @@ from typing import Final
 
 import msgspec
 
-from bridge.cli.bus import CliBus, tell
+from bridge.cli.bus_runner import CliBus, tell
 
 NAME: Final = "sdo-servers.json"
 _KEPT_S: Final = 30 * 86_400.0
 
 
-class _Server(msgspec.Struct):
+class _KnownServer(msgspec.Struct):
     """Reason why a server is not asked for block transfer, and when that was found out, in seconds since
     1970."""
 
@@ -28,10 +28,12 @@ class _Server(msgspec.Struct):
     since: float
 
 
-class _File(msgspec.Struct):
+class _KnownServersFile(msgspec.Struct):
     """Servers by bus, then by the COB-ID of requests."""
 
-    servers: dict[str, dict[int, _Server]] = msgspec.field(default_factory=dict[str, dict[int, _Server]])
+    servers: dict[str, dict[int, _KnownServer]] = msgspec.field(
+        default_factory=dict[str, dict[int, _KnownServer]]
+    )
 
 
 class KnownServers:
@@ -60,20 +62,20 @@ class KnownServers:
         kept = self._read()
         servers = kept.servers.setdefault(self._bus, {})
         for request_id, why in learned.items():
-            servers[request_id] = _Server(why, time.time())
+            servers[request_id] = _KnownServer(why, time.time())
         try:
             self._write(kept)
         except OSError as error:
             tell(f"{self.path} cannot be written: {error.strerror}; it will be asked for again")
 
-    def _read(self) -> _File:
+    def _read(self) -> _KnownServersFile:
         """Empty where there is no file that can be read: it is found out anew."""
         try:
-            return msgspec.json.decode(self.path.read_bytes(), type=_File)
+            return msgspec.json.decode(self.path.read_bytes(), type=_KnownServersFile)
         except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
-            return _File()
+            return _KnownServersFile()
 
-    def _write(self, kept: _File) -> None:
+    def _write(self, kept: _KnownServersFile) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         new = self.path.with_name(f".{NAME}.{os.getpid()}")
         new.write_bytes(msgspec.json.format(msgspec.json.encode(kept), indent=1))

@@ -14,14 +14,14 @@ import typer
 
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
-from bridge.bustools.decode import Decoder, Kind, Meaning
+from bridge.bustools.decode import Decoder, FrameKind, FrameMeaning
 from bridge.bustools.habit_watch import HabitWatch
 from bridge.bustools.pdo_views import without_pdos
 from bridge.bustools.silence_watch import SilenceWatch, bounds
 from bridge.bustools.statistics import Statistics
 from bridge.bustools.task import BusTask
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
-from bridge.cli.bus import AsJson, BusChoice, carry_out, choose_bus, print_table, takes_bus, tell
+from bridge.cli.bus_runner import AsJson, BusChoice, carry_out, choose_bus, print_table, takes_bus, tell
 from bridge.cli.terminal import printable
 from bridge.cli.trace import SUFFIXES, Trace
 from bridge.lint import family_dictionaries
@@ -36,8 +36,8 @@ class _Listener(BusTask):
         self,
         decoder: Decoder,
         habits: HabitWatch,
-        wanted: Callable[[Meaning], bool],
-        show: Callable[[Frame, Meaning, float], None],
+        wanted: Callable[[FrameMeaning], bool],
+        show: Callable[[Frame, FrameMeaning, float], None],
         now: float,
         count: int | None,
         seconds: float | None,
@@ -80,7 +80,7 @@ def monitor(
         ),
     ] = None,
     node: Annotated[list[str] | None, typer.Option(help="only this node; may be repeated")] = None,
-    kind: Annotated[list[Kind] | None, typer.Option(help="only this kind; may be repeated")] = None,
+    kind: Annotated[list[FrameKind] | None, typer.Option(help="only this kind; may be repeated")] = None,
     count: Annotated[int | None, typer.Option(min=1, help="end after this many frames")] = None,
     seconds: Annotated[float | None, typer.Option(min=0.01, help="end after this time")] = None,
     statistics: Annotated[bool, typer.Option("--statistics", help="count instead, by COB-ID")] = False,
@@ -97,10 +97,10 @@ def monitor(
     tally = Statistics(line.table.bitrate)
     habits = HabitWatch(lambda node_id: line.sdo_policy(node_id)[0], decoder.tpdo_bytes)
 
-    def wanted(meaning: Meaning) -> bool:
+    def wanted(meaning: FrameMeaning) -> bool:
         return (not ids or meaning.node in ids) and (not kinds or meaning.kind in kinds)
 
-    def show(frame: Frame, meaning: Meaning, at: float) -> None:
+    def show(frame: Frame, meaning: FrameMeaning, at: float) -> None:
         if record:
             record.write(line.table.channel or "can0", frame)
         if statistics:
@@ -162,14 +162,14 @@ def _cob_id(frame: Frame) -> str:
     return f"{frame.can_id & _IDENTIFIER:0{digits}X}"
 
 
-def for_people(frame: Frame, meaning: Meaning, at: float) -> str:
+def for_people(frame: Frame, meaning: FrameMeaning, at: float) -> str:
     """One line of the monitor."""
     data = "remote" if frame.can_id & REMOTE else frame.data.hex(" ").upper()
     label, text = printable(meaning.label), printable(meaning.text)
     return f"{at:12.6f}  {_cob_id(frame)}  {data:<23}  {label:<22}  {text}".rstrip()
 
 
-def _for_scripts(frame: Frame, meaning: Meaning, at: float) -> dict[str, object]:
+def _for_scripts(frame: Frame, meaning: FrameMeaning, at: float) -> dict[str, object]:
     return {
         "time": round(at, 6),
         "cob_id": _cob_id(frame),

@@ -13,7 +13,7 @@ import typer
 
 from bridge.base import clock
 from bridge.base.errors import FileFaults, OperationFailed
-from bridge.cli.bus import AsJson, print_table, tell
+from bridge.cli.bus_runner import AsJson, print_table, tell
 from bridge.cli.parameter_drive import DriveArgument, Force, SiteArgument, Target, Yes, find
 from bridge.cli.parameter_sets import read_all, write_all
 from bridge.image import Value

@@ -14,14 +14,14 @@ from bridge.base.errors import OperationFailed
 from bridge.bustools.bystander import Bystander, Standstill
 from bridge.bustools.parameter import ParameterTask
 from bridge.catalogue import Catalogue, MemberSpec
-from bridge.cli.bus import CliBus, carry_out, not_virtual, tell
+from bridge.cli.bus_runner import CliBus, carry_out, not_virtual, tell
 from bridge.cli.known_servers import KnownServers
 from bridge.cli.terminal import Show, progress
 from bridge.command.output_words import OutputWords
 from bridge.config import NodeTable
 from bridge.mapping.model import Family, Slot
 from bridge.node.parameters.run import Procedure
-from bridge.parameter import DriveParameters, Entry, Ledger, ParameterError, Why
+from bridge.parameter import DriveParameters, Ledger, ParameterEntry, ParameterError, Why
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.parameter.protection import Gate
 from bridge.project import load_project
@@ -45,7 +45,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class Saved:
+class SaveOutcome:
     """Outcome of a save: the guard's ``warning``, or ``why_not`` where nothing can be saved on command."""
 
     warning: Said = ""
@@ -79,7 +79,7 @@ class Target:
         """Slot of the drive; a node that is none has no slot."""
         return self.one.slot
 
-    def refuse_unforced(self, entries: Iterable[Entry]) -> None:
+    def refuse_unforced(self, entries: Iterable[ParameterEntry]) -> None:
         """Raises ``BadParameter`` with all that is written with ``--force`` only, if at all."""
         protection = self.access.names.protection
         reasons = "; ".join(str(why) for entry in entries if (why := protection.why_forced(entry)))
@@ -128,14 +128,14 @@ class Target:
             raise OperationFailed(f"{self.name}: {result}") from None
         return result
 
-    def save(self, gate: Gate) -> Saved:
+    def save(self, gate: Gate) -> SaveOutcome:
         """Have the node keep its parameters. Raises ``OperationFailed``, but not where it has no command for
         that: it may keep them by itself."""
         result = self.attempt(lambda now: self.access.save(now, gate), writes=True)
         if not isinstance(result, ParameterError):
-            return Saved(warning=result)
+            return SaveOutcome(warning=result)
         if result.why is Why.NOT_CONFIGURED:
-            return Saved(why_not=str(result))
+            return SaveOutcome(why_not=str(result))
         raise OperationFailed(f"{self.name}: {result}") from None
 
     def attempt(

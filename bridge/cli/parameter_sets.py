@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
-from bridge.cli.bus import tell
+from bridge.cli.bus_runner import tell
 from bridge.cli.parameter_drive import Target
 from bridge.cli.terminal import Show
 from bridge.image import Value

@@ -11,20 +11,20 @@ from bridge.base.errors import BridgeError, FileFaults, OperationFailed
 from bridge.bustools.scan import FoundNode
 from bridge.config import BusTable
 from bridge.derive import Derived, ProposedBus, ProposedNode, derive_family, describe, propose_site
-from bridge.derive.device import is_of
+from bridge.derive.device_family import is_of
 from bridge.derive.toml import file_name
 from bridge.eds import Description, read_device_file, read_whole_device_file
 from bridge.mapping import Family
 from bridge.mapping.loader import mappings_dir, read_family
 from bridge.mapping.match import Match
-from bridge.mapping.site import DESCRIBED
+from bridge.mapping.site_families import DESCRIBED
 
 _SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 _PROFILE_ONLY: Final = ("device_type",)
 
 
 @dataclass(frozen=True, slots=True)
-class _File:
+class _DescriptionFile:
     path: Path
     description: Description
 
@@ -75,7 +75,7 @@ def write_site(
     return f"{path}{beside}: {served} of {len(nodes)} nodes have a mapping"
 
 
-def _name(site: Path, file: _File, derived: Derived) -> str:
+def _name(site: Path, file: _DescriptionFile, derived: Derived) -> str:
     """Name of the mapping in the site file. A device that is no drive has its file itself, where that lies
     with the site; a drive has a mapping file, because its words want to be looked through."""
     folder, described = site.resolve().parent, file.path.resolve()
@@ -84,12 +84,12 @@ def _name(site: Path, file: _File, derived: Derived) -> str:
     return f"{DESCRIBED}{described.relative_to(folder).as_posix()}"
 
 
-def _files(folder: Path) -> Iterator[_File]:
+def _files(folder: Path) -> Iterator[_DescriptionFile]:
     """Readable device files in ``folder``; all others are somebody else's."""
     for path in sorted(folder.rglob("*")):
         if path.suffix.lower() in _SUFFIXES:
             try:
-                yield _File(path, read_device_file(path))
+                yield _DescriptionFile(path, read_device_file(path))
             except BridgeError:
                 continue
 

@@ -16,8 +16,8 @@ import typer
 
 from bridge.base.errors import BridgeError, OperationFailed
 from bridge.cli import logs
-from bridge.cli.signals import ending_signals
-from bridge.cli.stopping import Ending, until_stopped
+from bridge.cli.ending_signals import ending_signals
+from bridge.cli.stopping import Shutdown, until_stopped
 from bridge.config import BusTable, Site, ZenohTable, load_site
 from bridge.service.front_process import FRONTS, Front, become_front, give_reason, limit_memory
 
@@ -25,10 +25,10 @@ from bridge.service.front_process import FRONTS, Front, become_front, give_reaso
 if TYPE_CHECKING:
     from bridge.can import Bus
     from bridge.project import Project
-    from bridge.sim.shell import Simulation
+    from bridge.sim.runner import Simulation
 
 
-class Role(StrEnum):
+class ProcessRole(StrEnum):
     """Processes of the service, as ``run --role`` names them."""
 
     ALL = "all"
@@ -53,7 +53,7 @@ _DEMO_MOVES = (
 def run(
     site: SiteArgument,
     role: Annotated[
-        list[Role] | None,
+        list[ProcessRole] | None,
         typer.Option(help="run one process alone: bus, opcua, page or zenoh; or bus with some of the others"),
     ] = None,
     parent: Annotated[int, typer.Option(hidden=True)] = 0,
@@ -63,9 +63,9 @@ def run(
 ) -> None:
     """Run the bridge for SITE. Nodes of a virtual bus are simulated in the same process."""
     logs.set_up(verbose=verbose)
-    roles = role or [Role.ALL]
+    roles = role or [ProcessRole.ALL]
     front = next((one for one in roles if one in FRONTS), None)
-    if front is not None and Role.BUS not in roles:
+    if front is not None and ProcessRole.BUS not in roles:
         if len(roles) > 1:
             raise BridgeError("a process has one role; with bus, those of the fronts that it is to start")
         _become_front(parent, front)
@@ -78,8 +78,8 @@ def run(
         return
     from bridge.project import load_project
 
-    ending = Ending()
-    fronts = FRONTS if Role.ALL in roles else tuple(one for one in roles if one in FRONTS)
+    ending = Shutdown()
+    fronts = FRONTS if ProcessRole.ALL in roles else tuple(one for one in roles if one in FRONTS)
     until_stopped(_serve(load_project(site), ending, fronts=fronts), ending)
 
 
@@ -114,7 +114,7 @@ def demo(verbose: Verbose = False) -> None:
     logs.set_up(verbose=verbose)
     with tempfile.TemporaryDirectory(prefix="drivebridge-") as folder:
         project = load_project(_demo_site(Path(folder)))
-        ending = Ending()
+        ending = Shutdown()
         ready = partial(_print_demo, project)
         until_stopped(_serve(project, ending, controller=True, ready=ready), ending)
 
@@ -170,16 +170,16 @@ def _become_front(parent: int, role: str) -> None:
 
 async def _serve(
     project: Project,
-    ending: Ending,
+    ending: Shutdown,
     *,
     fronts: Collection[str] = FRONTS,
     controller: bool = False,
     ready: Callable[[], None] = lambda: None,
 ) -> None:
     """The service, with simulated nodes on its virtual buses."""
-    from bridge.base.memory import lock_memory
+    from bridge.base.memory_lock import lock_memory
     from bridge.master.standstill import SignalAlarm
-    from bridge.service.bus_process import Service, make_bus
+    from bridge.service.bus_process import BusProcess, make_bus
 
     why_not = lock_memory()
     if why_not:
@@ -199,7 +199,7 @@ async def _serve(
         simulations.append(nodes)
         return wire.end(table.name)
 
-    service = Service(project, open_bus, fronts=fronts, alarm=SignalAlarm())
+    service = BusProcess(project, open_bus, fronts=fronts, alarm=SignalAlarm())
     ending.first = service.halt
     if controller and project.site.zenoh:
         service.fronts.append(_demo_controller(project.site.zenoh, project.site.site.name))

@@ -16,11 +16,11 @@ from bridge.derive import describe
 from bridge.eds import read_whole_device_file
 from bridge.mapping import Family
 from bridge.mapping.loader import lineage, load_family, mapping_folders
-from bridge.mapping.site import described_file
+from bridge.mapping.site_families import described_file
 from bridge.sim.catalogue import SIMULATED, simulate_description, simulate_family, simulate_node, values_of
-from bridge.sim.core.device import SimulatedDevice
 from bridge.sim.core.habit import Rule, load_habit
-from bridge.sim.shell import Simulation
+from bridge.sim.core.simulated_device import SimulatedDevice
+from bridge.sim.runner import Simulation
 
 Habits = Mapping[str, Sequence[Rule]]
 """Rules by the name of the node that has them."""

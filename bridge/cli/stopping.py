@@ -8,24 +8,24 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from bridge.cli import logs
-from bridge.cli.signals import ending_signals
+from bridge.cli.ending_signals import ending_signals
 
 
 @dataclass(slots=True)
-class Ending:
+class Shutdown:
     """``first`` is done in the loop's turn after the signal, before anything else is ended."""
 
     first: Callable[[], None] = lambda: None
 
 
-def until_stopped(work: Coroutine[Any, Any, None], ending: Ending | None = None) -> None:
+def until_stopped(work: Coroutine[Any, Any, None], ending: Shutdown | None = None) -> None:
     """Run ``work`` until it ends or one of the signals that end us comes; then ``work`` is cancelled, once.
     Its one error is raised bare."""
     was_held = ending_signals.is_held
     if not was_held:
         ending_signals.hold()
     try:
-        asyncio.run(_supervised(work, ending or Ending()))
+        asyncio.run(_supervised(work, ending or Shutdown()))
     except BaseExceptionGroup as group:
         raise _first(cast("BaseException", group)) from None
     finally:
@@ -34,7 +34,7 @@ def until_stopped(work: Coroutine[Any, Any, None], ending: Ending | None = None)
             ending_signals.release()
 
 
-async def _supervised(work: Coroutine[Any, Any, None], ending: Ending) -> None:
+async def _supervised(work: Coroutine[Any, Any, None], ending: Shutdown) -> None:
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(logs.log_fault)
     logs.write_counts(loop)

@@ -20,9 +20,9 @@ import typer
 
 from bridge.base.errors import BridgeError, OperationFailed, Unavailable
 from bridge.cli import logs
-from bridge.cli.bus import AsJson
+from bridge.cli.bus_runner import AsJson
 from bridge.config import Site, load_site
-from bridge.witness.findings import Alarm, Finding, Kind, Sight, Stop
+from bridge.witness.findings import Alarm, AlarmKind, Finding, Sight, Stop
 from bridge.witness.numbers import Numbers
 from bridge.witness.plan import UnknownFamily, WatchedBus, plan
 from bridge.witness.shell import CannotListen, Witness
@@ -205,7 +205,7 @@ def _as_dict(finding: Finding) -> dict[str, object]:
 
 def _as_text(finding: Finding) -> str:
     if isinstance(finding, Alarm):
-        mark = "INTRUDER" if finding.kind is Kind.INTRUDER else "ALARM"
+        mark = "INTRUDER" if finding.kind is AlarmKind.INTRUDER else "ALARM"
         return f"{_time(finding.time)} {mark} {finding.source}: {finding.message}"
     if isinstance(finding, Sight):
         return f"{_time(finding.time)} sees again {finding.source}: {finding.message}"

@@ -5,8 +5,8 @@ from bridge.command.commanded import Commanded as Commanded
 from bridge.command.drive import Drive as Drive
 from bridge.command.drive import Identification as Identification
 from bridge.command.messages.event import Event as Event
+from bridge.command.messages.event import EventKind as EventKind
 from bridge.command.messages.event import EventQueue as EventQueue
-from bridge.command.messages.event import Kind as Kind
 from bridge.command.messages.request import Action as Action
 from bridge.command.messages.request import Code as Code
 from bridge.command.messages.request import Command as Command
@@ -25,7 +25,7 @@ from bridge.command.messages.request import Write as Write
 from bridge.command.messages.request import WriteParameter as WriteParameter
 from bridge.command.messages.request import command_of as command_of
 from bridge.command.node import BusSide as BusSide
-from bridge.command.node import HasParameters as HasParameters
 from bridge.command.node import Node as Node
+from bridge.command.node import ParameterHolder as ParameterHolder
 from bridge.command.plant import Plant as Plant
 from bridge.command.plant import PlantView as PlantView

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.link import FurtherTpdo
-from bridge.command.stop_check.drive import DriveStopCheck
+from bridge.command.drive_link import FurtherTpdo
+from bridge.command.stop_check.drive_check import DriveStopCheck
 from bridge.drive import DriveState, Lack, ParameterSet, ValueCodec, codecs
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Meaning, Slot

@@ -71,7 +71,7 @@ class Rejection:
     values: Values = field(default_factory=dict[str, Value])
 
 
-class Ending(NamedTuple):
+class AuditOutcome(NamedTuple):
     """An outcome, or what a protocol says that it has refused by itself."""
 
     code: str
@@ -93,7 +93,7 @@ class AuditEntry:
     identity: Identity
     target: str
     action: str
-    ending: Ending
+    ending: AuditOutcome
     old: Values = field(default_factory=dict[str, Value])
     new: Values = field(default_factory=dict[str, Value])
     count: int = 1
@@ -110,7 +110,7 @@ class _Telegrams:
 
     identity: Identity
     new: Values
-    ending: Ending
+    ending: AuditOutcome
     told_at: float
     repeated: int = 0
     waiting: AuditEntry | None = None
@@ -140,7 +140,7 @@ def _sum_of(one: AuditEntry, other: AuditEntry) -> AuditEntry:
         identity=shared_by(one.identity, other.identity),
         target=other.target if one.target == other.target else "",
         action=other.action if one.action == other.action else "",
-        ending=Ending(last.code, said, first.forwarded and last.forwarded),
+        ending=AuditOutcome(last.code, said, first.forwarded and last.forwarded),
         count=one.count + other.count,
     )
 
@@ -208,7 +208,7 @@ class AuditTrail:
         old = self._held(request)
 
         def conclude(outcome: Outcome) -> None:
-            ending = Ending(outcome.code, outcome.said, outcome.ok and outcome.forwarded)
+            ending = AuditOutcome(outcome.code, outcome.said, outcome.ok and outcome.forwarded)
             who, new = request.identity, _asked(request)
             self._note(AuditEntry(now, who, request.target, request.action, ending, old, new))
             reply(outcome)
@@ -218,14 +218,14 @@ class AuditTrail:
     def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
         """``count`` of this kind, the last of them ``now``."""
         if self._listener is not None:
-            who, ending = rejection.identity, Ending(rejection.code, rejection.said)
+            who, ending = rejection.identity, AuditOutcome(rejection.code, rejection.said)
             new = rejection.values
             self._note(AuditEntry(now, who, rejection.target, rejection.action, ending, new=new, count=count))
 
     def stop_ended(self, target: str, outcome: str, said: Text, now: float) -> None:
         """A stop that was forwarded has been followed or ignored."""
         if self._listener is not None:
-            ending = Ending(Code.OK if outcome == "followed" else outcome, said, forwarded=True)
+            ending = AuditOutcome(Code.OK if outcome == "followed" else outcome, said, forwarded=True)
             self._note_other(AuditEntry(now, _BRIDGE, target, "stop_ended", ending))
 
     def _held(self, request: Request) -> Values:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from bridge.catalogue.codes import WatchdogState
+from bridge.command.drive_link import DriveLink, NodeState
 from bridge.command.leg import event, owners
 from bridge.command.leg.effect import (
     Answer,
@@ -27,10 +28,9 @@ from bridge.command.leg.effect import (
 )
 from bridge.command.leg.outlook import next_deadline, output_then, until, watchdog_state
 from bridge.command.leg.settings import LegSettings
-from bridge.command.leg.state import WANTS_STOP_WORD, LegState, Output, Way
+from bridge.command.leg.state import WANTS_STOP_WORD, LegState, RpdoWords, Way
 from bridge.command.leg.step import initial, step
-from bridge.command.link import Link, NodeState
-from bridge.command.messages.event import Event, Kind
+from bridge.command.messages.event import Event, EventKind
 from bridge.command.messages.request import Identity, Outcome, Reply, Request
 from bridge.image import Quality
 from bridge.text import Said, Text
@@ -50,7 +50,7 @@ class Channel:
         self,
         name: str,
         leg_settings: LegSettings,
-        link: Link,
+        link: DriveLink,
         report: Callable[[Event], None],
         *,
         settled: Callable[[float], None],
@@ -77,12 +77,12 @@ class Channel:
     # what others may see
 
     @property
-    def output(self) -> Output:
+    def output(self) -> RpdoWords:
         """The words that belong on the bus now."""
         return self.leg.sent
 
     @property
-    def wired(self) -> Output | tuple[int, ...]:
+    def wired(self) -> RpdoWords | tuple[int, ...]:
         """What the bus gets by ``output``."""
         return self.leg.sent
 
@@ -92,7 +92,7 @@ class Channel:
         ends it."""
         return until(self.leg_settings, self.leg)
 
-    def output_then(self) -> Output:
+    def output_then(self) -> RpdoWords:
         """What belongs on the bus from ``until`` on."""
         return output_then(self.leg_settings, self.leg)
 
@@ -269,10 +269,10 @@ class Channel:
         self.trips += 1
         who, reaction = str(tripped.who), self._reaction()
         said = Text.of("watchdog.tripped", who=who, timeout_ms=tripped.timeout_ms, reaction=reaction)
-        self._tell(now, Kind.WATCHDOG, 900, said)
+        self._tell(now, EventKind.WATCHDOG, 900, said)
         self._tripped(tripped.due)
 
-    def _tell(self, now: float, kind: Kind, severity: int, said: Text) -> None:
+    def _tell(self, now: float, kind: EventKind, severity: int, said: Text) -> None:
         self._report(Event(now, kind, self.name, severity, said))
 
     # what is different for drives and outputs

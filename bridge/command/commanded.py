@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from bridge.command.channel import Channel
-from bridge.command.stop_check.state import LastStop, Verdict
+from bridge.command.stop_check.state import LastStop, StopVerdict
 from bridge.command.worst_case import Wire, sync_wait_ms, takeover_ms
 from bridge.config import BusTable
 from bridge.config.model import CommandedTable
@@ -85,7 +85,7 @@ class Commanded(Protocol):
         """Words for what it does now, beside a stop."""
         ...
 
-    def why_ignored(self, verdict: Verdict, took_s: float) -> Text:
+    def why_ignored(self, verdict: StopVerdict, took_s: float) -> Text:
         """Words for a stop that it has ignored, after ``took_s``."""
         ...
 
@@ -102,7 +102,7 @@ class Commanded(Protocol):
         """Begin the bound of its stop: the output of the channel has been handed to the bus."""
         ...
 
-    def on_time(self, now: float) -> Sequence[Verdict]:
+    def on_time(self, now: float) -> Sequence[StopVerdict]:
         """Let everything happen that is due by ``now``; how stops have ended."""
         ...
 

@@ -15,13 +15,13 @@ _MOST_ENTRIES: Final = 8
 """For each owner, before those that count no more are thrown away."""
 
 
-class Owner(Protocol):
+class DeadlineOwner(Protocol):
     """Owner of deadlines: the earliest of them at any time, ``now`` for one that is past."""
 
     def next_deadline(self, now: float) -> float | None: ...
 
 
-T = TypeVar("T", bound=Owner)
+T = TypeVar("T", bound=DeadlineOwner)
 
 
 class Deadlines(Generic[T]):

@@ -8,12 +8,12 @@ from typing import Final, Protocol
 
 from bridge.catalogue import DeviceSpec
 from bridge.command.drive import Identification
-from bridge.command.link import REASONS, Link, NodeState
+from bridge.command.drive_link import REASONS, DriveLink, NodeState
 from bridge.command.messages.request import Identity, Role
 from bridge.command.outputs import Outputs, Telling
 from bridge.image import Image, Quality, Value
-from bridge.mapping.device import Signal
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.device_signals import Signal
+from bridge.mapping.entry_types import ObjectRef
 from bridge.text import Said, Text
 
 
@@ -32,7 +32,7 @@ class _InputTpdo:
     """One TPDO: the points that its entries are shown by, and how good they are shown to be."""
 
     pdo: InputPdo
-    link: Link
+    link: DriveLink
     shown: list[tuple[int, Signal, int]] = field(default_factory=list[tuple[int, Signal, int]])
     """Entry, what it is, and its point."""
     quality: tuple[Quality, Said] | None = None
@@ -121,7 +121,7 @@ class Device:
         self._heard = []
         in_charge = _in_charge(pdos)
         for place, pdo in enumerate(pdos):
-            link = Link(0.0, self._hold_ms)
+            link = DriveLink(0.0, self._hold_ms)
             link.on_boot(pdo.deadline_s, ())
             link.on_node(self._node, now)
             heard = _InputTpdo(pdo, link)

@@ -12,17 +12,17 @@ from bridge.command.actual import ActualData
 from bridge.command.commanded import WordTiming
 from bridge.command.deadlines import NOW
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.link import FurtherTpdo, NodeState
+from bridge.command.drive_link import FurtherTpdo, NodeState
 from bridge.command.meaning_news import MeaningNews
 from bridge.command.messages.event import Event
 from bridge.command.messages.request import Identity
 from bridge.command.setpoint_doubts import InForce, in_force
-from bridge.command.stop_check.drive import DriveStopCheck
-from bridge.command.stop_check.state import Verdict
-from bridge.command.stop_check.words import drive_says, ignored_by_drive
+from bridge.command.stop_check.drive_check import DriveStopCheck
+from bridge.command.stop_check.ignored_texts import drive_says, ignored_by_drive
+from bridge.command.stop_check.state import StopVerdict
 from bridge.command.worst_case import StopTime, Wire, stop_time
 from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
-from bridge.drive.own_supervision import why_silence_does_not_stop
+from bridge.drive.own_judgement import why_silence_does_not_stop
 from bridge.image import Image, Quality, Value
 from bridge.mapping.model import Meaning
 from bridge.text import Said, Text
@@ -294,7 +294,7 @@ class Drive(WordTiming):
 
     # time
 
-    def on_time(self, now: float) -> Sequence[Verdict]:
+    def on_time(self, now: float) -> Sequence[StopVerdict]:
         """Let everything happen that is due by ``now``; how stops have ended. Call it when the bus has been
         drained."""
         self.channel.on_time(now)
@@ -333,7 +333,7 @@ class Drive(WordTiming):
     def says(self) -> Text:
         return drive_says(self.channel)
 
-    def why_ignored(self, verdict: Verdict, took_s: float) -> Text:
+    def why_ignored(self, verdict: StopVerdict, took_s: float) -> Text:
         return ignored_by_drive(self.channel, self.node_name, verdict, took_s)
 
     # into the image

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from bridge.command.channel import Channel
+from bridge.command.drive_link import DriveLink, NodeState
 from bridge.command.leg import event
 from bridge.command.leg.effect import Tripped
 from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import AWAITS_REPORT
-from bridge.command.leg.words import control_word
-from bridge.command.link import Link, NodeState
-from bridge.command.messages.event import Event, Kind
+from bridge.command.leg.word_table import control_word
+from bridge.command.messages.event import Event, EventKind
 from bridge.command.messages.telegram import TelegramDecoder
 from bridge.command.setpoint_doubts import SetpointDoubts
 from bridge.command.status import DriveStatus
@@ -52,7 +52,7 @@ class DriveChannel(Channel):
         decode = TelegramDecoder(
             name, family, slot, self.meanings, self.unserved, lambda: self._reported_word
         ).decode
-        link = Link(settings.telegram_downtime_s, hold_ms)
+        link = DriveLink(settings.telegram_downtime_s, hold_ms)
         of_leg = leg_settings(family, settings, decode)
         super().__init__(name, of_leg, link, report, settled=settled, tripped=tripped, due=due)
 
@@ -65,7 +65,7 @@ class DriveChannel(Channel):
 
     @property
     def control_word(self) -> int:
-        """As if it were the owner's (``bridge.command.leg.words``)."""
+        """As if it were the owner's (``bridge.command.leg.word_table``)."""
         return control_word(self.words, self.leg)
 
     @property
@@ -140,20 +140,20 @@ class DriveChannel(Channel):
             return
         if why_not and self.settings.falls_silent:
             said = Text.of("watchdog.silence_replaced", why=why_not)
-            self._tell(now, Kind.WATCHDOG, 700, said)
-        self._happen(event.OwnWatch(stops), now)
+            self._tell(now, EventKind.WATCHDOG, 700, said)
+        self._happen(event.StopsOnSilence(stops), now)
 
     def on_status_word(self, word: int, now: float) -> None:
         """A TPDO brought this status word."""
         status, leg, handshake = self._status, self.leg, self.leg_settings.handshake
         state = status.words.state(word)
-        is_taken = handshake is not None and bool(word & handshake.acknowledged)
+        is_acknowledged = handshake is not None and bool(word & handshake.acknowledged)
         is_news = state is not leg.drive or (handshake is not None and word != status.word)
         status.word = word
         is_news = is_news or not leg.way.is_heard
         if is_news or leg.stage in AWAITS_REPORT or leg.trip.ramps_until is not None:
             said = status.fault_said(self._bridge_fault, state) if state in FAULTED else ""
-            self._happen(event.Report(state, is_taken, said), now)
+            self._happen(event.StatusReport(state, is_acknowledged, said), now)
 
     def on_unchanged(self, now: float) -> None:
         """A TPDO arrived that says what the last one said."""
@@ -184,7 +184,7 @@ class DriveChannel(Channel):
         if is_its_own:
             severity = 100 if told.is_gone else 700
             said = Text.of("node.emergency", number=told.code, text=told.said)
-            self._tell(now, Kind.EMERGENCY, severity, said)
+            self._tell(now, EventKind.EMERGENCY, severity, said)
         self._settled(now)
 
     def on_drive_fault(self, current: float | None, last: float | None, now: float) -> None:
@@ -201,7 +201,7 @@ class DriveChannel(Channel):
     def _link_is_lost(self, fault: float, why: Text, now: float) -> None:
         self._status.link_fault = self._status.last_fault = fault
         said = Text.of("watchdog.link_fault", prefix=self.family.faults.prefix, fault=fault, why=why)
-        self._tell(now, Kind.WATCHDOG, 700, said)
+        self._tell(now, EventKind.WATCHDOG, 700, said)
 
     def _why_unplaced(self, now: float) -> Said:
         if not self._followed:
@@ -233,4 +233,4 @@ class DriveChannel(Channel):
 
     def _on_ignored(self, now: float) -> None:
         self._status.last_fault = self.family.faults.controller_silent
-        self._tell(now, Kind.WATCHDOG, 500, Text.of("watchdog.silence_ignored"))
+        self._tell(now, EventKind.WATCHDOG, 500, Text.of("watchdog.silence_ignored"))

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.command.commanded import Commanded
-from bridge.command.messages.event import Event, Kind
+from bridge.command.messages.event import Event, EventKind
 from bridge.command.messages.request import Action
 from bridge.command.node import Node
-from bridge.command.stop_check.state import LastStop, Verdict
+from bridge.command.stop_check.state import LastStop, StopVerdict
 from bridge.text import Text
 
 _WORST: Final = 1000
@@ -27,7 +27,7 @@ class Conclusion:
     action: Action | None = None
 
 
-def concluded(node: Node, one: Commanded, verdict: Verdict, now: float) -> Conclusion:
+def concluded(node: Node, one: Commanded, verdict: StopVerdict, now: float) -> Conclusion:
     """Consequences of how the last stop of ``one`` has ended."""
     took_s = verdict.at - verdict.since
     if verdict.outcome is not LastStop.IGNORED:
@@ -45,10 +45,10 @@ def concluded(node: Node, one: Commanded, verdict: Verdict, now: float) -> Concl
 
 
 def _event(one: Commanded, severity: int, said: Text, now: float) -> Event:
-    return Event(now, Kind.WATCHDOG, one.name, severity, said)
+    return Event(now, EventKind.WATCHDOG, one.name, severity, said)
 
 
-def _reaction(one: Commanded, verdict: Verdict) -> Action | None:
+def _reaction(one: Commanded, verdict: StopVerdict) -> Action | None:
     match one.table.reacts_to_ignored_stop:
         case "report":
             return None

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.messages.event import Event, Kind
+from bridge.command.messages.event import Event, EventKind
 from bridge.command.setpoint_doubts import InForce
 from bridge.drive import Codes, Key, is_scale, no_scale
 from bridge.mapping.model import Family, Meaning, Slot
@@ -121,7 +121,7 @@ class MeaningNews:
         self, key: Key, setting: float | None, had: float | None, affected: Sequence[Text], now: float
     ) -> None:
         said = _changed(*key, setting, had, tuple(affected))
-        self._report(Event(now, Kind.CONFIGURATION, self._drive.name, 500, said))
+        self._report(Event(now, EventKind.CONFIGURATION, self._drive.name, 500, said))
         self.drop_old_setpoints(now)
         self._drive.refresh(now)
 

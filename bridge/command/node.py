@@ -11,7 +11,7 @@ from bridge.catalogue import MemberSpec, NodeSpec
 from bridge.command.commanded import Commanded
 from bridge.command.device import Device
 from bridge.command.drive import Drive, Identification
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.messages.event import EventQueue
 from bridge.command.messages.request import Action, Identity
 from bridge.image import Image
@@ -24,7 +24,7 @@ Enforce = Callable[[str, Action, Text, float], None]
 """Does something to a node in the bridge's own name; the second text says why."""
 
 
-class HasParameters(Protocol):
+class ParameterHolder(Protocol):
     """A drive, or a node that is none."""
 
     name: str
@@ -54,7 +54,7 @@ class HasParameters(Protocol):
         ...
 
 
-class Member(HasParameters, Protocol):
+class Member(ParameterHolder, Protocol):
     """A drive or a device of a node: what of it is commanded, and its points. Times are monotonic seconds."""
 
     @property
@@ -105,7 +105,7 @@ class Node:
         """The parameters of the node, or of its first axis."""
         return self.spec.axis_names.of()
 
-    def is_of(self, who: HasParameters, ref: ObjectRef) -> bool:
+    def is_of(self, who: ParameterHolder, ref: ObjectRef) -> bool:
         """An object is that of one who has parameters, and no other drive's of the node: of a node with
         several axes those of its profile."""
         if all(one.spec.axis == 1 for one in self.members):

@@ -10,7 +10,7 @@ from bridge.command.messages.telegram import Refusal, Telegram, not_taken
 from bridge.config import NodeTable, SafeValue
 from bridge.image import Value
 from bridge.image.limits import ValueNotTaken
-from bridge.mapping.device import Output
+from bridge.mapping.device_signals import Output
 from bridge.mapping.model import Family
 from bridge.text import Text
 
@@ -20,7 +20,7 @@ ACTIVE: Final = 1
 """The control word of a telegram by which an output is anything but safe; 0 is that of one that stops."""
 
 
-class Place(NamedTuple):
+class OutputPlace(NamedTuple):
     """Where an output stands: ``span`` words from ``word`` on, the low one first."""
 
     output: Output
@@ -36,13 +36,13 @@ class OutputWords:
 
     def __init__(self, name: str, outputs: Sequence[Output], on_expiry: Mapping[str, SafeValue]) -> None:
         self._name = name
-        self.places: dict[str, Place] = {}
+        self.places: dict[str, OutputPlace] = {}
         word = 0
         for output in outputs:
             span = -(-output.size // _BITS)
             safe = on_expiry.get(output.name, output.on_expiry)
             raw = None if safe == "hold" else output.encode(safe)
-            self.places[output.name] = Place(output, word, span, raw)
+            self.places[output.name] = OutputPlace(output, word, span, raw)
             word += span
         self.count = word
         self.held: tuple[int, ...] = self.safe([0] * word)
@@ -58,17 +58,17 @@ class OutputWords:
     def all_hold(self) -> bool:
         return all(place.safe is None for place in self.places.values())
 
-    def raw(self, words: Sequence[int], place: Place) -> int:
+    def raw(self, words: Sequence[int], place: OutputPlace) -> int:
         """The output's integer without sign among these words."""
         return sum(words[place.word + n] << n * _BITS for n in range(place.span))
 
-    def value(self, words: Sequence[int], place: Place) -> Value:
+    def value(self, words: Sequence[int], place: OutputPlace) -> Value:
         raw, output = self.raw(words, place), place.output
         if output.is_signed and raw >> output.size - 1:
             raw -= 1 << output.size
         return output.decode(raw)
 
-    def put(self, words: list[int], place: Place, raw: int) -> None:
+    def put(self, words: list[int], place: OutputPlace, raw: int) -> None:
         for n in range(place.span):
             words[place.word + n] = raw >> n * _BITS & _MASK
 
@@ -128,7 +128,7 @@ class OutputWords:
             self.put(words, place, raw)
         return Telegram(0 if tuple(words) == self.safe(self.held) else ACTIVE, tuple(words))
 
-    def _with_bit(self, words: Sequence[int], place: Place, bit: str, value: Value) -> int:
+    def _with_bit(self, words: Sequence[int], place: OutputPlace, bit: str, value: Value) -> int:
         if not bit.isdecimal() or int(bit) >= place.output.size:
             said = Text.of("telegram.no_bit", leaf=f"{place.output.name}.{bit}", bits=place.output.size)
             raise Refusal(Code.OUT_OF_RANGE, said)

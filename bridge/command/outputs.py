@@ -15,20 +15,20 @@ from bridge.catalogue import DeviceSpec
 from bridge.command.channel import Channel
 from bridge.command.commanded import WordTiming
 from bridge.command.deadlines import NOW
+from bridge.command.drive_link import DriveLink, NodeState
 from bridge.command.leg.settings import LegSettings
-from bridge.command.leg.state import Output as Sent
-from bridge.command.link import Link, NodeState
-from bridge.command.messages.event import Event, Kind
+from bridge.command.leg.state import RpdoWords
+from bridge.command.messages.event import Event, EventKind
 from bridge.command.messages.request import Action, Code, Outcome, Reply, Request, refused
 from bridge.command.output_words import ACTIVE, OutputWords
-from bridge.command.stop_check.outputs import Answer, OutputStopCheck, Question, StoppedOutput
-from bridge.command.stop_check.state import Verdict
-from bridge.command.stop_check.words import ignored_by_outputs
+from bridge.command.stop_check.ignored_texts import ignored_by_outputs
+from bridge.command.stop_check.output_check import OutputReadback, OutputStopCheck, Question, StoppedOutput
+from bridge.command.stop_check.state import StopVerdict
 from bridge.command.worst_case import StopTime, Wire, output_stop_time
 from bridge.config import OutputsTable
 from bridge.drive import ControlWords, OwnJudgement
 from bridge.image import Image, Quality, Value
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.entry_types import ObjectRef
 from bridge.mapping.model import ControlWord
 from bridge.text import Said, Text
 
@@ -99,15 +99,17 @@ class OutputChannel(Channel):
             handshake=None,
             acknowledge_resumes=True,
         )
-        super().__init__(name, of_leg, Link(0.0, hold_ms), report, settled=settled, tripped=tripped, due=due)
+        super().__init__(
+            name, of_leg, DriveLink(0.0, hold_ms), report, settled=settled, tripped=tripped, due=due
+        )
         safe = words.held
-        self.leg = self.leg._replace(rest=safe, setpoints=safe, sent=Sent((0, *safe)))
+        self.leg = self.leg._replace(rest=safe, setpoints=safe, sent=RpdoWords((0, *safe)))
 
     @property
     def wired(self) -> tuple[int, ...]:
         return self.on_wire(self.output)
 
-    def on_wire(self, output: Sent) -> tuple[int, ...]:
+    def on_wire(self, output: RpdoWords) -> tuple[int, ...]:
         """What the outputs get by this output of the leg."""
         return self.output_words.on_wire(output.words)
 
@@ -115,7 +117,7 @@ class OutputChannel(Channel):
         if request.action is Action.START:
             self.on_refused(now)
             said = refused(request.action, str(request.identity), Text.of("request.not_started"))
-            self._tell(now, Kind.REFUSED, 300, said)
+            self._tell(now, EventKind.REFUSED, 300, said)
             reply(Outcome(Code.UNKNOWN_POINT, Text.of("request.outputs_not_started"), forwarded=False))
             return
         super().handle(request, now, reply)
@@ -253,7 +255,7 @@ class Outputs(WordTiming):
     def says(self) -> Text:
         return Text.of("stop.outputs_as_sent")
 
-    def why_ignored(self, verdict: Verdict, took_s: float) -> Text:
+    def why_ignored(self, verdict: StopVerdict, took_s: float) -> Text:
         return ignored_by_outputs(self.stop_check, verdict, took_s)
 
     def on_handed_over(self, now: float) -> None:
@@ -283,7 +285,7 @@ class Outputs(WordTiming):
         deadlines = [self._telling[one.object].deadline_s or 0.0 for one in stopped if one.told_by]
         return _DEADLINES * max(deadlines, default=0.0) + way_s + _TAKEN_S
 
-    def on_answer(self, question: Question, answer: Answer, now: float) -> None:
+    def on_answer(self, question: Question, answer: OutputReadback, now: float) -> None:
         """The answer to a question of ``stop_check``."""
         self.stop_check.on_answer(question, answer, now)
         self._judged(now)
@@ -301,7 +303,7 @@ class Outputs(WordTiming):
 
     # time
 
-    def on_time(self, now: float) -> Sequence[Verdict]:
+    def on_time(self, now: float) -> Sequence[StopVerdict]:
         """Let everything happen that is due by ``now``; how stops have ended."""
         self.channel.on_time(now)
         return self.stop_check.take_verdicts()

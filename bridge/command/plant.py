@@ -22,7 +22,7 @@ from bridge.command.deadlines import Deadlines
 from bridge.command.device import Device
 from bridge.command.drive import Drive
 from bridge.command.ignored_stop import concluded
-from bridge.command.messages.event import Event, EventGate, EventQueue, Kind
+from bridge.command.messages.event import Event, EventGate, EventKind, EventQueue
 from bridge.command.messages.request import (
     NODE_ACTIONS,
     PARAMETER_ACTIONS,
@@ -36,7 +36,7 @@ from bridge.command.messages.request import (
 )
 from bridge.command.node import BusSide, Enforce, Node
 from bridge.command.outputs import Outputs
-from bridge.command.stop_check.state import Verdict
+from bridge.command.stop_check.state import StopVerdict
 from bridge.config import BusTable, Site
 from bridge.image import Image, Quality, Value
 from bridge.parameter import Ledger
@@ -295,7 +295,7 @@ class Plant:
         unknown = "" if is_known else target[:_LONGEST_NAME]
         who = str(identity) if identity.user else identity.source.label
         self._refused_by_others += count
-        self.report(Event(now, Kind.REFUSED, source, 300, _refused(what, unknown, who, why)))
+        self.report(Event(now, EventKind.REFUSED, source, 300, _refused(what, unknown, who, why)))
 
     def _counting_refusals(self, request: Request, now: float, reply: Reply) -> Reply:
         """``reply`` for what no drive refuses by itself: a refusal is an event and counts as a drive's."""
@@ -319,7 +319,7 @@ class Plant:
             for verdict in one.on_time(now):
                 self._conclude(one, verdict, now, enforce)
 
-    def _conclude(self, one: Commanded, verdict: Verdict, now: float, enforce: Enforce) -> None:
+    def _conclude(self, one: Commanded, verdict: StopVerdict, now: float, enforce: Enforce) -> None:
         conclusion = concluded(self.nodes[one.node_name], one, verdict, now)
         self.audit.stop_ended(one.name, verdict.outcome.label, conclusion.logged, now)
         if conclusion.event is not None:
@@ -332,7 +332,7 @@ class Plant:
         for one in self._deadlines.sweep(now):
             if self._missed_limit.allows(now):
                 said = Text.of("watchdog.deadline_missed")
-                self.report(Event(now, Kind.WATCHDOG, one.name, _SEVERITY_MISSED, said))
+                self.report(Event(now, EventKind.WATCHDOG, one.name, _SEVERITY_MISSED, said))
         self.set("bridge/missed_deadlines", self._deadlines.missed, now)
         for member in self.members.values():
             member.look(now)

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from bridge.condition.findings import Rank, Trouble
-from bridge.condition.layout import Layout
+from bridge.condition.plant_layout import PlantLayout
+from bridge.condition.point_troubles import Rank, Trouble
 
 Key = tuple[str, str]
 """Kind and place."""
@@ -53,7 +53,7 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class TroubleLine:
     """One line of what is wrong. ``explains`` are its consequences; ``until_ms`` is when a cause was over of
     which only these are left. Times are in ms since 1970. ``rank`` is that of the worst of them all."""
 
@@ -69,24 +69,24 @@ class Shown:
         return self.trouble.kind, self.trouble.place
 
 
-Reach = Callable[[Layout, Known, Known], bool]
+Reach = Callable[[PlantLayout, Known, Known], bool]
 """Whether a cause can have a consequence where that is."""
 
 
-def _anywhere(layout: Layout, cause: Known, one: Known) -> bool:
+def _anywhere(layout: PlantLayout, cause: Known, one: Known) -> bool:
     return True
 
 
-def _below(layout: Layout, cause: Known, one: Known) -> bool:
+def _below(layout: PlantLayout, cause: Known, one: Known) -> bool:
     """At the cause's bus or node, or what is on it."""
     return cause.trouble.place in layout.above(one.trouble.place)
 
 
-def _of_owner(layout: Layout, cause: Known, one: Known) -> bool:
+def _of_owner(layout: PlantLayout, cause: Known, one: Known) -> bool:
     return one.owner == cause.owner
 
 
-def _through_front(layout: Layout, cause: Known, one: Known) -> bool:
+def _through_front(layout: PlantLayout, cause: Known, one: Known) -> bool:
     """At a drive that is commanded through a server that fails."""
     protocol = one.owner.partition(":")[0]
     return _SERVED_BY.get(protocol, protocol) in cause.trouble.fronts
@@ -97,7 +97,7 @@ _SERVED_BY: Final = {"local": "page"}
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class CauseRule:
     """``passing`` ends with the cause, within ``settle_ms``; what lasts longer is a trouble of its own.
     ``leaves`` stays until somebody acknowledges it. Either begins at most ``before_ms`` before the cause was
     noticed, and ``after_ms`` after it was over."""
@@ -122,17 +122,17 @@ _LEFT: Final = frozenset((BUS_FAULT,))
 _OF_CONTROLLER: Final = frozenset(("controller_silent", "controllers_silent"))
 
 
-def _rule_of_bus(kind: str) -> Rule:
-    return Rule(kind, _below, _OF_BUS, _LEFT, _NOTICED_MS, _BACK_MS, _BACK_MS)
+def _rule_of_bus(kind: str) -> CauseRule:
+    return CauseRule(kind, _below, _OF_BUS, _LEFT, _NOTICED_MS, _BACK_MS, _BACK_MS)
 
 
-def _rule_of_node(kind: str, passing: frozenset[str] = _UNHEARD) -> Rule:
-    return Rule(kind, _below, passing, _LEFT, _NOTICED_MS, _BACK_MS, _BACK_MS)
+def _rule_of_node(kind: str, passing: frozenset[str] = _UNHEARD) -> CauseRule:
+    return CauseRule(kind, _below, passing, _LEFT, _NOTICED_MS, _BACK_MS, _BACK_MS)
 
 
 RULES: Final = (
     # While this box stood still it neither heard nor said anything: all that was noticed then may be its own.
-    Rule(
+    CauseRule(
         "box_slow",
         _anywhere,
         _OF_BUS | {"fronts_failing"},
@@ -151,14 +151,16 @@ RULES: Final = (
     _rule_of_node("node_disabled"),
     _rule_of_node("node_booting"),
     # A front that hangs is noticed later than its clients' silence.
-    Rule("fronts_failing", _through_front, leaves=_OF_CONTROLLER, before_ms=10_000.0, after_ms=_BACK_MS),
-    Rule("controllers_silent", _of_owner, leaves=frozenset(("controller_silent",)), before_ms=_NOTICED_MS),
+    CauseRule("fronts_failing", _through_front, leaves=_OF_CONTROLLER, before_ms=10_000.0, after_ms=_BACK_MS),
+    CauseRule(
+        "controllers_silent", _of_owner, leaves=frozenset(("controller_silent",)), before_ms=_NOTICED_MS
+    ),
 )
 """Rules by which one trouble explains others; an earlier rule explains the causes of later ones, too."""
 _PLACE: Final = {rule.cause: place for place, rule in enumerate(RULES)}
 
 
-def explains(layout: Layout, cause: Known, one: Known, now_ms: float) -> bool:
+def explains(layout: PlantLayout, cause: Known, one: Known, now_ms: float) -> bool:
     """Whether ``one`` is a consequence of ``cause``."""
     place = _PLACE.get(cause.trouble.kind)
     if place is None or place >= _PLACE.get(one.trouble.kind, len(RULES)):
@@ -177,13 +179,13 @@ def explains(layout: Layout, cause: Known, one: Known, now_ms: float) -> bool:
 class Causes:
     """Remembers causes that are over for as long as something of them is left."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: PlantLayout) -> None:
         self._layout = layout
         self._causes: dict[Occurrence, Known] = {}
         """Known causes by occurrence, the furthest-reaching first: consequences of a first break are not
         those of the second."""
 
-    def fold(self, found: Iterable[Known], now_ms: float, epoch_ms: float) -> list[Shown]:
+    def fold(self, found: Iterable[Known], now_ms: float, epoch_ms: float) -> list[TroubleLine]:
         """Troubles to be shown, each cause with those that it explains: the worst first, of the same rank the
         oldest. A cause that came twice and has left something each time is there twice."""
         present = {one.occurrence: one for one in found}
@@ -226,7 +228,7 @@ class Causes:
                 del self._causes[place]
 
 
-def _shown(one: Known, explained: Iterable[Known]) -> Shown:
+def _shown(one: Known, explained: Iterable[Known]) -> TroubleLine:
     below = tuple(sorted(explained, key=lambda known: known.since_ms))
     rank = min((one.trouble.rank, *(known.trouble.rank for known in below)))
-    return Shown(one.trouble, rank, one.since_epoch_ms, one.until_epoch_ms, one.is_or_longer, below)
+    return TroubleLine(one.trouble, rank, one.since_epoch_ms, one.until_epoch_ms, one.is_or_longer, below)

@@ -6,14 +6,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bridge.catalogue import Catalogue
-from bridge.condition.findings import OwnFault
-from bridge.condition.layout import Layout
+from bridge.condition.plant_layout import PlantLayout
+from bridge.condition.point_troubles import OwnFault
 from bridge.drive import FAULTED, Explained, FaultWords, StatusWords
 from bridge.mapping import Family
 from bridge.text import Text
 
 
-def with_faults(layout: Layout, catalogue: Catalogue) -> Layout:
+def with_faults(layout: PlantLayout, catalogue: Catalogue) -> PlantLayout:
     """``layout`` with what its drives say of their faults."""
     drives = catalogue.drives.values()
     families = {node.table.mapping_key: node.family for node in catalogue.nodes.values() if node.drives}

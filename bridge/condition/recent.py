@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from bridge.condition.causes import Key, Shown
+from bridge.condition.causes import Key, TroubleLine
 
 KEPT_MS: Final = 600_000.0
 _MOST: Final = 50
@@ -16,7 +16,7 @@ _MOST: Final = 50
 class Ended:
     """A trouble that ended ``times`` times, the last time at ``until_ms``, in ms since 1970."""
 
-    shown: Shown
+    shown: TroubleLine
     until_ms: float
     times: int
     forgotten_ms: float
@@ -27,11 +27,11 @@ class Recent:
     """Troubles that have ended in the last ten minutes, each kind at each place once."""
 
     def __init__(self) -> None:
-        self._present: dict[Key, Shown] = {}
+        self._present: dict[Key, TroubleLine] = {}
         self._ended: dict[Key, Ended] = {}
 
     def see(
-        self, troubles: Iterable[Shown], explained: Collection[Key], now_ms: float, epoch_ms: float
+        self, troubles: Iterable[TroubleLine], explained: Collection[Key], now_ms: float, epoch_ms: float
     ) -> None:
         """``troubles`` is all that is shown now; what a cause ``explained`` meanwhile has not ended."""
         present = {one.key: one for one in troubles}

@@ -9,8 +9,8 @@ from typing import Any, Final
 import msgspec
 
 from bridge.catalogue.codes import CONDITIONS
-from bridge.condition.causes import Known, Shown
-from bridge.condition.findings import Rank, Trouble
+from bridge.condition.causes import Known, TroubleLine
+from bridge.condition.point_troubles import Rank, Trouble
 from bridge.condition.recent import Ended
 from bridge.text import Text, as_json, in_english
 
@@ -24,7 +24,7 @@ def condition(rank: Rank | None) -> int:
     return 0 if rank is None else len(CONDITIONS) - 1 - rank
 
 
-def troubles_json(shown: Iterable[Shown]) -> str:
+def troubles_json(shown: Iterable[TroubleLine]) -> str:
     """A list of objects: rank, kind, place, since in ms since 1970, facts; ``or_longer`` where it may have
     begun before the bridge did, ``explains`` (the same of each consequence) and ``until`` where the cause is
     over, and only these are left. Facts that are words of a text are in ``texts`` with its code and facts."""
@@ -41,7 +41,7 @@ def _json(told: list[dict[str, Any]]) -> str:
     return _encode(told).decode()
 
 
-def _shown(one: Shown) -> dict[str, Any]:
+def _shown(one: TroubleLine) -> dict[str, Any]:
     said = _said(one.trouble, one.rank, one.since_ms, is_or_longer=one.is_or_longer)
     if one.until_ms is not None:
         said["until"] = round(one.until_ms)

@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from bridge.condition.causes import Causes, Key, Known, Shown
-from bridge.condition.findings import (
+from bridge.condition.causes import Causes, Key, Known, TroubleLine
+from bridge.condition.plant_layout import PlantLayout
+from bridge.condition.point_troubles import (
     DOWN,
     ImageReader,
     Rank,
@@ -23,7 +24,6 @@ from bridge.condition.findings import (
     of_node,
     silence_of,
 )
-from bridge.condition.layout import Layout
 from bridge.condition.recent import Recent
 from bridge.image import Image, Quality
 
@@ -45,7 +45,7 @@ _AT_ONCE_MS: Final = 5000.0
 class Troubles:
     """Looks at the image as often as it is asked. ``now_ms`` is monotonic, ``epoch_ms`` the time of day."""
 
-    def __init__(self, image: Image, layout: Layout, now_ms: float) -> None:
+    def __init__(self, image: Image, layout: PlantLayout, now_ms: float) -> None:
         self._reader = ImageReader(image)
         self._layout = layout
         self._began_ms = now_ms
@@ -62,7 +62,7 @@ class Troubles:
         self._nodes_of = {
             bus: [node for node, its_bus in layout.nodes.items() if its_bus == bus] for bus in layout.buses
         }
-        self.shown: list[Shown] = []
+        self.shown: list[TroubleLine] = []
         """Present troubles, the worst first."""
         self.recent = self._recent.shown
         """Troubles that are over, the latest first."""

@@ -3,12 +3,10 @@
 Reference for users: ``docs/reference/site-file.md``.
 """
 
-from bridge.config.fields import IGNORE_ALL_S as IGNORE_ALL_S
-from bridge.config.fields import LIFE_SIGN_MS as LIFE_SIGN_MS
-from bridge.config.fields import Reaction as Reaction
-from bridge.config.fields import WordOrder as WordOrder
-from bridge.config.load import load_site as load_site
-from bridge.config.load import read_site as read_site
+from bridge.config.field_types import IGNORE_ALL_S as IGNORE_ALL_S
+from bridge.config.field_types import LIFE_SIGN_MS as LIFE_SIGN_MS
+from bridge.config.field_types import Reaction as Reaction
+from bridge.config.field_types import WordOrder as WordOrder
 from bridge.config.model import MODULES as MODULES
 from bridge.config.model import BusTable as BusTable
 from bridge.config.model import CableTable as CableTable
@@ -24,3 +22,5 @@ from bridge.config.model import Site as Site
 from bridge.config.model import UserTable as UserTable
 from bridge.config.model import ZenohTable as ZenohTable
 from bridge.config.model import mapping_key as mapping_key
+from bridge.config.site_file import load_site as load_site
+from bridge.config.site_file import read_site as read_site

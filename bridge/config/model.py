@@ -19,7 +19,7 @@ from pydantic import (
 from bridge.canopen.datatypes import TypeName, encode
 from bridge.canopen.pdo import MOST_BITS, PdoEntry
 from bridge.config.download import Download
-from bridge.config.fields import (
+from bridge.config.field_types import (
     LIFE_SIGN_MS,
     LONGEST_TIMEOUT_MS,
     Control,

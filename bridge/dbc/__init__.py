@@ -7,4 +7,4 @@ file of it and needs cantools, so it is imported by those alone who write one.
 from bridge.dbc.describe import describe as describe
 from bridge.dbc.model import BusDescription as BusDescription
 from bridge.dbc.model import Message as Message
-from bridge.dbc.model import Signal as Signal
+from bridge.dbc.model import MessageSignal as MessageSignal

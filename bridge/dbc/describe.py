@@ -9,13 +9,13 @@ from typing import Final
 from bridge.base.errors import OperationFailed
 from bridge.config import NodeTable, PdoTable
 from bridge.config.model import pdo_table
-from bridge.dbc.device import device_messages
-from bridge.dbc.fields import lay_out
+from bridge.dbc.device_messages import device_messages
 from bridge.dbc.model import BRIDGE, BusDescription, Message
-from bridge.dbc.protocol import bus_messages, node_messages
+from bridge.dbc.pdo_fields import lay_out
+from bridge.dbc.protocol_messages import bus_messages, node_messages
 from bridge.dbc.signals import PdoSignals
 from bridge.drive import default_codecs
-from bridge.lint.bus import BusView, DriveView, NodeView, PdoView
+from bridge.lint.checked_bus import CheckedBus, CheckedDrive, CheckedNode, CheckedPdo
 from bridge.mapping.model import Pdo, Slot
 from bridge.node.boot import factory_entries, layouts, match_words
 
@@ -26,7 +26,7 @@ _WARNING: Final = (
 )
 
 
-def describe(bus: BusView, *, words: bool = False) -> BusDescription:
+def describe(bus: CheckedBus, *, words: bool = False) -> BusDescription:
     """Everything on ``bus``. With ``words`` the process data are raw words, else values and bits.
 
     Raises ``OperationFailed`` where two messages have one identifier.
@@ -54,7 +54,7 @@ def describe(bus: BusView, *, words: bool = False) -> BusDescription:
     return BusDescription(bus.table.name, bus.table.bitrate, comment, nodes, tuple(_named(messages)))
 
 
-def _pdos(drive: DriveView, slot: Slot) -> Iterator[tuple[PdoView, Pdo]]:
+def _pdos(drive: CheckedDrive, slot: Slot) -> Iterator[tuple[CheckedPdo, Pdo]]:
     """The PDOs of a drive, without those that the site file switches off."""
     for views, pdos in ((drive.rpdos, slot.rpdo), (drive.tpdos, slot.tpdo)):
         by_number = {view.number: view for view in views}
@@ -65,14 +65,21 @@ def _pdos(drive: DriveView, slot: Slot) -> Iterator[tuple[PdoView, Pdo]]:
                 yield view, pdo
 
 
-def _asked(drive: DriveView, view: PdoView, first: int) -> PdoTable | None:
+def _asked(drive: CheckedDrive, view: CheckedPdo, first: int) -> PdoTable | None:
     """Table of this PDO in the site file; a table without a number is for the drive's first."""
     tables = drive.table.rpdo if view.receives else drive.table.tpdo
     return pdo_table(tables, view.number, first)
 
 
 def _message(
-    bus: BusView, node: NodeView, drive: DriveView, slot: Slot, view: PdoView, pdo: Pdo, *, words: bool
+    bus: CheckedBus,
+    node: CheckedNode,
+    drive: CheckedDrive,
+    slot: Slot,
+    view: CheckedPdo,
+    pdo: Pdo,
+    *,
+    words: bool,
 ) -> Message:
     family = node.family
     pdos = slot.rpdo if view.receives else slot.tpdo
@@ -109,7 +116,7 @@ def _message(
     )
 
 
-def _comment(node: NodeTable, drive: DriveView, view: PdoView, pdo: Pdo, asked: PdoTable | None) -> str:
+def _comment(node: NodeTable, drive: CheckedDrive, view: CheckedPdo, pdo: Pdo, asked: PdoTable | None) -> str:
     if pdo.static:
         source = "what it carries is fixed in the device, and the node does not show it"
     elif asked is not None and asked.mapping:

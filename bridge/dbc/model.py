@@ -11,7 +11,7 @@ BRIDGE: Final = "DRIVEBRIDGE"
 
 
 @dataclass(frozen=True, slots=True)
-class Signal:
+class MessageSignal:
     """``start`` and ``length`` in bits, little-endian; physical value = raw × factor + offset.
 
     ``is_float``: raw is a floating-point number of IEEE 754. ``choices`` has the texts of an enumeration.
@@ -44,7 +44,7 @@ class Message:
     length: int
     sender: str
     receivers: tuple[str, ...]
-    signals: tuple[Signal, ...]
+    signals: tuple[MessageSignal, ...]
     comment: str = ""
     cycle_ms: int = 0
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict[str, tuple[str, ...]])

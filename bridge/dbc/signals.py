@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from bridge.canopen.pdo import PdoEntry
-from bridge.dbc.fields import Field, Layout
-from bridge.dbc.kinds import kind_of
-from bridge.dbc.model import Signal
+from bridge.dbc.model import MessageSignal
+from bridge.dbc.object_format import kind_of
+from bridge.dbc.pdo_fields import Field, WordLayout
 from bridge.drive import ValueCodec
 from bridge.eds import Description
-from bridge.node.places.words import WORD_BITS
+from bridge.node.places.word_map import WORD_BITS
 
 Groups = dict[str, tuple[str, ...]]
 
@@ -26,7 +26,7 @@ class PdoSignals:
 
     def __init__(
         self,
-        layout: Layout,
+        layout: WordLayout,
         process: Sequence[str],
         bits: Sequence[str],
         codecs: Sequence[ValueCodec],
@@ -42,14 +42,14 @@ class PdoSignals:
         self._taken: set[int] = set()
         self.groups: Groups = {}
 
-    def words(self) -> list[Signal]:
+    def words(self) -> list[MessageSignal]:
         """Every word as the number that it is."""
         found = [signal for place in self._layout.words for signal in self._raw(place)]
         return [*found, *self._others()]
 
-    def values(self) -> list[Signal]:
+    def values(self) -> list[MessageSignal]:
         """Signals of the values that the words carry."""
-        found: list[Signal] = []
+        found: list[MessageSignal] = []
         for codec in self._codecs:
             if not codec.model.bits and codec.model.bit is None:
                 found += self._value(codec)
@@ -72,14 +72,14 @@ class PdoSignals:
             return None
         return Field(first.start, sum(field.length for field in fields), any(f.is_signed for f in fields))
 
-    def _value(self, codec: ValueCodec) -> Iterator[Signal]:
+    def _value(self, codec: ValueCodec) -> Iterator[MessageSignal]:
         field = self._field(codec.places)
         if field is None or not self._taken.isdisjoint(codec.places):
             return
         self._taken.update(codec.places)
         model = codec.model
         low, high = codec.range
-        yield Signal(
+        yield MessageSignal(
             model.name,
             field.start,
             field.length,
@@ -118,16 +118,16 @@ class PdoSignals:
         ]
         return "; ".join([*said, *shared])
 
-    def _bits_of(self, place: int) -> list[Signal]:
+    def _bits_of(self, place: int) -> list[MessageSignal]:
         """A word as its bits; empty where none has a name."""
         named = self._bit_names(place)
-        found: list[Signal] = []
+        found: list[MessageSignal] = []
         for part in self._layout.words[place]:
             for offset in range(part.length):
                 bit = part.shift + offset
                 if bit in named:
                     name, comment = named[bit]
-                    found.append(Signal(name, part.start + offset, 1, low=0, high=1, comment=comment))
+                    found.append(MessageSignal(name, part.start + offset, 1, low=0, high=1, comment=comment))
         if found:
             self.groups[self._process[place]] = tuple(signal.name for signal in found)
         return found
@@ -149,13 +149,13 @@ class PdoSignals:
                 names[model.bit] = (model.name, f"{model.leaf}: {model.description}".rstrip(": "))
         return names
 
-    def _raw(self, place: int) -> list[Signal]:
+    def _raw(self, place: int) -> list[MessageSignal]:
         word = self._process[place]
         group = "command" if self._process[0] == "control_word" else "status" if place == 0 else "actual"
         parts = self._layout.words[place]
         whole = len(parts) == 1 and not parts[0].shift
         return [
-            Signal(
+            MessageSignal(
                 word if whole else f"{word}_{part.shift}",
                 part.start,
                 part.length,
@@ -165,13 +165,13 @@ class PdoSignals:
             for part in parts
         ]
 
-    def _others(self) -> list[Signal]:
+    def _others(self) -> list[MessageSignal]:
         return [self._other(entry, field) for entry, field in self._layout.others]
 
-    def _other(self, entry: PdoEntry, field: Field) -> Signal:
+    def _other(self, entry: PdoEntry, field: Field) -> MessageSignal:
         kind = kind_of(self._dictionary, entry.index, entry.sub, field.length)
         title = f" {kind.title}" if kind.title else ""
-        return Signal(
+        return MessageSignal(
             f"object_{entry.index:04x}_{entry.sub:02x}",
             field.start,
             field.length,

@@ -13,7 +13,7 @@ from cantools.database.can.signal_group import SignalGroup
 from cantools.database.conversion import BaseConversion
 from cantools.database.namedsignalvalue import NamedSignalValue
 
-from bridge.dbc.model import BusDescription, Message, Signal
+from bridge.dbc.model import BusDescription, Message, MessageSignal
 
 _DIGITS: Final = 9
 _SPELT: Final = str.maketrans(
@@ -45,7 +45,7 @@ def _message(message: Message) -> DbcMessage:
     )
 
 
-def _signal(signal: Signal, receivers: tuple[str, ...]) -> DbcSignal:
+def _signal(signal: MessageSignal, receivers: tuple[str, ...]) -> DbcSignal:
     texts = ((value, _plain(text) or "-") for value, text in signal.choices.items())
     choices: OrderedDict[int, str | NamedSignalValue] = OrderedDict(texts)
     return DbcSignal(

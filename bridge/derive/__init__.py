@@ -3,6 +3,6 @@
 from bridge.derive.family import Derived as Derived
 from bridge.derive.family import derive_family as derive_family
 from bridge.derive.family import describe as describe
-from bridge.derive.site import ProposedBus as ProposedBus
-from bridge.derive.site import ProposedNode as ProposedNode
-from bridge.derive.site import propose_site as propose_site
+from bridge.derive.proposed_site import ProposedBus as ProposedBus
+from bridge.derive.proposed_site import ProposedNode as ProposedNode
+from bridge.derive.proposed_site import propose_site as propose_site

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Final
 
 from bridge.base.errors import Fault, FileFaults, OperationFailed
-from bridge.derive.axes import View, axes_of, view_of
-from bridge.derive.device import GENERIC, device_lines
-from bridge.derive.drive import Axis, drive_text, words_of
-from bridge.derive.layout import Axes, layout_of
+from bridge.derive.axis_descriptions import AxisDescription, axes_of, view_of
+from bridge.derive.device_family import GENERIC, device_lines
+from bridge.derive.drive_family import Axis, drive_text, words_of
 from bridge.derive.modes import CONTROL_WORD, PROFILE_402, STATUS_WORD, Mode, bits_of, modes_of
 from bridge.derive.pdo_words import NoLayout
+from bridge.derive.profile_layout import Axes, layout_of
 from bridge.derive.toml import file_name
 from bridge.eds import Description, read_whole_device_file
 from bridge.mapping import Family
@@ -75,7 +75,7 @@ def derive_family(description: Description, source: str, mode: str | None = None
 def _drives(description: Description, mode: Mode, axes: Sequence[int]) -> list[Axis]:
     """All axes in the same mode. Raises ``NoLayout`` with the one that cannot be driven so."""
     if axes == [1]:
-        return [Axis(View(1, description), layout_of(description, mode))]
+        return [Axis(AxisDescription(1, description), layout_of(description, mode))]
     common = Axes(description)
     taken: set[tuple[bool, int]] = set()
     found: list[Axis] = []

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.eds import Description
-from bridge.eds.model import DataType
+from bridge.eds.model import StaticDataType
 
 CONTROL_WORD: Final = 0x6040
 STATUS_WORD: Final = 0x6041
@@ -16,12 +16,12 @@ _SUPPORTED: Final = 0x6502
 PROFILE_402: Final = 402
 _FREQUENCY_CONVERTER: Final = 1
 _BITS: Final = {
-    DataType.INTEGER8: 8,
-    DataType.UNSIGNED8: 8,
-    DataType.INTEGER16: 16,
-    DataType.UNSIGNED16: 16,
-    DataType.INTEGER32: 32,
-    DataType.UNSIGNED32: 32,
+    StaticDataType.INTEGER8: 8,
+    StaticDataType.UNSIGNED8: 8,
+    StaticDataType.INTEGER16: 16,
+    StaticDataType.UNSIGNED16: 16,
+    StaticDataType.INTEGER32: 32,
+    StaticDataType.UNSIGNED32: 32,
 }
 
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from bridge.canopen.datatypes import REALS
-from bridge.derive.axes import View
+from bridge.derive.axis_descriptions import AxisDescription
 from bridge.derive.modes import MODE, PROFILE_402, Mode
 from bridge.derive.titles import title_of
 from bridge.derive.toml import string, strings, word
-from bridge.eds import DataType, Description, Entry
-from bridge.eds.pdos import MappedObject, PdoSummary
-from bridge.parameter.effect import Effect
+from bridge.eds import Description, Entry, StaticDataType
+from bridge.eds.pdos import MappedEntry, PdoSummary
 from bridge.parameter.profiles import effect_of
+from bridge.parameter.write_effect import Effect
 
 WORD_BITS: Final = 16
 _DUMMIES: Final = range(0x0001, 0x0008)
@@ -56,7 +56,7 @@ class PdoLayout:
     times: tuple[str, ...] = ()
     """Transmission settings, where they are written: keys of the mapping file with their values."""
 
-    def of_node(self, view: View) -> PdoLayout:
+    def of_node(self, view: AxisDescription) -> PdoLayout:
         """The PDO of an axis, with the objects as the node has them."""
         objects, signed = (tuple(view.reference(ref) for ref in refs) for refs in (self.objects, self.signed))
         return replace(self, objects=objects, signed=signed)
@@ -90,7 +90,7 @@ class FurtherWords:
         """Names that the mode may need in another axis."""
         self._taken.update(words)
 
-    def names(self, kind: str, one: MappedObject, rest: int, count: int, used: Collection[str]) -> list[str]:
+    def names(self, kind: str, one: MappedEntry, rest: int, count: int, used: Collection[str]) -> list[str]:
         """Names of the words that an object fills which the mode does not name; ``used`` are the axis's."""
         key = (kind, one.index, one.sub, one.bits, rest)
         there = self._names.get(key, [])
@@ -156,12 +156,12 @@ class WordNames:
             pdo.number, cob_id, tuple(words), tuple(objects), not pdo.enabled, tuple(further), signed, times
         )
 
-    def _is_signed_byte(self, pdo: PdoSummary, one: MappedObject) -> bool:
+    def _is_signed_byte(self, pdo: PdoSummary, one: MappedEntry) -> bool:
         """Whether it has to be told that a byte of a TPDO has a sign."""
         entry = None if pdo.receives else self._description.entry(one.index, one.sub)
-        return entry is not None and entry.data_type is DataType.INTEGER8
+        return entry is not None and entry.data_type is StaticDataType.INTEGER8
 
-    def _entry(self, pdo: PdoSummary, one: MappedObject) -> Entry:
+    def _entry(self, pdo: PdoSummary, one: MappedEntry) -> Entry:
         """Raises ``NoLayout``."""
         entry = self._description.entry(one.index, one.sub)
         if entry is None:
@@ -169,7 +169,7 @@ class WordNames:
             raise NoLayout(f"{pdo.name} carries {ref}, which the file does not describe")
         return entry
 
-    def _rest(self, pdo: PdoSummary, one: MappedObject) -> int:
+    def _rest(self, pdo: PdoSummary, one: MappedEntry) -> int:
         """Value that a PDO carries while nobody commands it, as an integer without sign. Raises ``NoLayout``
         where nobody says a right value for it: 0 is not right for a torque limit, and as a mode of operation
         it is none."""
@@ -180,7 +180,7 @@ class WordNames:
         if one.index == MODE:
             return self._mode.number & mask
         value = entry.current.at(None) if entry.current else None
-        if entry.data_type is DataType.REAL32 and isinstance(value, int | float):
+        if entry.data_type is StaticDataType.REAL32 and isinstance(value, int | float):
             return int.from_bytes(REALS["real32"].encode(value), "little")
         if isinstance(value, int):
             return value & mask
@@ -192,13 +192,13 @@ class WordNames:
             "mapping by hand"
         )
 
-    def _known(self, one: MappedObject) -> list[str]:
+    def _known(self, one: MappedEntry) -> list[str]:
         names = [name for name, want in self._free.items() if want == (one.index, one.bits) and not one.sub]
         for name in names:
             del self._free[name]
         return names
 
-    def _new(self, one: MappedObject, rest: int) -> list[str]:
+    def _new(self, one: MappedEntry, rest: int) -> list[str]:
         count = max(1, one.bits // WORD_BITS)
         names = self._further.names(self._others, one, rest, count, self._used)
         self._used.update(names)

@@ -3,7 +3,7 @@
 Needs that package, which is an extra: nothing else of the bridge does.
 """
 
-from bridge.dictionary.description import dictionary_of as dictionary_of
-from bridge.dictionary.family import add_family as add_family
-from bridge.dictionary.load import as_eds as as_eds
-from bridge.dictionary.load import load_dictionary as load_dictionary
+from bridge.dictionary.family_objects import add_family as add_family
+from bridge.dictionary.load_dictionary import as_eds as as_eds
+from bridge.dictionary.load_dictionary import load_dictionary as load_dictionary
+from bridge.dictionary.object_dictionary import dictionary_of as dictionary_of

@@ -20,7 +20,7 @@ _REAL: Final = REALS["real32"]
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class MaskedBits:
     """Bits of one word that a write sets: ``word & ~mask | bits``, at this place."""
 
     place: int
@@ -107,17 +107,17 @@ class ValueCodec:
         number = self._number.from_word(word)
         return float(number) if self.model.scale is not None else number
 
-    def to_words(self, value: bool | int | float) -> tuple[Written, ...]:
+    def to_words(self, value: bool | int | float) -> tuple[MaskedBits, ...]:
         """Bits that writing ``value`` sets. Raises ValueNotTaken where it is out of range. The scale must be
         known."""
         if self._bit is not None:
             if value not in (0, 1):
                 raise ValueNotTaken(Text.of("takes.bool", value=f"{value:g}"))
             mask = 1 << self._bit
-            return (Written(self.places[0], mask, mask if value else 0),)
+            return (MaskedBits(self.places[0], mask, mask if value else 0),)
         word = self.scale.to_word(value) if self.scale is not None else self._whole(value)
         return tuple(
-            Written(place, _WORD_MASK, word >> _WORD_BITS * part & _WORD_MASK)
+            MaskedBits(place, _WORD_MASK, word >> _WORD_BITS * part & _WORD_MASK)
             for part, place in enumerate(self.places)
         )
 

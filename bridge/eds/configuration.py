@@ -7,7 +7,7 @@ from typing import Final, TypeGuard
 from bridge.canopen.sdo import COMMANDS
 from bridge.config.download import Download
 from bridge.eds.model import Description, Entry, Plain, Report
-from bridge.eds.values import BadValue, encode
+from bridge.eds.value_text import BadValue, encode
 
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _MAPPINGS: Final = (range(0x1600, 0x1800), range(0x1A00, 0x1C00))

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from bridge.canopen import cobid
-from bridge.eds.model import DataType, Description, Entry, Finding, Object, Severity, Value
-from bridge.eds.values import BadValue, bits_of_type, encode
+from bridge.eds.model import Description, Entry, Finding, FindingSeverity, Object, StaticDataType, Value
+from bridge.eds.value_text import BadValue, bits_of_type, encode
 
 _MAPPINGS: Final = {True: range(0x1600, 0x1800), False: range(0x1A00, 0x1C00)}
 """Mapping parameters of RPDOs (True) and TPDOs (CiA 301 §7.5.2.36, §7.5.2.38)."""
@@ -33,7 +33,7 @@ def contradictions(description: Description) -> list[Finding]:
 
 
 def _told(line: int, text: str) -> Finding:
-    return Finding(line, Severity.WARNING, text)
+    return Finding(line, FindingSeverity.WARNING, text)
 
 
 def _place(entry: Entry) -> str:
@@ -110,7 +110,7 @@ def _mapped(description: Description, word: int, receives: bool) -> str:
         return f"{index:04X}h:{sub:02X} is not described"
     place, kind = _place(entry), entry.data_type
     length = bits_of_type(kind) if kind else None
-    if kind and length and bits != length and not (kind is DataType.BOOLEAN and bits == 1):
+    if kind and length and bits != length and not (kind is StaticDataType.BOOLEAN and bits == 1):
         return f"{place} has {length} bits ({kind.name}), not {bits}"
     if not (entry.access.writable if receives else entry.access.readable):
         return f"{place} is {entry.access.value}, and this PDO is {'received' if receives else 'sent'}"

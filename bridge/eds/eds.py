@@ -12,7 +12,7 @@ from bridge.eds.model import Commissioning, Description, DeviceInfo, Object, Rep
 from bridge.eds.modules import Modules
 from bridge.eds.objects import ObjectReader
 from bridge.eds.pdos import add_compact_pdos
-from bridge.eds.text import lines
+from bridge.eds.text_file import lines
 
 _INDEX: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})")
 _SUB: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})sub(?:0x)?([0-9a-f]{1,2})")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, TypeVar
 
-from bridge.eds.ini import Section, Text, shown
-from bridge.eds.model import Access, DataType, Report, Value
-from bridge.eds.values import BadValue, integer, value
+from bridge.eds.ini import IniValue, Section, shown
+from bridge.eds.model import Access, Report, StaticDataType, Value
+from bridge.eds.value_text import BadValue, integer, value
 
 T = TypeVar("T")
 
@@ -41,7 +41,7 @@ class Fields:
             return None
         return number
 
-    def whole(self, found: Text, name: str) -> int | None:
+    def whole(self, found: IniValue, name: str) -> int | None:
         return self._read(found, name, lambda: integer(found.text))
 
     def flag(self, section: Section, name: str) -> bool:
@@ -57,14 +57,14 @@ class Fields:
             self._report.warning(found.line, f"{name}={shown(found.text)} is taken as 1")
         return bool(number)
 
-    def value(self, section: Section, name: str, data_type: DataType | None) -> Value | None:
+    def value(self, section: Section, name: str, data_type: StaticDataType | None) -> Value | None:
         found = section.get(name)
         return None if found is None else self.value_of(found, name, data_type)
 
-    def value_of(self, found: Text, name: str, data_type: DataType | None) -> Value | None:
+    def value_of(self, found: IniValue, name: str, data_type: StaticDataType | None) -> Value | None:
         return self._read(found, name, lambda: value(found.text, data_type))
 
-    def _read(self, found: Text, name: str, read: Callable[[], tuple[T, str]]) -> T | None:
+    def _read(self, found: IniValue, name: str, read: Callable[[], tuple[T, str]]) -> T | None:
         """Result of ``read``, with a warning of its note; None where it raises BadValue."""
         try:
             one, note = read()
@@ -75,7 +75,7 @@ class Fields:
             self._report.warning(found.line, f"{name}: {note}")
         return one
 
-    def access(self, found: Text | None, default: Access, line: int, whose: str) -> Access:
+    def access(self, found: IniValue | None, default: Access, line: int, whose: str) -> Access:
         """The access; if it is missing or unknown, that is reported and ``default`` is taken."""
         if found is None:
             self._report.warning(line, f"{whose} has no AccessType: taken as {default}")

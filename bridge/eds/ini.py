@@ -23,7 +23,7 @@ SPELLING: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class IniValue:
     """A value as written in the file."""
 
     text: str
@@ -36,9 +36,9 @@ class Section:
 
     name: str
     line: int
-    keys: dict[str, Text] = field(default_factory=dict[str, Text])
+    keys: dict[str, IniValue] = field(default_factory=dict[str, IniValue])
 
-    def get(self, name: str) -> Text | None:
+    def get(self, name: str) -> IniValue | None:
         """The value of ``name``, or None if it is missing or empty."""
         found = self.keys.get(name.lower())
         return found if found and found.text else None
@@ -47,7 +47,7 @@ class Section:
         found = self.keys.get(name.lower())
         return found.text if found else ""
 
-    def numbered(self) -> Iterator[tuple[int, Text]]:
+    def numbered(self) -> Iterator[tuple[int, IniValue]]:
         """The keys that are plain numbers, with their values."""
         for key, value in self.keys.items():
             if key.isascii() and key.isdigit() and len(key) <= 4:
@@ -56,10 +56,10 @@ class Section:
 
 def read_sections(lines: Iterable[str], report: Report) -> dict[str, Section]:
     """Sections by their name in lower case without blanks."""
-    return _Reader(report).read(lines)
+    return _IniReader(report).read(lines)
 
 
-class _Reader:
+class _IniReader:
     def __init__(self, report: Report) -> None:
         self._report = report
         self._sections: dict[str, Section] = {}
@@ -124,7 +124,7 @@ class _Reader:
                 # As Windows reads such files, for which these tools were made.
                 self._report.error(number, f"{where}: {shown(first.text)} counts, not {shown(value)}")
             return
-        section.keys[name] = Text(value, number)
+        section.keys[name] = IniValue(value, number)
 
 
 def stripped(line: str) -> str:

@@ -8,7 +8,7 @@ from enum import IntEnum, StrEnum
 from typing import Final
 
 
-class DataType(IntEnum):
+class StaticDataType(IntEnum):
     """Static data types by their index (CiA 301 §7.4.7, table 44)."""
 
     BOOLEAN = 0x01
@@ -73,7 +73,7 @@ class Access(StrEnum):
         return self not in (Access.RO, Access.CONST)
 
 
-class Severity(StrEnum):
+class FindingSeverity(StrEnum):
     ERROR = "error"
     """Something could not be read and was left out."""
     WARNING = "warning"
@@ -85,7 +85,7 @@ class Finding:
     """An oddity of a file. ``line`` counts from 1; 0 means the file as a whole."""
 
     line: int
-    severity: Severity
+    severity: FindingSeverity
     text: str
 
     def __str__(self) -> str:
@@ -127,7 +127,7 @@ class Entry:
     index: int
     sub: int
     name: str
-    data_type: DataType | None
+    data_type: StaticDataType | None
     access: Access
     default: Value | None = None
     parameter_value: Value | None = None
@@ -146,7 +146,7 @@ class Entry:
 def count_entry(index: int, highest: int, line: int, access: Access = Access.RO) -> Entry:
     """Sub-index 0."""
     name = "Highest sub-index supported"
-    return Entry(index, 0, name, DataType.UNSIGNED8, access, default=Value(highest), line=line)
+    return Entry(index, 0, name, StaticDataType.UNSIGNED8, access, default=Value(highest), line=line)
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +247,7 @@ class Report:
         self.broken_off_at: int | None = None
 
     def error(self, line: int, text: str) -> None:
-        self._add(Finding(line, Severity.ERROR, text))
+        self._add(Finding(line, FindingSeverity.ERROR, text))
 
     def breaks_off(self, line: int, text: str) -> None:
         """Report that the file has been lost from behind ``line`` on."""
@@ -255,7 +255,7 @@ class Report:
         self.error(line, text)
 
     def warning(self, line: int, text: str) -> None:
-        self._add(Finding(line, Severity.WARNING, text))
+        self._add(Finding(line, FindingSeverity.WARNING, text))
 
     def _add(self, finding: Finding) -> None:
         if len(self._findings) < self.most:
@@ -267,5 +267,5 @@ class Report:
         """Findings in the order of the file."""
         found = sorted(self._findings, key=lambda finding: finding.line)
         if self._more:
-            found.append(Finding(0, Severity.WARNING, f"and {self._more} more of this kind"))
+            found.append(Finding(0, FindingSeverity.WARNING, f"and {self._more} more of this kind"))
         return tuple(found)

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.eds.fields import Fields
-from bridge.eds.ini import Section, Text, shown
-from bridge.eds.model import DataType, Module, ObjectType, Report
-from bridge.eds.values import bits_of_type
+from bridge.eds.ini import IniValue, Section, shown
+from bridge.eds.model import Module, ObjectType, Report, StaticDataType
+from bridge.eds.value_text import bits_of_type
 
 _PART: Final = re.compile(
     r"m([0-9]{1,5})(moduleinfo|fixed([0-9a-f]{4}(?:sub[0-9a-f]{1,2})?)|subext([0-9a-f]{4}))"
@@ -132,7 +132,7 @@ class Modules:
 
     def _extension(self, section: Section) -> _Extension | None:
         data_type = self._fields.number(section, "DataType")
-        known = DataType(data_type) if data_type in {int(one) for one in DataType} else None
+        known = StaticDataType(data_type) if data_type in {int(one) for one in StaticDataType} else None
         text = section.get("Count")
         match = _COUNT.fullmatch(text.text.replace(" ", "")) if text else None
         if match is None:
@@ -142,7 +142,7 @@ class Modules:
             return None
         elements, bits = int(match[1]), int(match[2] or 0)
         # An element of booleans is one bit, however long a value of it is on its way.
-        width = 1 if known is DataType.BOOLEAN else (known and bits_of_type(known)) or 8
+        width = 1 if known is StaticDataType.BOOLEAN else (known and bits_of_type(known)) or 8
         last = self._fields.number(section, "ObjExtend", 0, _HIGHEST) or 0
         return _Extension(elements, 0 if elements else bits, width, last)
 
@@ -157,10 +157,10 @@ class Modules:
         root = self._section(f"{index:04x}")
         if root is None:
             root = self._sections[f"{index:04x}"] = Section(
-                f"{index:04X}", line, {"parametername": Text(name, line)}
+                f"{index:04X}", line, {"parametername": IniValue(name, line)}
             )
             self.brought.add(index)
-        root.keys["objecttype"] = Text(str(int(ObjectType.ARRAY)), line)
+        root.keys["objecttype"] = IniValue(str(int(ObjectType.ARRAY)), line)
         # Those that are there count.
         root.keys.pop("subnumber", None)
         count = self._section(f"{index:04x}sub0")
@@ -171,11 +171,11 @@ class Modules:
             ("datatype", "0x5"),
             ("accesstype", "ro"),
         ):
-            count.keys.setdefault(key, Text(value, line))
-        count.keys["defaultvalue"] = Text(str(sub), line)
+            count.keys.setdefault(key, IniValue(value, line))
+        count.keys["defaultvalue"] = IniValue(str(sub), line)
         keys = {key: text for key, text in section.keys.items() if key not in _OF_THE_EXTENSION}
         # Modules of a kind have one name for all of their elements.
-        keys["parametername"] = Text(f"{name} {sub}".strip(), line)
+        keys["parametername"] = IniValue(f"{name} {sub}".strip(), line)
         self._sections[f"{index:04x}sub{sub:x}"] = Section(f"{index:04X}sub{sub:X}", line, keys)
 
     def _section(self, name: str) -> Section | None:

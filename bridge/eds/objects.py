@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Final
 
 from bridge.eds.fields import Fields
-from bridge.eds.ini import Section, Text
-from bridge.eds.model import Access, DataType, Entry, Object, ObjectType, Report, count_entry
+from bridge.eds.ini import IniValue, Section
+from bridge.eds.model import Access, Entry, Object, ObjectType, Report, StaticDataType, count_entry
 
 _MOST_SUBS: Final = 254
 _REFUSES_DOWNLOAD: Final = 1
@@ -90,11 +90,11 @@ class ObjectReader:
             return likely
         return kind
 
-    def _element_type(self, root: Section, subs: dict[int, Section]) -> Text | None:
+    def _element_type(self, root: Section, subs: dict[int, Section]) -> IniValue | None:
         """The type of an array's elements, for those that do not say."""
         return root.get("DataType") or (subs[1].get("DataType") if 1 in subs else None)
 
-    def _sub(self, index: int, sub: int, section: Section, fallback: Text | None) -> Entry:
+    def _sub(self, index: int, sub: int, section: Section, fallback: IniValue | None) -> Entry:
         name = self._name(section, f"{index:04X}h:{sub:02X}")
         return self._entry(section, index, sub, name, Access.RW if sub else Access.RO, fallback)
 
@@ -105,7 +105,7 @@ class ObjectReader:
         sub: int,
         name: str,
         access: Access,
-        fallback: Text | None = None,
+        fallback: IniValue | None = None,
     ) -> Entry:
         fields = self._fields
         whose = f"{index:04X}h:{sub:02X}" if sub or section.name.lower().find("sub") > 0 else f"{index:04X}h"
@@ -127,22 +127,24 @@ class ObjectReader:
             line=section.line,
         )
 
-    def _data_type(self, section: Section, whose: str, sub: int, fallback: Text | None) -> DataType | None:
+    def _data_type(
+        self, section: Section, whose: str, sub: int, fallback: IniValue | None
+    ) -> StaticDataType | None:
         found = section.get("DataType")
         if found is None:
             if section.get("ObjectType") and self._fields.number(section, "ObjectType") == ObjectType.DOMAIN:
-                return DataType.DOMAIN
+                return StaticDataType.DOMAIN
             if sub == 0 and "sub" in section.name.lower():
                 self._report.warning(section.line, f"{whose} has no DataType: taken as UNSIGNED8")
-                return DataType.UNSIGNED8
+                return StaticDataType.UNSIGNED8
             if fallback is None:
                 self._report.error(section.line, f"{whose} has no DataType: its length is not known")
                 return None
         text = found or fallback
         code = self._fields.whole(text, "DataType") if text else None
         code = self._named_type(code)
-        if code is not None and code in {int(one) for one in DataType}:
-            data_type = DataType(code)
+        if code is not None and code in {int(one) for one in StaticDataType}:
+            data_type = StaticDataType(code)
             if found is None:
                 self._report.warning(
                     section.line, f"{whose} has no DataType: taken as {data_type.name} like the others"

@@ -10,12 +10,12 @@ from bridge.eds.fields import Fields
 from bridge.eds.ini import Section
 from bridge.eds.model import (
     Access,
-    DataType,
     Description,
     Entry,
     Object,
     ObjectType,
     Report,
+    StaticDataType,
     Value,
     count_entry,
 )
@@ -28,12 +28,12 @@ _PREDEFINED: Final = {
     "tpdo": (0x180, 0x280, 0x380, 0x480),
 }
 _SUBS: Final = (
-    ("COB-ID used by PDO", DataType.UNSIGNED32),
-    ("Transmission type", DataType.UNSIGNED8),
-    ("Inhibit time", DataType.UNSIGNED16),
-    ("Reserved", DataType.UNSIGNED8),
-    ("Event timer", DataType.UNSIGNED16),
-    ("SYNC start value", DataType.UNSIGNED8),
+    ("COB-ID used by PDO", StaticDataType.UNSIGNED32),
+    ("Transmission type", StaticDataType.UNSIGNED8),
+    ("Inhibit time", StaticDataType.UNSIGNED16),
+    ("Reserved", StaticDataType.UNSIGNED8),
+    ("Event timer", StaticDataType.UNSIGNED16),
+    ("SYNC start value", StaticDataType.UNSIGNED8),
 )
 """Sub-indices 1…6 of a communication parameter; bit n of CompactPDO stands for sub-index n + 1."""
 _BASES: Final = {"rpdo": (0x1400, 0x1600), "tpdo": (0x1800, 0x1A00)}
@@ -80,12 +80,14 @@ def _mapping(kind: str, number: int, line: int) -> Object:
     entries = [count_entry(index, 0, line, Access.RW)]
     for sub in range(1, _MOST_MAPPED + 1):
         name = f"Mapped object {sub}"
-        entries.append(Entry(index, sub, name, DataType.UNSIGNED32, Access.RW, default=Value(0), line=line))
+        entries.append(
+            Entry(index, sub, name, StaticDataType.UNSIGNED32, Access.RW, default=Value(0), line=line)
+        )
     return Object(index, f"{kind.upper()} mapping parameter", ObjectType.RECORD, tuple(entries))
 
 
 @dataclass(frozen=True, slots=True)
-class MappedObject:
+class MappedEntry:
     """One entry of a PDO; ``name`` is empty where the file does not describe the object."""
 
     index: int
@@ -107,7 +109,7 @@ class PdoSummary:
     transmission_type: int | None
     inhibit_100us: int
     event_timer_ms: int
-    mapped: tuple[MappedObject, ...]
+    mapped: tuple[MappedEntry, ...]
 
     @property
     def name(self) -> str:
@@ -157,11 +159,11 @@ def _cob_id_text(value: Value | None) -> str:
     return f"{value.plain & 0x7FF:X}h" + ("+id" if value.plus_node_id else "")
 
 
-def _mapped(description: Description, index: int, node_id: int | None) -> Iterator[MappedObject]:
+def _mapped(description: Description, index: int, node_id: int | None) -> Iterator[MappedEntry]:
     count = description.number(index, 0, node_id) or 0
     for sub in range(1, min(count, _MOST_MAPPED) + 1):
         word = description.number(index, sub, node_id)
         if word:
             target, target_sub = word >> 16 & 0xFFFF, word >> 8 & 0xFF
             entry = description.entry(target, target_sub)
-            yield MappedObject(target, target_sub, word & 0xFF, entry.name if entry else "")
+            yield MappedEntry(target, target_sub, word & 0xFF, entry.name if entry else "")

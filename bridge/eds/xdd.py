@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.eds.fields import Fields
-from bridge.eds.ini import Section, Text, shown
+from bridge.eds.ini import IniValue, Section, shown
 from bridge.eds.model import Commissioning, Description, DeviceInfo, Object, Report
 from bridge.eds.objects import ObjectReader
-from bridge.eds.xdd_parameters import DEFAULT_ACCESS, Parameters
+from bridge.eds.xdd_parameters import DEFAULT_ACCESS, XddParameters
 from bridge.eds.xml import Element, parse
 
 _KEYS: Final = {
@@ -36,7 +36,7 @@ class _XddReader:
         self._root = root
         self._report = report
         self._fields = Fields(report)
-        self._parameters = Parameters(root, report)
+        self._parameters = XddParameters(root, report)
 
     def read(self) -> Description:
         objects = self._objects()
@@ -87,19 +87,19 @@ class _XddReader:
         section = Section(name, element.line)
         for attribute, value in element.attributes.items():
             if attribute in _KEYS:
-                section.keys[_KEYS[attribute]] = Text(value, element.line)
+                section.keys[_KEYS[attribute]] = IniValue(value, element.line)
         if "datatype" in section.keys:
             text = section.keys["datatype"].text
             plain = text.lower().startswith("0x") or not text
-            section.keys["datatype"] = Text(text if plain else f"0x{text}", element.line)
+            section.keys["datatype"] = IniValue(text if plain else f"0x{text}", element.line)
         mapping = element.attributes.get("pdomapping", "no").lower()
         if mapping not in ("no", ""):
-            section.keys["pdomapping"] = Text("1", element.line)
+            section.keys["pdomapping"] = IniValue("1", element.line)
         self._parameters.fill(section, element)
         has_subs = any(child.tag == "CANopenSubObject" for child in element.children)
         if section.get("AccessType") is None and not has_subs:
             self._report.warning(element.line, f"{name} has no accessType: taken as {DEFAULT_ACCESS}")
-            section.keys["accesstype"] = Text(DEFAULT_ACCESS, element.line)
+            section.keys["accesstype"] = IniValue(DEFAULT_ACCESS, element.line)
         return section
 
     def _device_info(self) -> DeviceInfo:
@@ -107,7 +107,7 @@ class _XddReader:
         if identity is None:
             self._report.warning(0, "there is no DeviceIdentity: the device is not named")
             return DeviceInfo()
-        texts = {child.tag: Text(child.text.strip(), child.line) for child in identity.children}
+        texts = {child.tag: IniValue(child.text.strip(), child.line) for child in identity.children}
         section = Section("DeviceIdentity", identity.line)
         for tag, key in (("vendorID", "vendornumber"), ("productID", "productnumber")):
             if tag in texts:
@@ -117,7 +117,7 @@ class _XddReader:
         product = texts.get("productName") or texts.get("productFamily")
         vendor, order = texts.get("vendorName"), texts.get("orderNumber")
         if revision and revision.attributes.get("value", "").lower().startswith("0x"):
-            section.keys["revisionnumber"] = Text(revision.attributes["value"], revision.line)
+            section.keys["revisionnumber"] = IniValue(revision.attributes["value"], revision.line)
         return DeviceInfo(
             vendor=vendor.text if vendor else "",
             vendor_id=self._fields.number(section, "VendorNumber"),
@@ -129,10 +129,10 @@ class _XddReader:
         )
 
     @staticmethod
-    def _number(found: Text) -> Text:
+    def _number(found: IniValue) -> IniValue:
         """vendorID and productID are hexadecimal, with or without 0x (CiA 311, DeviceIdentity)."""
         is_marked = found.text.lower().startswith("0x") or not found.text
-        return found if is_marked else Text(f"0x{found.text}", found.line)
+        return found if is_marked else IniValue(f"0x{found.text}", found.line)
 
     def _bitrates(self) -> list[int]:
         found: list[int] = []
@@ -147,7 +147,7 @@ class _XddReader:
         for name in ("nodeid", "actualbaudrate"):
             if name in element.attributes:
                 first = (element.attributes[name].split() or [""])[0]
-                section.keys[name] = Text(first, element.line)
+                section.keys[name] = IniValue(first, element.line)
         kbit_s = self._fields.number(section, "actualBaudRate", 0, 1000)
         return Commissioning(
             node_id=self._fields.number(section, "nodeID", 1, 127),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from bridge.eds.ini import Section, Text, shown
-from bridge.eds.model import DataType, ObjectType, Report
+from bridge.eds.ini import IniValue, Section, shown
+from bridge.eds.model import ObjectType, Report, StaticDataType
 from bridge.eds.xml import Element
 
 _ACCESS: Final = {
@@ -24,25 +24,25 @@ DEFAULT_ACCESS: Final = "ro"
 
 BIT_STRING: Final = "BITSTRING"
 TYPES: Final = {
-    "BOOL": DataType.BOOLEAN,
-    BIT_STRING: DataType.OCTET_STRING,
-    "CHAR": DataType.INTEGER8,
-    "SINT": DataType.INTEGER8,
-    "INT": DataType.INTEGER16,
-    "DINT": DataType.INTEGER32,
-    "LINT": DataType.INTEGER64,
-    "USINT": DataType.UNSIGNED8,
-    "BYTE": DataType.UNSIGNED8,
-    "UINT": DataType.UNSIGNED16,
-    "WORD": DataType.UNSIGNED16,
-    "UDINT": DataType.UNSIGNED32,
-    "DWORD": DataType.UNSIGNED32,
-    "ULINT": DataType.UNSIGNED64,
-    "LWORD": DataType.UNSIGNED64,
-    "REAL": DataType.REAL32,
-    "LREAL": DataType.REAL64,
-    "STRING": DataType.VISIBLE_STRING,
-    "WSTRING": DataType.UNICODE_STRING,
+    "BOOL": StaticDataType.BOOLEAN,
+    BIT_STRING: StaticDataType.OCTET_STRING,
+    "CHAR": StaticDataType.INTEGER8,
+    "SINT": StaticDataType.INTEGER8,
+    "INT": StaticDataType.INTEGER16,
+    "DINT": StaticDataType.INTEGER32,
+    "LINT": StaticDataType.INTEGER64,
+    "USINT": StaticDataType.UNSIGNED8,
+    "BYTE": StaticDataType.UNSIGNED8,
+    "UINT": StaticDataType.UNSIGNED16,
+    "WORD": StaticDataType.UNSIGNED16,
+    "UDINT": StaticDataType.UNSIGNED32,
+    "DWORD": StaticDataType.UNSIGNED32,
+    "ULINT": StaticDataType.UNSIGNED64,
+    "LWORD": StaticDataType.UNSIGNED64,
+    "REAL": StaticDataType.REAL32,
+    "LREAL": StaticDataType.REAL64,
+    "STRING": StaticDataType.VISIBLE_STRING,
+    "WSTRING": StaticDataType.UNICODE_STRING,
 }
 """Every element that names a simple type (IEC 61131-3). Types of other lengths, such as 24 bits, and domains
 have none: tools write BITSTRING for them."""
@@ -52,7 +52,7 @@ _DEEPEST: Final = 8
 """Depth of types derived from each other."""
 
 
-class Parameters:
+class XddParameters:
     """The parameters of one file, by their ``uniqueID``."""
 
     def __init__(self, root: Element, report: Report) -> None:
@@ -112,7 +112,7 @@ class Parameters:
 def _give(section: Section, key: str, text: str, line: int) -> None:
     """Set a key that is missing from the section or empty."""
     if text and not section.text(key):
-        section.keys[key] = Text(text, line)
+        section.keys[key] = IniValue(text, line)
 
 
 def _by_id(elements: Iterator[Element]) -> dict[str, Element]:

@@ -14,7 +14,7 @@ _DEEPEST: Final = 64
 _MOST_ELEMENTS: Final = 500_000
 
 
-class _Refused(Exception):
+class _XmlRefused(Exception):
     """The text is XML that we refuse to read further."""
 
 
@@ -55,7 +55,7 @@ def parse(content: bytes, report: Report) -> Element:
         parser.Parse(content, True)
     except expat.ExpatError as error:
         report.breaks_off(error.lineno, f"is not XML from here on: {expat.ErrorString(error.code)}")
-    except _Refused as error:
+    except _XmlRefused as error:
         report.breaks_off(parser.CurrentLineNumber, str(error))
     except (ValueError, LookupError) as error:  # it declares an encoding that Python does not have
         report.error(1, f"cannot be decoded: {error}")
@@ -82,12 +82,14 @@ class _Builder:
     @staticmethod
     def _refuse(*details: object) -> NoReturn:
         del details
-        raise _Refused("has a document type or an entity: a device description needs none, so it is refused")
+        raise _XmlRefused(
+            "has a document type or an entity: a device description needs none, so it is refused"
+        )
 
     def _start(self, tag: str, attributes: dict[str, str], line: int) -> None:
         self._count += 1
         if self._count > _MOST_ELEMENTS or len(self._open) > _DEEPEST:
-            raise _Refused("has too many elements, or too many within each other")
+            raise _XmlRefused("has too many elements, or too many within each other")
         named = {_local(name).lower(): value.strip() for name, value in attributes.items()}
         element = Element(_local(tag), line, named)
         self._open[-1].children.append(element)

@@ -4,7 +4,7 @@ A site file is checked by ``bridge.config`` key by key; here it is seen together
 uses which COB-ID, how full the bus gets, which times cannot work together.
 """
 
-from bridge.lint.lint import Verdict as Verdict
+from bridge.lint.lint import CheckResult as CheckResult
 from bridge.lint.lint import dictionary_files as dictionary_files
 from bridge.lint.lint import family_dictionaries as family_dictionaries
 from bridge.lint.lint import lint as lint

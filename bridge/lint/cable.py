@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.config import CableTable
-from bridge.lint.bus import BusView
+from bridge.lint.checked_bus import CheckedBus
 from bridge.lint.report import LintReport
 from bridge.text import Text
 from bridge.tomlfile import Key
@@ -100,7 +100,7 @@ MANUALS: Final[Mapping[str, Manual]] = {
 """Manuals by the vendor of a family."""
 
 
-def check_cable(bus: BusView, report: LintReport) -> None:
+def check_cable(bus: CheckedBus, report: LintReport) -> None:
     """Judge the cable by the site file; without entries there nothing is reported."""
     cable, key = bus.table.cable, (*bus.key, "cable")
     if not cable:
@@ -128,7 +128,7 @@ def check_cable(bus: BusView, report: LintReport) -> None:
             )
 
 
-def _check_length(bus: BusView, manuals: Sequence[Manual], report: LintReport) -> None:
+def _check_length(bus: CheckedBus, manuals: Sequence[Manual], report: LintReport) -> None:
     """Judge the length of the bus. A repeater delays the signal like a length of cable (EDS84DMOTCAN
     §5.2.4)."""
     cable, rate = bus.table.cable, bus.table.bitrate

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.canopen import cobid
-from bridge.lint.bus import BusView, NodeView
+from bridge.lint.checked_bus import CheckedBus, CheckedNode
 from bridge.lint.report import LintReport
 from bridge.text import Text, Words
 from bridge.tomlfile import Key
@@ -35,7 +35,7 @@ class _Use:
         return Text.of("use.of_node", what=self.what, node=self.owner)
 
 
-def check_identifiers(bus: BusView, report: LintReport) -> None:
+def check_identifiers(bus: CheckedBus, report: LintReport) -> None:
     """Report collisions: an error if two uses collide, a warning if one of them is off at present. One
     finding for each pair of nodes: where one identifier collides, many do."""
     first: dict[int, list[_Use]] = {}
@@ -64,7 +64,7 @@ def _collision(use: _Use, other: _Use, more: int) -> Text:
     return Text.of("check.same_cob_id", use=name, cob_id=cob_id, other=whose)
 
 
-def _uses(bus: BusView) -> Iterator[_Use]:
+def _uses(bus: CheckedBus) -> Iterator[_Use]:
     table = bus.table
     bridge = ""
     yield _Use(cobid.NMT, "NMT", bridge, bus.key)
@@ -83,7 +83,7 @@ def _uses(bus: BusView) -> Iterator[_Use]:
         yield from _node_uses(node)
 
 
-def _node_uses(node: NodeView) -> Iterator[_Use]:
+def _node_uses(node: CheckedNode) -> Iterator[_Use]:
     node_id, name, key = node.table.id, node.table.name, (*node.key, "id")
     if node.emcy_id is not None:
         yield _Use(node.emcy_id, "EMCY", name, key)

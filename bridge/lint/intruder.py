@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from bridge.command.worst_case import REACTION_BOUND_MS, sync_wait_ms
-from bridge.lint.bus import BusView, NodeView
-from bridge.lint.wire import busy_bits, wire_of
+from bridge.lint.checked_bus import CheckedBus, CheckedNode
+from bridge.lint.interference import busy_bits, wire_of
 from bridge.master.answers import SHARE, answer_bits
 from bridge.text import Text, render
 
@@ -41,7 +41,7 @@ class Exposure:
         return render(self.said)
 
 
-def exposure(bus: BusView) -> Exposure:
+def exposure(bus: CheckedBus) -> Exposure:
     """Exposure of a bus by the site's files: the settings in a node may differ."""
     busy = busy_bits(bus)
     longest: float | None = 0.0
@@ -60,5 +60,5 @@ def exposure(bus: BusView) -> Exposure:
     return Exposure(bus.table.name, bus.table.on_intruder, within_ms, per_s, round(100 * SHARE))
 
 
-def _identifiers(node: NodeView) -> int:
+def _identifiers(node: CheckedNode) -> int:
     return sum(pdo.receives and pdo.enabled for pdo in node.pdos)

@@ -8,29 +8,29 @@ from pathlib import Path
 
 from bridge.config import Site
 from bridge.eds import Description, read_device_file
-from bridge.lint.bus import Downloads, view_bus
+from bridge.lint.bus_interface import check_interface
+from bridge.lint.bus_load import BusLoad, check_load
 from bridge.lint.cable import check_cable
-from bridge.lint.contradictions import check_contradictions
+from bridge.lint.checked_bus import Downloads, view_bus
+from bridge.lint.coupler_modules import check_modules
 from bridge.lint.decisions import check_decisions
 from bridge.lint.identifiers import check_identifiers
-from bridge.lint.interface import check_interface
 from bridge.lint.intruder import Exposure, exposure
-from bridge.lint.load import BusLoad, check_load
-from bridge.lint.modules import check_modules
 from bridge.lint.moving import check_moving
-from bridge.lint.outputs import check_outputs, check_read_only, output_cases
+from bridge.lint.overridden_downloads import check_contradictions
 from bridge.lint.own import WorstCase, check_own_supervision, worst_cases
-from bridge.lint.pdos import check_pdos
+from bridge.lint.refused_pdos import check_pdos
 from bridge.lint.report import LintFinding, LintReport, Severity
+from bridge.lint.silent_outputs import check_outputs, check_read_only, output_cases
 from bridge.lint.times import check_times
-from bridge.lint.words import check_words
+from bridge.lint.unmapped_words import check_words
 from bridge.mapping import Family
 from bridge.mapping.loader import mapping_folders
-from bridge.mapping.site import described_file, modules_of
+from bridge.mapping.site_families import described_file, modules_of
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class CheckResult:
     """Findings in the order of the site file, the predicted load of each bus, how long each drive may take to
     stop, and what an intruder can do on each bus."""
 
@@ -74,7 +74,7 @@ def lint(
     path: Path,
     downloads: Downloads,
     dictionaries: Mapping[str, Description] | None = None,
-) -> Verdict:
+) -> CheckResult:
     """Judge a site whose file, at ``path``, has no faults of its own. ``dictionaries`` are those of
     ``family_dictionaries``, unless given."""
     known = dictionaries
@@ -102,4 +102,4 @@ def lint(
         loads.append(check_load(bus, report))
         exposures.append(exposure(bus))
     check_decisions(site, families, report)
-    return Verdict(report.findings(), tuple(loads), tuple(cases), tuple(exposures))
+    return CheckResult(report.findings(), tuple(loads), tuple(cases), tuple(exposures))

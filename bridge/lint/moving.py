@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from bridge.lint.bus import BusView
+from bridge.lint.checked_bus import CheckedBus
 from bridge.lint.report import LintReport
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.entry_types import ObjectRef
 from bridge.parameter import Names
-from bridge.parameter.effect import Effect
+from bridge.parameter.write_effect import Effect
 from bridge.text import Text
 
 
-def check_moving(bus: BusView, report: LintReport) -> None:
+def check_moving(bus: CheckedBus, report: LintReport) -> None:
     """Report downloads to objects that command a node; 0 is allowed, their value after switching on."""
     for node in bus.nodes:
         names = Names(node.family)

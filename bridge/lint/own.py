@@ -9,10 +9,10 @@ from functools import partial
 from bridge.command.worst_case import StopTime, Wire, stop_time
 from bridge.config import DriveTable
 from bridge.drive import OwnJudgement, OwnVerdict
-from bridge.drive.own_supervision import judge
-from bridge.lint.bus import BusView, DriveView, NodeView
+from bridge.drive.own_judgement import judge
+from bridge.lint.checked_bus import CheckedBus, CheckedDrive, CheckedNode
+from bridge.lint.interference import busy_bits, wire_of
 from bridge.lint.report import LintReport
-from bridge.lint.wire import busy_bits, wire_of
 from bridge.mapping.model import OwnSupervision
 from bridge.mapping.own_places import channels_needed, offline, place_of, settable, wanted
 from bridge.text import Said, Text, render
@@ -54,7 +54,7 @@ class WorstCase:
         }
 
 
-def worst_cases(bus: BusView) -> Iterator[WorstCase]:
+def worst_cases(bus: CheckedBus) -> Iterator[WorstCase]:
     """Worst cases of every drive of the bus, as far as known without asking it."""
     busy = busy_bits(bus)
     for node in bus.nodes:
@@ -77,19 +77,19 @@ def longest_ms(table: DriveTable) -> int:
 
 
 def _stop_time(
-    bus: BusView, drive: DriveView, kind: int, wire: Wire, own_ms: float, timeout_ms: int
+    bus: CheckedBus, drive: CheckedDrive, kind: int, wire: Wire, own_ms: float, timeout_ms: int
 ) -> StopTime:
     return stop_time(drive.table, bus.table, timeout_ms, kind, wire, own_ms)
 
 
-def judged(bus: BusView, node: NodeView, drive: DriveView) -> OwnJudgement:
+def judged(bus: CheckedBus, node: CheckedNode, drive: CheckedDrive) -> OwnJudgement:
     slot = node.family.slot_named(drive.table.slot)
     family, table = node.family.of_slot(slot), node.table
     raw = offline(family, node.settings.values, bus.table, table, slot)
     return judge(family, raw, bus.table, table, drive.table.accepts.runs_on or "")
 
 
-def check_own_supervision(bus: BusView, report: LintReport) -> None:
+def check_own_supervision(bus: CheckedBus, report: LintReport) -> None:
     for node in bus.nodes:
         if node.table.enabled:
             _check_times(bus, node, report)
@@ -97,7 +97,7 @@ def check_own_supervision(bus: BusView, report: LintReport) -> None:
                 _check_runs_on(bus, node, report)
 
 
-def _check_times(bus: BusView, node: NodeView, report: LintReport) -> None:
+def _check_times(bus: CheckedBus, node: CheckedNode, report: LintReport) -> None:
     """Check that configured time-outs exceed the longest silence of a healthy bridge."""
     entry = settable(node.family)
     if entry is None:
@@ -129,7 +129,7 @@ def _check_times(bus: BusView, node: NodeView, report: LintReport) -> None:
         )
 
 
-def _given(bus: BusView, node: NodeView, entry: OwnSupervision) -> tuple[Key, float]:
+def _given(bus: CheckedBus, node: CheckedNode, entry: OwnSupervision) -> tuple[Key, float]:
     """Time that the site file gives, and its key."""
     if node.table.own_timeout_ms is not None:
         return (*node.key, "own_timeout_ms"), float(node.table.own_timeout_ms)
@@ -142,7 +142,7 @@ def _given(bus: BusView, node: NodeView, entry: OwnSupervision) -> tuple[Key, fl
     return setting.key, setting.value * entry.unit_ms
 
 
-def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
+def _check_reaction(bus: CheckedBus, node: CheckedNode, report: LintReport) -> bool:
     """Report a node whose reaction to its time-out is none by factory setting. True if it was reported."""
     entry = settable(node.family)
     reaction = entry.reaction if entry else None
@@ -172,7 +172,7 @@ def _check_reaction(bus: BusView, node: NodeView, report: LintReport) -> bool:
     return False
 
 
-def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
+def _check_runs_on(bus: CheckedBus, node: CheckedNode, report: LintReport) -> None:
     """Report drives that are not known to stop when the bridge falls silent; drives of a node with the same
     reason share one warning."""
     drives: dict[tuple[OwnVerdict, Said], list[str]] = {}
@@ -190,7 +190,7 @@ def _check_runs_on(bus: BusView, node: NodeView, report: LintReport) -> None:
         report.warning(node.key, said, Text.of("check.runs_on_advice", what=_remedy(node, names)))
 
 
-def _remedy(node: NodeView, names: Sequence[str]) -> Text:
+def _remedy(node: CheckedNode, names: Sequence[str]) -> Text:
     """Remedy for these drives, which would run on."""
     family = node.family
     if settable(family) is not None:

@@ -7,7 +7,7 @@ from typing import Final
 
 from bridge.canopen.sync import LAST_SYNCHRONOUS, tpdo_deadline_s
 from bridge.config import IGNORE_ALL_S, LIFE_SIGN_MS
-from bridge.lint.bus import BusView, DriveView, NodeView
+from bridge.lint.checked_bus import CheckedBus, CheckedDrive, CheckedNode
 from bridge.lint.report import LintReport
 from bridge.node.process.held import held_s, least_deadman_ms
 from bridge.text import Text
@@ -22,7 +22,7 @@ a Modbus client reads it), a program that reads and writes every 100 ms, and the
 _LONGEST_DEADMAN_MS: Final = 10_000
 
 
-def check_times(bus: BusView, report: LintReport) -> None:
+def check_times(bus: CheckedBus, report: LintReport) -> None:
     for node in bus.nodes:
         if not node.table.enabled:
             continue
@@ -36,14 +36,14 @@ def check_times(bus: BusView, report: LintReport) -> None:
             _check_downtime(bus, node, drive, report)
 
 
-def life_ms(node: NodeView) -> int:
+def life_ms(node: CheckedNode) -> int:
     """Silence in ms after which a node is lost; 0 where nothing watches it."""
     table = node.table
     factors = {"heartbeat": 1, "guarding": table.life_time_factor, "none": 0}
     return table.supervision_ms * factors[table.supervision]
 
 
-def _check_supervision(bus: BusView, node: NodeView, report: LintReport) -> None:
+def _check_supervision(bus: CheckedBus, node: CheckedNode, report: LintReport) -> None:
     table, dictionary = node.table, node.dictionary
     objects = {"heartbeat": (0x1017,), "guarding": (0x100C, 0x100D), "none": ()}[table.supervision]
     missing = [f"{index:04X}h" for index in objects if dictionary and not dictionary.object(index)]
@@ -67,7 +67,7 @@ def _check_supervision(bus: BusView, node: NodeView, report: LintReport) -> None
         )
 
 
-def _check_sdo(node: NodeView, report: LintReport) -> None:
+def _check_sdo(node: CheckedNode, report: LintReport) -> None:
     timeout_ms, life = node.table.sdo_timeout_ms, life_ms(node)
     key = (*node.key, "sdo_timeout_ms")
     if timeout_ms < _SLOW_ANSWER_MS:
@@ -81,7 +81,7 @@ def _check_sdo(node: NodeView, report: LintReport) -> None:
         )
 
 
-def _check_controller(bus: BusView, drive: DriveView, report: LintReport) -> None:
+def _check_controller(bus: CheckedBus, drive: CheckedDrive, report: LintReport) -> None:
     timeout_ms = drive.table.fieldbus_timeout_ms
     if not timeout_ms or drive.table.control == "none":
         return
@@ -101,7 +101,7 @@ def _check_controller(bus: BusView, drive: DriveView, report: LintReport) -> Non
         )
 
 
-def _check_life_sign(drive: DriveView, report: LintReport) -> None:
+def _check_life_sign(drive: CheckedDrive, report: LintReport) -> None:
     table = drive.table
     left_ms = (table.fieldbus_timeout_ms or 0) - LIFE_SIGN_MS
     if not table.life_sign or not 0 < left_ms < _ROUND_TRIP_MS:
@@ -113,7 +113,7 @@ def _check_life_sign(drive: DriveView, report: LintReport) -> None:
     )
 
 
-def _check_range(drive: DriveView, report: LintReport) -> None:
+def _check_range(drive: CheckedDrive, report: LintReport) -> None:
     """Check the range within which the owner may set its time-out."""
     table, key = drive.table, (*drive.key, "fieldbus_timeout_range_ms")
     if table.fieldbus_timeout_range_ms is None or table.control == "none":
@@ -130,7 +130,7 @@ def _check_range(drive: DriveView, report: LintReport) -> None:
         report.warning(key, said, Text.of("check.range_without_own_advice"))
 
 
-def _check_held(bus: BusView, drive: DriveView, report: LintReport) -> None:
+def _check_held(bus: CheckedBus, drive: CheckedDrive, report: LintReport) -> None:
     """Check that a SYNC still makes the stop effective when controller and bridge fail together."""
     table, rpdo = drive.table, drive.rpdos[0]
     kind, sync_ms, timeout_ms = rpdo.transmission_type, bus.table.sync_period_ms, table.fieldbus_timeout_ms
@@ -154,7 +154,7 @@ def _check_held(bus: BusView, drive: DriveView, report: LintReport) -> None:
     )
 
 
-def _check_downtime(bus: BusView, node: NodeView, drive: DriveView, report: LintReport) -> None:
+def _check_downtime(bus: CheckedBus, node: CheckedNode, drive: CheckedDrive, report: LintReport) -> None:
     """Check that ``telegram_downtime_s`` exceeds the time after which the TPDO is late (``command.link``)."""
     downtime_s = drive.table.telegram_downtime_s
     key = (*drive.key, "telegram_downtime_s")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.entry_types import ObjectRef
 from bridge.mapping.model import Family
 from bridge.mapping.parameters import object_of
 

@@ -6,7 +6,7 @@ from typing import Annotated, Final, cast
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
-from bridge.mapping.fields import Ref, Table
+from bridge.mapping.entry_types import Ref, Table
 
 COMMUNICATION: Final = range(0x1000, 0x2000)
 """The communication profile area (CiA 301 §7.5.1)."""

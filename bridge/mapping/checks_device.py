@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.mapping.checks_process import twice
-from bridge.mapping.device import Signal
+from bridge.mapping.device_signals import Signal
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family
 

@@ -8,7 +8,7 @@ from typing import Annotated, Final
 from pydantic import AfterValidator, Field
 
 from bridge.mapping import emcy_codes
-from bridge.mapping.fields import Decimal, EmcyCode, FaultNumber, Table, Wording
+from bridge.mapping.entry_types import Decimal, EmcyCode, FaultNumber, Table, Wording
 from bridge.text import Words
 
 FORM_FIELD: Final = re.compile(r"\{(number|group|hex|bits (\d{1,2})-(\d{1,2}))(?::(\d))?\}")

@@ -13,15 +13,15 @@ from typing import Literal
 from pydantic import Field, PrivateAttr
 
 from bridge.config import DriveTable
-from bridge.config.fields import RegularExpression
+from bridge.config.field_types import RegularExpression
 from bridge.mapping.aliases import Aliases
 from bridge.mapping.axes import STANDARDISED, on_axis
-from bridge.mapping.device import Output, Signal, no_process
+from bridge.mapping.device_signals import Output, Signal, no_process
+from bridge.mapping.entry_types import Bit, Bits, Kind, Name, ObjectRef, Pattern, Ref, Table, Word
+from bridge.mapping.entry_types import MappedObject as MappedObject
+from bridge.mapping.entry_types import pattern_bits as pattern_bits
 from bridge.mapping.faults import EmcyTable, FaultEntry, FaultNumbers
 from bridge.mapping.faults import FaultParameter as FaultParameter
-from bridge.mapping.fields import Bit, Bits, Kind, Name, ObjectRef, Pattern, Ref, Table, Word
-from bridge.mapping.fields import MappedObject as MappedObject
-from bridge.mapping.fields import pattern_bits as pattern_bits
 from bridge.mapping.own_supervision import OwnObject as OwnObject
 from bridge.mapping.own_supervision import OwnReaction as OwnReaction
 from bridge.mapping.own_supervision import OwnSupervision

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from bridge.canopen.datatypes import TypeName
-from bridge.mapping.fields import Ref, Table
+from bridge.mapping.entry_types import Ref, Table
 
 Watches = Literal["process_data", "heartbeat", "guarding", "link"]
 

@@ -8,9 +8,9 @@ from typing import Annotated, Final, Literal
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
 from bridge.canopen.datatypes import Plain, TypeName, encode
-from bridge.config.fields import PlainValue
+from bridge.config.field_types import PlainValue
 from bridge.image import DataType
-from bridge.mapping.fields import ObjectRef, Ref, States, Table
+from bridge.mapping.entry_types import ObjectRef, Ref, States, Table
 
 GROUPS: Final = ("number", "letter", "element", "set")
 """What the pattern of parameter names may name."""

@@ -8,10 +8,10 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
 from bridge.canopen.datatypes import INTEGERS, TypeName, encode
 from bridge.config.download import Download
-from bridge.config.fields import PlainValue, listed
+from bridge.config.field_types import PlainValue, listed
 from bridge.image import DataType
 from bridge.mapping.axes import MOST_AXES
-from bridge.mapping.fields import Bit, Mapped, Name, ObjectRef, Ref, States, Table, Wording
+from bridge.mapping.entry_types import Bit, Mapped, Name, ObjectRef, Ref, States, Table, Wording
 from bridge.text import Text
 
 MOST_WORDS: Final = 9

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.can.wirebits import longest_bits
-from bridge.node.node import NodeCore
+from bridge.node.node_core import NodeCore
 
 SHARE: Final = 0.2
 """Of the bus: somebody who provokes answers must not fill it by them."""

@@ -6,7 +6,7 @@ from typing import Final
 
 from bridge.base.ratelimit import RateLimit
 from bridge.can.interface import BusStatus
-from bridge.command import BusSide, Event, Kind
+from bridge.command import BusSide, Event, EventKind
 from bridge.config import BusTable
 from bridge.text import Text
 
@@ -60,4 +60,4 @@ class BusPoints:
             said = Text.of("bus.error_frames", number=number, error=error)
             if number == 1:
                 said = Text.of("bus.error_frame", error=error)
-            self._events.report(Event(now, Kind.BUS, self._bus.name, 500, said))
+            self._events.report(Event(now, EventKind.BUS, self._bus.name, 500, said))

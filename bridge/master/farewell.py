@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bridge.canopen.nmt import NmtCommand
-from bridge.node.node import NodeCore
+from bridge.node.node_core import NodeCore
 
 
 class Farewell:

@@ -18,12 +18,12 @@ from bridge.canopen import cobid, nmt
 from bridge.canopen.decode_sdo import SdoListener, SdoSaid
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.command import Drive, Event, EventQueue, Kind
+from bridge.command import Drive, Event, EventKind, EventQueue
 from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.master.answers import Answers
-from bridge.node.node import NodeCore
-from bridge.node.process.command_frames import Command, commands_of
+from bridge.node.node_core import NodeCore
+from bridge.node.process.command_frames import CommandFrame, commands_of
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.wire import Handler
 from bridge.text import Said, Text, Words
@@ -65,7 +65,7 @@ class Intruders:
         self._events = events
         self._acts = acts
         self._stop = stop
-        self._commands: dict[int, tuple[NodeCore, Command]] = {}
+        self._commands: dict[int, tuple[NodeCore, CommandFrame]] = {}
         self._heartbeat_id = cobid.ERROR_CONTROL + bus.master_node_id if bus.heartbeat_ms else None
         self._sdo: dict[int, SdoListener] = {}
         self._pauses = Pauses(_AGAIN_S)
@@ -79,7 +79,7 @@ class Intruders:
         """Where the site file has TPDOs put: they come before the boot-up has ended."""
         self._given = {can_id: node for node in nodes for can_id in node.wire.stop_words.given_ids}
         """Whose identifier it is by the site's files."""
-        self._known: dict[int, tuple[Mapping[str, DrivePdos], dict[int, Command]]] = {}
+        self._known: dict[int, tuple[Mapping[str, DrivePdos], dict[int, CommandFrame]]] = {}
         """What each node is commanded by, as long as it has these PDOs."""
 
     # whose identifiers
@@ -100,7 +100,7 @@ class Intruders:
             watched.add(self._heartbeat_id)
         return frozenset(watched)
 
-    def _commands_of(self, node: NodeCore) -> dict[int, Command]:
+    def _commands_of(self, node: NodeCore) -> dict[int, CommandFrame]:
         connected = node.wire.drives
         known = self._known.get(node.table.id)
         if known is None or known[0] is not connected:
@@ -151,7 +151,7 @@ class Intruders:
             said = partial(_state_said, frame)
             self._meet(frame, self._nodes, lambda: Text.of("frame.says", frame=self.name(frame), said=said()))
 
-    def _said_command(self, frame: Frame, command: Command) -> Text:
+    def _said_command(self, frame: Frame, command: CommandFrame) -> Text:
         return Text.of("frame.says", frame=self.name(frame), said=command.said(frame.data))
 
     def _on_nmt(self, then: Handler | None, frame: Frame) -> None:
@@ -211,7 +211,7 @@ class Intruders:
             self.last = _answered(_met(said(), since), stopped, self._nodes)
             severity = _HARMLESS if affected is None else _SEVERE
             told = Text.of("intruder.seen", what=self.last)
-            self._events.report(Event(frame.time, Kind.INTRUDER, self._bus.name, severity, told))
+            self._events.report(Event(frame.time, EventKind.INTRUDER, self._bus.name, severity, told))
         due = [node for node in stopped if self._is_due(node, frame.time, brings_back=brings_back)]
         running = [node for node in due if not node.is_held]
         if running:
@@ -253,7 +253,9 @@ class Intruders:
     def _reset(self, series: _Series, now: float) -> None:
         node, series.reset_at = series.node, now
         node.hold_by_reset(now)
-        self._events.report(Event(now, Kind.INTRUDER, node.node.name, _SEVERE, Text.of("intruder.reset")))
+        self._events.report(
+            Event(now, EventKind.INTRUDER, node.node.name, _SEVERE, Text.of("intruder.reset"))
+        )
 
     def next_deadline(self) -> float | None:
         if not self._series and not self._answers.are_asked:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.base.ratelimit import RateLimit
-from bridge.command import Event, EventQueue, Kind
+from bridge.command import Event, EventKind, EventQueue
 from bridge.command.worst_case import REACTION_BOUND_MS
 from bridge.image import Image
 from bridge.text import Text
@@ -58,7 +58,7 @@ class Lateness:
             self._tell(said, _SEVERITY_TRIP, now)
 
     def _tell(self, said: Text, severity: int, now: float) -> None:
-        self._events.report(Event(now, Kind.WATCHDOG, "bridge", severity, said))
+        self._events.report(Event(now, EventKind.WATCHDOG, "bridge", severity, said))
 
     def refresh(self, now: float) -> None:
         self._image.put("bridge/hangs", self._hangs, now)

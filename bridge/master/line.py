@@ -17,8 +17,8 @@ from bridge.canopen.nmt import NmtState
 from bridge.canopen.sync import burst_length, sync_frames
 from bridge.command import Plant
 from bridge.master.network import Network
-from bridge.master.standstill import Alarm, StoodStill
-from bridge.node.node import NodeCore
+from bridge.master.standstill import StoodStill, WatchdogTimer
+from bridge.node.node_core import NodeCore
 from bridge.node.process.process_data import Repetition, RunningBurst
 
 RENEWALS: Final = 3
@@ -109,7 +109,7 @@ class BusLine:
     network: Network
     plant: Plant
     clock: Callable[[], float]
-    alarm: Alarm
+    alarm: WatchdogTimer
     repeated: Repeated = field(init=False)
     running: dict[int, RunningBurst] = field(default_factory=dict[int, RunningBurst])
     repetitions: Repetitions | None = None

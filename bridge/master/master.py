@@ -17,12 +17,12 @@ from bridge.base.errors import OperationFailed
 from bridge.base.guard import Guard
 from bridge.can import open_all
 from bridge.can.interface import Bus, ControllerState
-from bridge.command import Action, Event, Kind, Plant, Reply, Request
+from bridge.command import Action, Event, EventKind, Plant, Reply, Request
 from bridge.master.ending import Ending, end, waits_for
 from bridge.master.lateness import Lateness
 from bridge.master.line import RENEWALS, BusLine
 from bridge.master.network import Network
-from bridge.master.standstill import Alarm
+from bridge.master.standstill import WatchdogTimer
 from bridge.master.suspend import SuspendWatch
 from bridge.master.timer import LoopTimer
 from bridge.text import Text
@@ -60,10 +60,10 @@ class Master:
         plant: Plant,
         clock: Callable[[], float],
         alive: Callable[[float], None] = lambda now: None,
-        alarm: Alarm | None = None,
+        alarm: WatchdogTimer | None = None,
         suspended: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0),
     ) -> None:
-        self._alarm = alarm or Alarm()
+        self._alarm = alarm or WatchdogTimer()
         self._lines = [BusLine(bus, network, plant, clock, self._alarm) for bus, network in lines]
         self._plant = plant
         self._clock = clock
@@ -283,7 +283,7 @@ class Master:
         if slept_s:
             said = Text.of("bus.machine_suspended", slept_s=slept_s)
         for line in hung:
-            self._plant.events.report(Event(now, Kind.BUS, line.bus.name, 900, said))
+            self._plant.events.report(Event(now, EventKind.BUS, line.bus.name, 900, said))
             line.network.came_back(now)
             for node in line.network.nodes:
                 for one in node.node.commanded:
@@ -324,7 +324,7 @@ class Master:
         said = Text.of("bus.state", bus=line.bus.name, state=state)
         if status.state is not ControllerState.OK and status.last_error:
             said = Text.of("bus.state_after", bus=line.bus.name, state=state, error=status.last_error)
-        self._plant.events.report(Event(now, Kind.BUS, line.bus.name, _SEVERITIES[status.state], said))
+        self._plant.events.report(Event(now, EventKind.BUS, line.bus.name, _SEVERITIES[status.state], said))
 
     def _tell_refusal(self, line: BusLine, now: float) -> None:
         """The kernel no longer takes bursts, or takes them again."""
@@ -335,7 +335,7 @@ class Master:
         said = Text.of("bus.bursts_sent_again")
         if refusal:
             said = Text.of("bus.bursts_refused", refusal=refusal)
-        self._plant.events.report(Event(now, Kind.BUS, line.bus.name, 600 if refusal else 200, said))
+        self._plant.events.report(Event(now, EventKind.BUS, line.bus.name, 600 if refusal else 200, said))
 
     def _arm(self, now: float) -> None:
         times = [self._refresh_at]

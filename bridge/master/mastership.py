@@ -4,31 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bridge.command import Event, EventQueue, Kind
+from bridge.command import Event, EventKind, EventQueue
 from bridge.config import BusTable
-from bridge.master.listening import Listening, Part, listen_s
-from bridge.node.node import NodeCore
+from bridge.master.standby import BusRole, Standby, listen_s
+from bridge.node.node_core import NodeCore
 from bridge.text import Said, Text
 
 
 class BusMastership:
-    """Mastership of one bus, by ``listening``."""
+    """Mastership of one bus, by its ``Standby``."""
 
     def __init__(
         self,
         bus: BusTable,
         nodes: Sequence[NodeCore],
         events: EventQueue,
-        listening: Listening | None,
+        listening: Standby | None,
     ) -> None:
         self._bus = bus
         self._nodes = nodes
         self._events = events
-        self._listening = listening or Listening(listen_s(bus))
+        self._listening = listening or Standby(listen_s(bus))
 
     def acts(self) -> bool:
         """True if this bridge acts: otherwise nothing is sent."""
-        return self._listening.part is Part.ACTING
+        return self._listening.part is BusRole.ACTING
 
     @property
     def is_passive(self) -> bool:
@@ -40,7 +40,7 @@ class BusMastership:
         """Reason why nothing is sent; empty where this bridge acts."""
         if self.acts():
             return ""
-        listens = self._listening.part is Part.LISTENING
+        listens = self._listening.part is BusRole.LISTENING
         return Text.of("bus.listens" if listens else "bus.leaves", bus=self._bus.name)
 
     def heard(self, sign: Text, now: float) -> Text | None:
@@ -88,4 +88,4 @@ class BusMastership:
                 node.say(Text.of("node.passive", bus=self._bus.name), now)
 
     def _tell(self, said: Text, now: float) -> None:
-        self._events.report(Event(now, Kind.BUS, self._bus.name, 800, said))
+        self._events.report(Event(now, EventKind.BUS, self._bus.name, 800, said))

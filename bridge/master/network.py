@@ -16,22 +16,22 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sync import SyncWindow
 from bridge.canopen.time_stamp import TimeProducer
-from bridge.command import Action, BusSide, Code, Commanded, Event, Kind, Outcome, Reply, Request
+from bridge.command import Action, BusSide, Code, Commanded, Event, EventKind, Outcome, Reply, Request
 from bridge.command.messages.request import NODE_ACTIONS
 from bridge.config import BusTable
 from bridge.config.download import Download
 from bridge.master.bus_points import BusPoints
 from bridge.master.farewell import Farewell
 from bridge.master.intruders import Intruders
-from bridge.master.listening import Listening
 from bridge.master.mastership import BusMastership
 from bridge.master.reach import Reach
 from bridge.master.schedule import Schedule
+from bridge.master.standby import Standby
 from bridge.master.startup import StartGate
 from bridge.master.watch import BusWatch
 from bridge.node import nmt_commands as node_commands
 from bridge.node.neighbours import Neighbour
-from bridge.node.node import BUS_IS_DOWN, NodeCore
+from bridge.node.node_core import BUS_IS_DOWN, NodeCore
 from bridge.node.wire import Handler
 from bridge.text import Text
 
@@ -50,7 +50,7 @@ class Network:
         side: BusSide,
         epoch_ns: Callable[[float], int] | None = None,
         downloads: Mapping[str, Sequence[Download]] = NOTHING,
-        listening: Listening | None = None,
+        listening: Standby | None = None,
     ) -> None:
         """``downloads`` has the configuration of nodes that a file gives, by the node's name. ``listening``
         is as the bus has it, unless given."""
@@ -256,7 +256,7 @@ class Network:
         """A node is lost without which the others must not go on."""
         self._gate.stopped_by(node)
         said = Text.of("bus.all_stopped", why=why)
-        self._events.report(Event(now, Kind.BUS, self.bus.name, 800, said))
+        self._events.report(Event(now, EventKind.BUS, self.bus.name, 800, said))
         each = self._takes_over(self.nodes)
         for other in self.nodes:
             # The lost one included, if it still hears us.

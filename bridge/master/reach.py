@@ -8,7 +8,7 @@ from bridge.canopen import nmt
 from bridge.command import Commanded
 from bridge.master.farewell import Farewell
 from bridge.master.mastership import BusMastership
-from bridge.node.node import BUS_IS_DOWN, NodeCore
+from bridge.node.node_core import BUS_IS_DOWN, NodeCore
 from bridge.text import Said, Text
 
 

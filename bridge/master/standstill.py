@@ -14,7 +14,7 @@ class StoodStill(Exception):
     """The process was stopped for longer than what it was about to do may wait."""
 
 
-class Alarm:
+class WatchdogTimer:
     """``rang``: the time it was last set to has passed. While it ``breaks_in``, it raises ``StoodStill``
     wherever the process is as it rings. This one never rings: it is for a master that shares its process."""
 
@@ -25,7 +25,7 @@ class Alarm:
         """Ring then, unless set again before. 0: not at all."""
 
 
-class SignalAlarm(Alarm):
+class SignalAlarm(WatchdogTimer):
     """Takes SIGALRM and the real-time interval timer of the process. Made in its main thread."""
 
     def __init__(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bridge.config.fields import MandatoryMissing
+from bridge.config.field_types import MandatoryMissing
 from bridge.node.neighbours import Neighbour
 
 

@@ -10,7 +10,7 @@ from bridge.base.ratelimit import Pauses
 from bridge.canopen import cobid
 from bridge.canopen.duplicate import DuplicateSign, StateChanges, TooManyHeartbeats
 from bridge.canopen.frame import Frame
-from bridge.command import BusSide, Event, Kind
+from bridge.command import BusSide, Event, EventKind
 from bridge.text import Text
 
 _NODES: Final = range(1, 128)
@@ -91,7 +91,7 @@ class BusWatch:
 
     def _tell(self, key: str, said: Text, now: float, severity: int) -> None:
         if self._pauses.take(now, key) is not None:
-            self._events.report(Event(now, Kind.BUS, self._bus, severity, said))
+            self._events.report(Event(now, EventKind.BUS, self._bus, severity, said))
 
     def refresh(self, now: float) -> None:
         """Bring the points of the bus up to date."""

@@ -21,7 +21,7 @@ from bridge.mirror.endpoint import LEASE_MS
 from bridge.mirror.protocol import Answered, Changed, Connected, Counted, Delta, Malformed, Snapshot
 from bridge.mirror.rejections import Rejections
 from bridge.text import Text
-from bridge.zenohlink import Answer, Message, ZenohLink, zenoh_config
+from bridge.zenohlink import GetReply, Sample, ZenohLink, zenoh_config
 
 _log = logging.getLogger(__name__)
 
@@ -78,7 +78,7 @@ class MirrorClient:
         self._points_changed = False
         self._listeners: list[Callable[[Event], None]] = []
         self._asking = set[asyncio.Task[Outcome]]()
-        self._telling = set[asyncio.Task[list[Answer]]]()
+        self._telling = set[asyncio.Task[list[GetReply]]]()
         self._rejections = Rejections()
         self._counts = Counter[str]()
         self._guard = Guard("mirror")
@@ -192,10 +192,10 @@ class MirrorClient:
     def _tell_rejections(self) -> None:
         for rejected in self._rejections.take():
             with self._guard:
-                self._link.send(Message(protocol.REJECTED, protocol.encode(rejected)))
+                self._link.send(Sample(protocol.REJECTED, protocol.encode(rejected)))
         counts, self._counts = self._counts, Counter[str]()
         for leaf, by in counts.items():
-            self._link.send(Message(protocol.COUNTED, protocol.encode(Counted(leaf, by))))
+            self._link.send(Sample(protocol.COUNTED, protocol.encode(Counted(leaf, by))))
 
     # life
 
@@ -300,13 +300,13 @@ class MirrorClient:
                 self._follow(delta)
         self._tell_waiting()
 
-    def _on_told(self, message: Message) -> None:
+    def _on_told(self, message: Sample) -> None:
         if message.key == protocol.PROMPT:
             self._on_prompt(message)
         else:
             self._on_delta(message)
 
-    def _on_delta(self, message: Message) -> None:
+    def _on_delta(self, message: Sample) -> None:
         count = 0 if self._image is None else len(self._image.points)
         if not count:
             return
@@ -319,7 +319,7 @@ class MirrorClient:
         elif len(self._pending) < _MOST_PENDING:
             self._pending.append(delta)
 
-    def _on_prompt(self, message: Message) -> None:
+    def _on_prompt(self, message: Sample) -> None:
         if not self._in_step:
             return
         prompt = self._read(partial(protocol.decode_prompt, count=len(self.image.points)), message)
@@ -364,7 +364,7 @@ class MirrorClient:
         if not is_alive and self._image is not None:
             self._mark_dead()
 
-    def _on_event(self, message: Message) -> None:
+    def _on_event(self, message: Sample) -> None:
         event = self._read(partial(protocol.decode, Event), message)
         if event is None:
             return
@@ -372,7 +372,7 @@ class MirrorClient:
             with self._guard:
                 listener(event)
 
-    def _read(self, decode: Callable[[bytes], _Told], message: Message) -> _Told | None:
+    def _read(self, decode: Callable[[bytes], _Told], message: Sample) -> _Told | None:
         try:
             return decode(message.payload)
         except Malformed as error:

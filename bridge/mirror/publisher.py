@@ -19,7 +19,7 @@ from bridge.mirror import protocol
 from bridge.mirror.endpoint import LEASE_MS, close_to_others, prepare_folder
 from bridge.mirror.protocol import Answered, Changed, Connected, Delta, Malformed, Prompt, Rejected, Snapshot
 from bridge.text import Text
-from bridge.zenohlink import IncomingQuery, Message, Pace, ZenohLink, zenoh_config
+from bridge.zenohlink import IncomingQuery, Pace, Sample, ZenohLink, zenoh_config
 
 _POINTS_PER_DELTA: Final = 500
 _HEARTBEAT_S: Final = 0.25
@@ -189,7 +189,7 @@ class MirrorPublisher:
         self._send(protocol.EVENT, replace(event, time=self._view.epoch_ns(event.time) / 1e9))
 
     def _send(self, key: str, message: Delta | Prompt | Event) -> None:
-        self._link.send(Message(key, protocol.encode(message)))
+        self._link.send(Sample(key, protocol.encode(message)))
 
     # in
 
@@ -212,15 +212,15 @@ class MirrorPublisher:
             if index % _POINTS_PER_DELTA == 0:
                 await asyncio.sleep(0)
         snapshot = Snapshot(self._instance, sequence, points, tuple(readings))
-        asked.send([Message(protocol.SNAPSHOT, protocol.encode(snapshot))])
+        asked.send([Sample(protocol.SNAPSHOT, protocol.encode(snapshot))])
         asked.finish()
 
-    def _on_rejected(self, message: Message) -> None:
+    def _on_rejected(self, message: Sample) -> None:
         told = self._read(partial(protocol.decode, Rejected), message)
         if told:
             self._view.rejected(told.rejection, told.time_s, told.count)
 
-    def _on_counted(self, message: Message) -> None:
+    def _on_counted(self, message: Sample) -> None:
         told = self._read(protocol.decode_counted, message)
         if told:
             self._view.count(told.leaf, told.by)
@@ -237,7 +237,7 @@ class MirrorPublisher:
         self._view.on_connection(told.identity, is_there=told.is_there, has_others=told.has_others)
         asked.finish()
 
-    def _read(self, decode: Callable[[bytes], _Told], message: Message) -> _Told | None:
+    def _read(self, decode: Callable[[bytes], _Told], message: Sample) -> _Told | None:
         try:
             return decode(message.payload)
         except Malformed:
@@ -270,7 +270,7 @@ class MirrorPublisher:
 
     def _answer(self, asked: IncomingQuery, outcome: Outcome) -> None:
         answered = Answered(outcome, self._instance, self._sequence)
-        asked.send([Message(asked.key, protocol.encode(answered))])
+        asked.send([Sample(asked.key, protocol.encode(answered))])
         asked.finish()
 
 

@@ -49,7 +49,7 @@ class Booting:
         self._awaited: _Awaited | None = None
         self._goes_on_at: float | None = None
         self._answers: list[Result] = []
-        self._step = boot.Step(Text.of("boot_step.look"), "B")
+        self._step = boot.BootStep(Text.of("boot_step.look"), "B")
         self.is_held = False
 
     @property
@@ -111,7 +111,7 @@ class Booting:
     def _waits(self, action: boot.Action, now: float) -> bool:
         """Do one step; True where its answer comes later."""
         match action:
-            case boot.Read() | boot.Write():
+            case boot.SdoRead() | boot.SdoWrite():
                 ask(action, self._sdo[action.channel], now, self._answers.append, Priority.BOOT)
                 return True
             case boot.Await(state, timeout_s):
@@ -122,10 +122,10 @@ class Booting:
             case boot.Pause(seconds):
                 self._goes_on_at = now + seconds
                 return True
-            case boot.Signal.AWAIT_RELEASE:
+            case boot.BootSignal.AWAIT_RELEASE:
                 self.is_held = not self._node.may_start()
                 return self.is_held
-            case boot.Step():
+            case boot.BootStep():
                 self._step = action
                 self._node.carry_out(action, now)
                 return False
@@ -140,7 +140,7 @@ class Booting:
         self._node.boot_ended(result, now)
 
 
-def _failure(error: SdoError, step: boot.Step) -> boot.BootError:
+def _failure(error: SdoError, step: boot.BootStep) -> boot.BootError:
     """What the boot-up ends with. Silence says nothing about what was asked for."""
     if error.was_answered or step.letter == "B":
         return boot.BootError(step.letter, _needed(text_of(error), step), absent=not error.was_answered)
@@ -148,5 +148,5 @@ def _failure(error: SdoError, step: boot.Step) -> boot.BootError:
     return boot.BootError(step.letter, _needed(what, step), absent=True)
 
 
-def _needed(what: Text, step: boot.Step) -> Text:
+def _needed(what: Text, step: boot.BootStep) -> Text:
     return Text.of("boot.needed", what=what, rule=step.needed_by) if step.needed_by else what

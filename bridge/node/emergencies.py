@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.canopen import emcy
 from bridge.canopen.frame import Frame
-from bridge.command import BusSide, Drive, Event, Kind
+from bridge.command import BusSide, Drive, Event, EventKind
 from bridge.command.node import Node
 from bridge.drive import EmergencyMeaning, EmergencyReader
 from bridge.node.emergency_log import EmergencyLog
@@ -71,7 +71,7 @@ class Emergencies:
     def _report(self, source: str, told: EmergencyMeaning, at: float) -> None:
         severity = _GONE if told.is_gone else _COMES
         said = Text.of("node.emergency", number=told.code, text=told.said)
-        self._events.report(Event(at, Kind.EMERGENCY, source, severity, said))
+        self._events.report(Event(at, EventKind.EMERGENCY, source, severity, said))
 
     def refresh(self, now: float) -> None:
         top = f"{self._node.name}/node"

@@ -14,7 +14,7 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.heartbeat import HeartbeatConsumer, NodeGuard
 from bridge.canopen.nmt import NmtState
 from bridge.config import NodeTable
-from bridge.node.boot.status import HINTS
+from bridge.node.boot.error_status import HINTS
 from bridge.node.bootloop import BootLoop
 from bridge.text import Text
 

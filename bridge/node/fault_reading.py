@@ -25,7 +25,7 @@ _AGAIN_S: Final = 1.0
 
 
 @dataclass(slots=True)
-class _Watched:
+class _FaultWatch:
     drive: Drive
     sdo: SdoChannel
     due: float = math.inf
@@ -44,7 +44,7 @@ class FaultReading:
         # Some families have a number for "no fault" that is not 0.
         self._none = family.emcy.event.gone if family.emcy.event else None
         self._current, self._last = parameter(faults.current), parameter(faults.last)
-        self._drives: dict[str, _Watched] = {}
+        self._drives: dict[str, _FaultWatch] = {}
         self._look_at: float | None = None
         self._now = 0.0
         if self._current is None and self._last is None:
@@ -52,7 +52,7 @@ class FaultReading:
         for drive in node.drives:
             number = drive.spec.sdo_channel
             if number is not None:
-                self._drives[drive.name] = _Watched(drive, sdo[number])
+                self._drives[drive.name] = _FaultWatch(drive, sdo[number])
 
     def start(self, now: float) -> None:
         """The node is in operation: each drive is asked once, for what it remembers."""
@@ -89,7 +89,7 @@ class FaultReading:
                 asked.due = now + _AGAIN_S if is_faulted else math.inf
                 self._ask(asked, now)
 
-    def _ask(self, asked: _Watched, now: float) -> None:
+    def _ask(self, asked: _FaultWatch, now: float) -> None:
         channel = asked.drive.channel
 
         def tell_current(value: float) -> None:

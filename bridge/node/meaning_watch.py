@@ -50,7 +50,7 @@ class _Item:
 
 
 @dataclass(slots=True)
-class _Watched:
+class _WatchedDrive:
     """One drive. ``items`` are those that count with the codes its words have."""
 
     drive: Drive
@@ -79,7 +79,7 @@ class MeaningWatch:
     """
 
     def __init__(self, node: Node, sdo: SdoChannels) -> None:
-        self._drives: list[_Watched] = []
+        self._drives: list[_WatchedDrive] = []
         self._look_at: float | None = None
         self.now = 0.0
         for drive in node.drives:
@@ -88,7 +88,7 @@ class MeaningWatch:
                 value.scaled_by or value.when or value.steady for value in drive.family.values_of(drive.slot)
             )
             if number is not None and asked:
-                self._drives.append(_Watched(drive, sdo[number]))
+                self._drives.append(_WatchedDrive(drive, sdo[number]))
 
     def start(self, now: float) -> None:
         """The node is in operation, and its drives have just been asked."""
@@ -128,7 +128,7 @@ class MeaningWatch:
             self._judge(watched)
             self._ask(watched)
 
-    def _choose(self, watched: _Watched, read_at: float) -> None:
+    def _choose(self, watched: _WatchedDrive, read_at: float) -> None:
         """What is asked depends on the codes. What is new among it has been read at ``read_at``."""
         drive = watched.drive
         codes = drive.channel.meanings.codes
@@ -147,12 +147,12 @@ class MeaningWatch:
             items.append(_Item(one, in_set, ref, key, read_at))
         watched.items = {one.key: before.get(one.key, one) for one in items}
 
-    def _judge(self, watched: _Watched) -> None:
+    def _judge(self, watched: _WatchedDrive) -> None:
         """What has not been answered for too long is in doubt."""
         late = (key for key, one in watched.items.items() if self.now - one.read_at > _BOUND_S)
         watched.drive.news.on_overdue(frozenset(late), self.now)
 
-    def _ask(self, watched: _Watched) -> None:
+    def _ask(self, watched: _WatchedDrive) -> None:
         """The next question. Its answer leads to the one after it, so that others get their turn between."""
         if watched.is_asking or self._look_at is None:
             return
@@ -172,11 +172,11 @@ class MeaningWatch:
         if due:
             self._read(watched, min(due, key=lambda one: max(one.read_at, one.tried_at)))
 
-    def _is_due(self, watched: _Watched, item: _Item, every_s: float) -> bool:
+    def _is_due(self, watched: _WatchedDrive, item: _Item, every_s: float) -> bool:
         is_old = item.read_at < watched.not_before or self.now >= item.read_at + every_s
         return is_old and self.now >= item.tried_at + _PAUSE_S
 
-    def _read(self, watched: _Watched, item: _Item) -> None:
+    def _read(self, watched: _WatchedDrive, item: _Item) -> None:
         run, asked_at = watched.run, self.now
 
         def done(result: Result) -> None:

@@ -6,8 +6,19 @@ from collections.abc import Sequence
 from typing import Final, Protocol
 
 from bridge.canopen.nmt import NmtCommand
-from bridge.command import Action, Code, Commanded, Event, EventQueue, Kind, Outcome, Reply, Request, Role
-from bridge.command.link import NodeState
+from bridge.command import (
+    Action,
+    Code,
+    Commanded,
+    Event,
+    EventKind,
+    EventQueue,
+    Outcome,
+    Reply,
+    Request,
+    Role,
+)
+from bridge.command.drive_link import NodeState
 from bridge.command.node import Node
 from bridge.node.leaving import Leaving
 from bridge.node.put_off import CANCELS_WORDS
@@ -82,7 +93,7 @@ def answer(
         return False
     who = str(request.identity)
     told = Text.of("request.by", action=Text.word("action", request.action), who=who)
-    events.report(Event(now, Kind.OWNER, name, 400, told))
+    events.report(Event(now, EventKind.OWNER, name, 400, told))
     each = not is_bus or request.action is Action.START_NODE
     each |= NMT.get(request.action) in CANCELS_WORDS and any(one.leaving.takeover_s for one in nodes)
     for one in nodes:

@@ -1,6 +1,6 @@
 """Reads the outputs of a node that is no drive: whether they have what the last stop gives them.
 
-``command/stop_check/outputs.py`` says when, and what it means. One is asked for after the other,
+``command/stop_check/output_check.py`` says when, and what it means. One is asked for after the other,
 so that other transfers get their turn.
 """
 
@@ -13,7 +13,7 @@ from bridge.base.sdo_texts import text_of_abort
 from bridge.canopen import width
 from bridge.canopen.sdo import Result, SdoError
 from bridge.command.outputs import Outputs
-from bridge.command.stop_check.outputs import Answer, Question, StoppedOutput
+from bridge.command.stop_check.output_check import OutputReadback, Question, StoppedOutput
 from bridge.node.places.sdo_channels import FIRST, SdoChannels
 from bridge.text import Text
 
@@ -43,16 +43,18 @@ class ReadBack:
         self._outputs.on_answer(question, _answer(question.output, result), self.now)
 
 
-def _answer(output: StoppedOutput, result: Result) -> Answer:
+def _answer(output: StoppedOutput, result: Result) -> OutputReadback:
     if isinstance(result, SdoError):
         if result.by_server:
             why = text_of_abort(result.code)
-            return Answer(None, Text.of("outputs.not_let", output=output.place, why=why, code=result.code))
-        return Answer(None, Text.of("outputs.no_answer", output=output.place), was_silent=True)
+            return OutputReadback(
+                None, Text.of("outputs.not_let", output=output.place, why=why, code=result.code)
+            )
+        return OutputReadback(None, Text.of("outputs.no_answer", output=output.place), was_silent=True)
     size = -(-output.size // 8)
     raw = width.unsigned(result, size)
     is_of_length = len(result) == size or len(result) == _EXPEDITED > size
     if not is_of_length or width.surplus(result, size) or (output.size > 1 and raw >> output.size):
         said = Text.of("outputs.odd_answer", output=output.place, length=len(result), bits=output.size)
-        return Answer(None, said)
-    return Answer(min(raw, 1) if output.size == 1 else raw)
+        return OutputReadback(None, said)
+    return OutputReadback(min(raw, 1) if output.size == 1 else raw)

@@ -14,7 +14,7 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.habits import HabitCounter, Odd
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoChannel
-from bridge.command import BusSide, Commanded, Event, Kind
+from bridge.command import BusSide, Commanded, Event, EventKind
 from bridge.command.device import Device
 from bridge.command.node import Node
 from bridge.node import boot
@@ -24,7 +24,7 @@ from bridge.node.fault_reading import FaultReading
 from bridge.node.meaning_watch import MeaningWatch
 from bridge.node.places.sdo_channels import SdoChannels
 from bridge.node.process.inputs import connect_inputs
-from bridge.node.process.outputs import OutputPdos, connect_outputs
+from bridge.node.process.output_rpdos import OutputPdos, connect_outputs
 from bridge.node.process.polling import Polling
 from bridge.node.process.process_data import DrivePdos, connect
 from bridge.node.process.stop_words import StopWords
@@ -39,7 +39,7 @@ _EMCY_BYTES: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Listener:
+class WireEvents:
     """Who is told what comes in, and knows the other nodes."""
 
     on_sign: Callable[[Sign, float], None]
@@ -56,7 +56,7 @@ class Listener:
 class NodeWire:
     """``rejected`` counts frames that did not fit what the node says it sends."""
 
-    def __init__(self, node: Node, side: BusSide, listener: Listener, stop_words: StopWords) -> None:
+    def __init__(self, node: Node, side: BusSide, listener: WireEvents, stop_words: StopWords) -> None:
         self._node = node
         self.stop_words = stop_words
         self._image = side.image
@@ -135,11 +135,11 @@ class NodeWire:
     def carry_out(self, action: boot.Action) -> None:
         """What a boot-up has sent and needs no answer."""
         match action:
-            case boot.Nmt(command):
+            case boot.SendNmt(command):
                 self.send_nmt(command)
-            case boot.Signal.SEND_STOPPED:
+            case boot.BootSignal.SEND_STOPPED:
                 self.send_stopped()
-            case boot.Signal.WAKE:
+            case boot.BootSignal.WAKE:
                 self.send_stopped()
                 self.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
             case boot.ResetCommunication():
@@ -191,7 +191,7 @@ class NodeWire:
         elif frame.can_id == self._emcy_id and len(frame.data) != _EMCY_BYTES:
             self.habits.note(Odd.EMCY_LENGTH, len(frame.data), _EMCY_BYTES)
         said = Text.of("node.frame_does_not_fit", frame=repr(frame), why=why)
-        self._events.report(Event(frame.time, Kind.CONFIGURATION, self._node.name, 300, said))
+        self._events.report(Event(frame.time, EventKind.CONFIGURATION, self._node.name, 300, said))
 
     def on_time(self, now: float) -> None:
         self._emergencies.on_time(now)
@@ -206,7 +206,7 @@ class NodeWire:
         """Something is learned when a transfer ends well, which an answer brings about."""
         for learned in self.sdo.take_learned():
             said = Text.of("node.no_block_transfer", why=text_of_learned(learned))
-            self._events.report(Event(now, Kind.CONFIGURATION, self._node.name, 300, said))
+            self._events.report(Event(now, EventKind.CONFIGURATION, self._node.name, 300, said))
 
     def send_put_off(self, now: float) -> None:
         """The NMT command that waits, if its time has come."""

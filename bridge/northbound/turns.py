@@ -28,7 +28,7 @@ class _Address(Generic[One]):
 
 
 @dataclass(slots=True, eq=False)
-class _Place(Generic[One]):
+class _Waiting(Generic[One]):
     source: str
     address: _Address[One]
     served: int
@@ -40,7 +40,7 @@ class Turns(Generic[One]):
 
     def __init__(self) -> None:
         self._number = 0
-        self._places: dict[One, _Place[One]] = {}
+        self._places: dict[One, _Waiting[One]] = {}
         self._addresses: dict[str, _Address[One]] = {}
         self._queue: list[tuple[int, int, _Address[One]]] = []
 
@@ -55,7 +55,7 @@ class Turns(Generic[One]):
         if address is None:
             address = self._addresses[source] = _Address[One](self._number)
         address.members += 1
-        self._places[one] = _Place(source, address, self._number)
+        self._places[one] = _Waiting(source, address, self._number)
 
     def leave(self, one: One) -> None:
         """Forget a connection, whether it waits or not. May be called again."""

@@ -3,9 +3,9 @@ them wears out, and backups of them. No bus in here."""
 
 from bridge.mapping.model import ObjectRef as ObjectRef
 from bridge.parameter.access import DriveParameters as DriveParameters
-from bridge.parameter.access import Reading as Reading
-from bridge.parameter.access import Written as Written
-from bridge.parameter.definition import Entry as Entry
+from bridge.parameter.access import ParameterReading as ParameterReading
+from bridge.parameter.access import ParameterWritten as ParameterWritten
+from bridge.parameter.definition import ParameterEntry as ParameterEntry
 from bridge.parameter.error import ParameterError as ParameterError
 from bridge.parameter.error import TransferFailed as TransferFailed
 from bridge.parameter.error import Why as Why

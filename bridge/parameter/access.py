@@ -14,7 +14,7 @@ from bridge.canopen import abort, width
 from bridge.image import Value
 from bridge.mapping.model import Family, ObjectRef
 from bridge.parameter.codec import decode, encode_value, forms, matches, shown
-from bridge.parameter.definition import Entry
+from bridge.parameter.definition import ParameterEntry
 from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.ledger import Key, Ledger
 from bridge.parameter.names import Names
@@ -31,10 +31,10 @@ MISSING: Final = (abort.NO_OBJECT, abort.NO_SUB)
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ParameterReading:
     """Value that a drive holds, and when it was asked, in monotonic seconds."""
 
-    entry: Entry
+    entry: ParameterEntry
     value: Value
     time: float
 
@@ -43,18 +43,18 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class ParameterWritten:
     """A value that the drive holds now, as it was read back. ``before`` is None where it was not read.
     ``changed`` is false where it was there already; ``warning`` is what the EEPROM guard has to say."""
 
-    reading: Reading
+    reading: ParameterReading
     before: Value | None
     changed: bool
     warning: Said = ""
 
 
-Reads = Generator[Transfer, tuple[bytes, float], Reading]
-Writes = Generator[Transfer, tuple[bytes, float], Written]
+Reads = Generator[Transfer, tuple[bytes, float], ParameterReading]
+Writes = Generator[Transfer, tuple[bytes, float], ParameterWritten]
 Saves = Generator[Transfer, tuple[bytes, float], Said]
 """Returns the guard's warning, or an empty text."""
 
@@ -88,27 +88,27 @@ class DriveParameters:
         """The drive may have been switched off, or exchanged."""
         self._cache.clear()
 
-    def cached(self, entry: Entry) -> Reading | None:
+    def cached(self, entry: ParameterEntry) -> ParameterReading | None:
         """Reading that was taken last."""
         held = self._cache.get(entry.address)
-        return Reading(entry, decode(entry, held[0]), held[1]) if held else None
+        return ParameterReading(entry, decode(entry, held[0]), held[1]) if held else None
 
-    def held(self, entry: Entry) -> bytes | None:
+    def held(self, entry: ParameterEntry) -> bytes | None:
         """The bytes that were last read."""
         held = self._cache.get(entry.address)
         return held[0] if held else None
 
     # reading
 
-    def read(self, entry: Entry, now: float, max_age_s: float = 0.0) -> Reads:
+    def read(self, entry: ParameterEntry, now: float, max_age_s: float = 0.0) -> Reads:
         """The value, from the drive, or from the cache where it is not older than ``max_age_s``."""
         if entry.definition and not entry.definition.readable:
             raise ParameterError(Why.WRITE_ONLY, Text.of("parameter.write_only", parameter=entry.name))
         data, time = yield from self._fetch(entry, now, max_age_s)
-        return Reading(entry, decode(entry, data), time)
+        return ParameterReading(entry, decode(entry, data), time)
 
     def _fetch(
-        self, entry: Entry, now: float, max_age_s: float
+        self, entry: ParameterEntry, now: float, max_age_s: float
     ) -> Generator[Transfer, tuple[bytes, float], tuple[bytes, float]]:
         held = self._cache.get(entry.address)
         if held and now - held[1] < max_age_s:
@@ -121,17 +121,17 @@ class DriveParameters:
         return held
 
     def compare(
-        self, entry: Entry, value: Value, now: float
-    ) -> Generator[Transfer, tuple[bytes, float], tuple[Reading, bool]]:
+        self, entry: ParameterEntry, value: Value, now: float
+    ) -> Generator[Transfer, tuple[bytes, float], tuple[ParameterReading, bool]]:
         """Reading of the drive, and whether it equals ``value``. Raises ``ParameterError`` also where it
         cannot hold ``value``."""
         held, time = yield from self._fetch(entry, now, FRESH_S)
         same = matches(entry, held, encode_value(entry, value, held))
-        return Reading(entry, decode(entry, held), time), same
+        return ParameterReading(entry, decode(entry, held), time), same
 
     # writing
 
-    def write(self, entry: Entry, value: Value, now: float, gate: Gate) -> Writes:
+    def write(self, entry: ParameterEntry, value: Value, now: float, gate: Gate) -> Writes:
         """Write ``value`` where the drive does not hold it yet, and read it back; a command is written and
         has been given when the drive answers. ``gate`` lets in what may be written."""
         self.check_writable(entry)
@@ -144,8 +144,10 @@ class DriveParameters:
             now = max(now, time)
         data = encode_value(entry, value, before)
         if before is not None and matches(entry, before, data):
-            return Written(
-                Reading(entry, _held(entry, before, value), now), decode(entry, before), changed=False
+            return ParameterWritten(
+                ParameterReading(entry, _held(entry, before, value), now),
+                decode(entry, before),
+                changed=False,
             )
         wears = yield from self._wears(entry, now)
         key = (self._node_name if _is_of_node(entry) else self.name, str(entry.address))
@@ -164,7 +166,9 @@ class DriveParameters:
         # Also where the answer was lost: it may have been written.
         warning = self._count(key, entry.name, now) if wears else ""
         if blind:
-            return Written(Reading(entry, _held(entry, data, value), now), None, True, warning)
+            return ParameterWritten(
+                ParameterReading(entry, _held(entry, data, value), now), None, True, warning
+            )
         try:
             held, now = yield from self._fetch(entry, now, 0.0)
         except ParameterError as error:
@@ -177,10 +181,10 @@ class DriveParameters:
             said = Text.of("parameter.holds_other", parameter=entry.name, value=found)
             raise ParameterError(Why.NOT_TAKEN, said)
         was = None if before is None else decode(entry, before)
-        return Written(Reading(entry, _held(entry, held, value), now), was, True, warning)
+        return ParameterWritten(ParameterReading(entry, _held(entry, held, value), now), was, True, warning)
 
     def _put(
-        self, entry: Entry, data: bytes, before: bytes | None, gate: Gate
+        self, entry: ParameterEntry, data: bytes, before: bytes | None, gate: Gate
     ) -> Generator[Transfer, tuple[bytes, float], float]:
         """Write ``data`` in the width in which the drive takes it; when that was, in monotonic seconds."""
         refused: TransferFailed | None = None
@@ -195,7 +199,7 @@ class DriveParameters:
                 return now
         raise refused or AssertionError("there is one form at least")
 
-    def check_writable(self, entry: Entry) -> None:
+    def check_writable(self, entry: ParameterEntry) -> None:
         """Raises ``ParameterError`` for what nobody writes by this way."""
         if entry.definition and not entry.definition.writable:
             raise ParameterError(Why.READ_ONLY, Text.of("parameter.read_only", parameter=entry.name))
@@ -203,12 +207,12 @@ class DriveParameters:
         if why:
             raise ParameterError(Why.PROTECTED, why)
 
-    def _pass(self, entry: Entry, gate: Gate) -> None:
+    def _pass(self, entry: ParameterEntry, gate: Gate) -> None:
         """Raises ``ParameterError`` where the gate does not let it in."""
         if why := self.names.protection.why_not(entry, gate):
             raise ParameterError(Why.PROTECTED, why)
 
-    def _transfer(self, entry: Entry, data: bytes, gate: Gate, *, of_node: bool) -> Transfer:
+    def _transfer(self, entry: ParameterEntry, data: bytes, gate: Gate, *, of_node: bool) -> Transfer:
         """A write, which passes the gate once more when its turn has come."""
 
         def why_not() -> Text | None:
@@ -219,14 +223,14 @@ class DriveParameters:
     # the EEPROM
 
     @property
-    def saving(self) -> Entry | None:
+    def saving(self) -> ParameterEntry | None:
         """Entry to be written when the parameters are saved; None where the family has no such command."""
         eeprom = self._eeprom
         if eeprom is None or not eeprom.can_save:
             return None
         if eeprom.save_command is not None:
             return self.names.resolve(eeprom.save_command.parameter)
-        return None if eeprom.save is None else Entry("save", eeprom.save)
+        return None if eeprom.save is None else ParameterEntry("save", eeprom.save)
 
     def save(self, now: float, gate: Gate) -> Saves:
         """The parameters of the node go to its EEPROM. What the gate lets in is judged by the parameter that
@@ -257,12 +261,12 @@ class DriveParameters:
             raise self._error(entry, failure) from None
         return self._count(key, entry.name, now)
 
-    def writes(self, entry: Entry) -> int:
+    def writes(self, entry: ParameterEntry) -> int:
         """Number of known EEPROM writes of this parameter."""
         owner = self._node_name if _is_of_node(entry) else self.name
         return self._ledger.writes((owner, str(entry.address)))
 
-    def keeps_in_ram(self, entry: Entry) -> bool:
+    def keeps_in_ram(self, entry: ParameterEntry) -> bool:
         """Whether what is written is lost at power-off because of the family's switch, as last read."""
         switch, reading = self.ram_switch, None
         if switch is not None and not (entry.definition and entry.definition.volatile):
@@ -270,7 +274,7 @@ class DriveParameters:
         return reading is not None and self.means_ram(reading.value)
 
     @property
-    def ram_switch(self) -> Entry | None:
+    def ram_switch(self) -> ParameterEntry | None:
         """The parameter that keeps writes out of the EEPROM, where the family has one."""
         ram_only = self._eeprom.ram_only if self._eeprom else None
         return self.names.resolve(ram_only.parameter) if ram_only else None
@@ -288,7 +292,7 @@ class DriveParameters:
     def _count(self, key: Key, name: str, now: float) -> Said:
         return self._ledger.count(key, name, self._eeprom.cycles if self._eeprom else None, now)
 
-    def _wears(self, entry: Entry, now: float) -> Generator[Transfer, tuple[bytes, float], bool]:
+    def _wears(self, entry: ParameterEntry, now: float) -> Generator[Transfer, tuple[bytes, float], bool]:
         """Whether writing it goes to the EEPROM. Where that cannot be read it is taken to."""
         eeprom = self._eeprom
         if eeprom is None or eeprom.written_on_save_only or (entry.definition and entry.definition.volatile):
@@ -304,7 +308,7 @@ class DriveParameters:
         except ParameterError:
             return True
 
-    def _error(self, entry: Entry, failure: TransferFailed) -> ParameterError:
+    def _error(self, entry: ParameterEntry, failure: TransferFailed) -> ParameterError:
         said = Text.of("parameter.of", owner=entry.name, what=failure.said)
         if failure.abort_code in MISSING and not entry.definition:
             hints = (*self.names.hints(entry.name), *self.names.set_hints(entry.name))
@@ -313,15 +317,15 @@ class DriveParameters:
         return ParameterError(why, said, failure.abort_code)
 
 
-def _address(entry: Entry) -> str:
+def _address(entry: ParameterEntry) -> str:
     return f"{entry.address.index:04X}h:{entry.address.sub:02X}"
 
 
-def _is_of_node(entry: Entry) -> bool:
+def _is_of_node(entry: ParameterEntry) -> bool:
     return entry.definition is not None and entry.definition.of_node
 
 
-def _held(entry: Entry, data: bytes, written: Value) -> Value:
+def _held(entry: ParameterEntry, data: bytes, written: Value) -> Value:
     """Value in ``data``; of an object that no file describes with the sign that was written."""
     negative = entry.definition is None and not isinstance(written, str) and written < 0
     return written if negative else decode(entry, data)

@@ -80,10 +80,10 @@ class BackupFile:
 
 def read_backup(path: Path) -> BackupFile:
     """Read the file at ``path``. Raises ``FileFaults`` with everything that is wrong."""
-    return _Reader(TomlFile(path)).read()
+    return _BackupReader(TomlFile(path)).read()
 
 
-class _Reader:
+class _BackupReader:
     """Reading of one file, step by step; each step notes its faults."""
 
     def __init__(self, file: TomlFile) -> None:

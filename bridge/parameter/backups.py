@@ -15,15 +15,15 @@ from typing import Final
 from bridge.canopen import abort
 from bridge.image import Value
 from bridge.mapping.model import ObjectRef
-from bridge.parameter.access import MISSING, DriveParameters, Written
+from bridge.parameter.access import MISSING, DriveParameters, ParameterWritten
 from bridge.parameter.backup_file import IDENTITY
 from bridge.parameter.codec import encode_value
-from bridge.parameter.definition import Entry
-from bridge.parameter.effect import Effect
+from bridge.parameter.definition import ParameterEntry
 from bridge.parameter.error import ParameterError, TransferFailed, Why
 from bridge.parameter.names import Names
 from bridge.parameter.protection import Gate
 from bridge.parameter.transfer import Transfer
+from bridge.parameter.write_effect import Effect
 from bridge.text import Text
 
 _MOVING: Final = (Effect.COMMANDS, Effect.MAY_MOVE)
@@ -38,7 +38,7 @@ _SUBS: Final = 0xFF
 class Difference:
     """Value that a drive holds beside the set's value for it."""
 
-    entry: Entry
+    entry: ParameterEntry
     in_drive: Value
     in_set: Value
 
@@ -72,7 +72,7 @@ class Comparison:
 class Restored:
     """``failed`` is the name at which it ended with ``error``; ``left`` are those not come to."""
 
-    written: list[Written] = field(default_factory=list[Written])
+    written: list[ParameterWritten] = field(default_factory=list[ParameterWritten])
     same: list[str] = field(default_factory=list[str])
     missing: list[str] = field(default_factory=list[str])
     read_only: list[str] = field(default_factory=list[str])
@@ -86,7 +86,7 @@ class Restored:
 Steps = Generator[Transfer, tuple[bytes, float], None]
 
 
-def settings(names: Names, *, on_first: bool = True) -> list[Entry]:
+def settings(names: Names, *, on_first: bool = True) -> list[ParameterEntry]:
     """Entries that belong into a set, in the order of the mapping file; the node's own parameters are in the
     set of the drive on its first SDO channel."""
     return [one for one in _set(names, on_first) if not names.protection.why_no_setting(one)]
@@ -101,14 +101,14 @@ def left_out(names: Names, *, on_first: bool = True) -> dict[str, str]:
     }
 
 
-def _set(names: Names, on_first: bool) -> Iterator[Entry]:
+def _set(names: Names, on_first: bool) -> Iterator[ParameterEntry]:
     for entry in names.entries():
         one = entry.definition
         if one and one.readable and one.writable and one.backup and (on_first or not one.of_node):
             yield entry
 
 
-def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[Entry, Value]]:
+def in_order(names: Names, values: Mapping[str, Value]) -> list[tuple[ParameterEntry, Value]]:
     """The entries of a set in the order of the mapping file, then those that it does not list.
 
     Raises ``ParameterError`` for a name that the family does not have, for what no set holds and for two
@@ -134,7 +134,7 @@ def misfits(names: Names, values: Mapping[str, Value]) -> Iterator[tuple[str, Pa
             yield name, error
 
 
-def _fitting(names: Names, name: str, seen: dict[ObjectRef, str]) -> Entry:
+def _fitting(names: Names, name: str, seen: dict[ObjectRef, str]) -> ParameterEntry:
     """Entry that ``name`` means in a set that already has ``seen``. Raises ``ParameterError``."""
     entry = names.resolve(name)
     other = seen.setdefault(entry.address, name)
@@ -145,7 +145,7 @@ def _fitting(names: Names, name: str, seen: dict[ObjectRef, str]) -> Entry:
     return entry
 
 
-def _check_moves_nothing(names: Names, entry: Entry) -> None:
+def _check_moves_nothing(names: Names, entry: ParameterEntry) -> None:
     """Raises ``ParameterError`` for what no set holds because it moves something."""
     if names.protection.effect(entry.address) in _MOVING and (why := names.protection.why_no_setting(entry)):
         raise ParameterError(Why.PROTECTED, Text.of("parameter_set.moves", why=why))
@@ -273,7 +273,7 @@ def why_another(of_file: Mapping[str, int], of_node: Mapping[str, int]) -> tuple
     return None
 
 
-def _refusal(entry: Entry, error: ParameterError, into: Backup) -> str:
+def _refusal(entry: ParameterEntry, error: ParameterError, into: Backup) -> str:
     """Reason why a value was not read, in words. Raises ``error`` again where the drive has not answered at
     all, but for what it was silent about before: whoever begins again has seen that it answers."""
     if error.why is Why.NO_ANSWER:
@@ -322,7 +322,7 @@ def compare_sets(
             into.differences.append(Difference(entry, held[entry.address], value))
 
 
-def _is_same(entry: Entry, one: Value, other: Value) -> bool:
+def _is_same(entry: ParameterEntry, one: Value, other: Value) -> bool:
     if entry.definition is None:
         return one == other
     return encode_value(entry, one, None) == encode_value(entry, other, None)
@@ -366,7 +366,7 @@ def restore(
             into.same.append(entry.name)
 
 
-def _checked(access: DriveParameters, values: Mapping[str, Value]) -> list[tuple[Entry, Value]]:
+def _checked(access: DriveParameters, values: Mapping[str, Value]) -> list[tuple[ParameterEntry, Value]]:
     """The set in the order in which it is written. The switch of the EEPROM comes first where what follows
     is to be kept, and last where it is not. Raises ``ParameterError`` with all that cannot be written."""
     wanted = in_order(access.names, values)
@@ -384,7 +384,7 @@ def _checked(access: DriveParameters, values: Mapping[str, Value]) -> list[tuple
         raise ParameterError(refused[0].why, Text.of("parameter_set.refused", reasons=reasons))
     switch = access.ram_switch
 
-    def place(pair: tuple[Entry, Value]) -> int:
+    def place(pair: tuple[ParameterEntry, Value]) -> int:
         if switch is None or pair[0].address != switch.address:
             return 0
         return 1 if access.means_ram(pair[1]) else -1

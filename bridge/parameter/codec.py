@@ -15,7 +15,7 @@ from bridge.canopen import datatypes, width
 from bridge.canopen.datatypes import INTEGERS, NUMBERS, REALS, DataTypeError, Integer, Misfit
 from bridge.image import Value
 from bridge.image.limits import shown_range
-from bridge.parameter.definition import Entry
+from bridge.parameter.definition import ParameterEntry
 from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.number_text import NumberError, command_line_number
 from bridge.text import Text
@@ -25,7 +25,7 @@ _DIGITS: Final = 9
 """Behind the point: what a factor such as 0.01 makes of a whole number is that number of hundredths."""
 
 
-def decode(entry: Entry, data: bytes) -> Value:
+def decode(entry: ParameterEntry, data: bytes) -> Value:
     """The value in ``data``. Raises ``ParameterError`` where the node has sent another type.
 
     Bytes beyond the type's are left out: some servers answer every read with four.
@@ -54,7 +54,7 @@ def decode(entry: Entry, data: bytes) -> Value:
     return value * definition.factor
 
 
-def encode_value(entry: Entry, value: Value, held: bytes | None) -> bytes:
+def encode_value(entry: ParameterEntry, value: Value, held: bytes | None) -> bytes:
     """The bytes of ``value``, the nearest that the parameter can hold.
 
     ``held`` is what the drive holds now; for an object that no file describes it gives the length.
@@ -85,7 +85,7 @@ def encode_value(entry: Entry, value: Value, held: bytes | None) -> bytes:
         raise _misfit(entry, value, DataTypeError(Misfit.TOO_LARGE, kind, str(value))) from None
 
 
-def matches(entry: Entry, held: bytes, wanted: bytes) -> bool:
+def matches(entry: ParameterEntry, held: bytes, wanted: bytes) -> bool:
     """Whether the drive holds what was to be written."""
     if entry.definition and entry.definition.data_type == "string":
         return datatypes.text(held) == datatypes.text(wanted)
@@ -94,19 +94,19 @@ def matches(entry: Entry, held: bytes, wanted: bytes) -> bool:
     return padded or width.holds(held, wanted, signed=_is_signed(entry))
 
 
-def forms(entry: Entry, data: bytes, held: bytes | None) -> Iterator[bytes]:
+def forms(entry: ParameterEntry, data: bytes, held: bytes | None) -> Iterator[bytes]:
     """The bytes in which the drive may take a value, the likeliest first; ``held`` is its last answer."""
     if held is None or (entry.definition and entry.definition.data_type not in NUMBERS):
         return iter((data,))
     return width.forms(data, held, signed=_is_signed(entry))
 
 
-def _is_signed(entry: Entry) -> bool:
+def _is_signed(entry: ParameterEntry) -> bool:
     kind = entry.definition.data_type if entry.definition else ""
     return kind in INTEGERS and INTEGERS[kind].signed
 
 
-def parse(entry: Entry, text: str) -> Value:
+def parse(entry: ParameterEntry, text: str) -> Value:
     """A value as it is typed on the command line. Raises ``ParameterError``; whether it is in range,
     ``encode_value`` says."""
     definition = entry.definition
@@ -131,7 +131,7 @@ def parse(entry: Entry, text: str) -> Value:
         raise ParameterError(Why.OUT_OF_RANGE, _of(entry, error.said)) from None
 
 
-def check_raw(entry: Entry, value: Value) -> None:
+def check_raw(entry: ParameterEntry, value: Value) -> None:
     """Raises ``ParameterError`` where ``value`` is not bytes in hexadecimal that the parameter takes."""
     try:
         if not isinstance(value, str):
@@ -143,7 +143,7 @@ def check_raw(entry: Entry, value: Value) -> None:
         encode_value(entry, decode(entry, data), data)
 
 
-def shown(entry: Entry, value: Value) -> str:
+def shown(entry: ParameterEntry, value: Value) -> str:
     """``1.03 s``, ``1 (automatic)``."""
     definition = entry.definition
     if definition is None or isinstance(value, str | bool):
@@ -160,7 +160,7 @@ def _raw(data: bytes) -> Value:
     return text if text.isprintable() else data.hex(" ").upper()
 
 
-def _encode_raw(entry: Entry, value: Value, held: bytes | None) -> bytes:
+def _encode_raw(entry: ParameterEntry, value: Value, held: bytes | None) -> bytes:
     if isinstance(value, str):
         try:
             return datatypes.encode("string", value)
@@ -176,7 +176,7 @@ def _encode_raw(entry: Entry, value: Value, held: bytes | None) -> bytes:
     return number.encode(int(value))
 
 
-def _number(entry: Entry, value: Value) -> int | float:
+def _number(entry: ParameterEntry, value: Value) -> int | float:
     """``value`` as a number; the text of a state is taken for its code."""
     definition = entry.definition
     if isinstance(value, str) and definition:
@@ -193,7 +193,7 @@ def _number(entry: Entry, value: Value) -> int | float:
     return value
 
 
-def _check_range(entry: Entry, number: int | float) -> None:
+def _check_range(entry: ParameterEntry, number: int | float) -> None:
     definition = entry.definition
     if definition is None:
         return
@@ -205,20 +205,20 @@ def _check_range(entry: Entry, number: int | float) -> None:
         raise _not_taken(entry, Text.of("takes.range_in", range=allowed, unit=unit, value=value))
 
 
-def _shown_states(entry: Entry) -> tuple[str, ...]:
+def _shown_states(entry: ParameterEntry) -> tuple[str, ...]:
     states = entry.definition.states if entry.definition else {}
     return tuple(f"{code} ({state})" for code, state in states.items())
 
 
-def _not_taken(entry: Entry, takes: Text) -> ParameterError:
+def _not_taken(entry: ParameterEntry, takes: Text) -> ParameterError:
     return ParameterError(Why.OUT_OF_RANGE, Text.of("value.of", name=entry.name, said=takes))
 
 
-def _misfit(entry: Entry, value: Value, error: DataTypeError) -> ParameterError:
+def _misfit(entry: ParameterEntry, value: Value, error: DataTypeError) -> ParameterError:
     why = text_of_misfit(error)
     said = Text.of("parameter.value_does_not_fit", parameter=entry.name, value=repr(value), why=why)
     return ParameterError(Why.OUT_OF_RANGE, said)
 
 
-def _of(entry: Entry, what: Text) -> Text:
+def _of(entry: ParameterEntry, what: Text) -> Text:
     return Text.of("parameter.of", owner=entry.name, what=what)

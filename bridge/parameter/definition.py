@@ -9,7 +9,7 @@ from bridge.mapping.parameters import leaf_of
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ParameterEntry:
     """One value of a drive: a parameter, one element of it, or an object that no file describes."""
 
     name: str
@@ -17,7 +17,7 @@ class Entry:
     definition: Parameter | None = None
 
     @property
-    def as_bytes(self) -> Entry:
+    def as_bytes(self) -> ParameterEntry:
         """The same object with its bytes for a value; whatever protects it stays."""
         if self.definition is None:
             bare = Parameter.model_validate({"name": self.name, "title": "", "data_type": "bytes"})

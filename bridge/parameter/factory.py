@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.canopen.sdo import COMMANDS
 from bridge.eds import Description, Entry, read_whole_device_file
-from bridge.eds.values import BadValue, encode
+from bridge.eds.value_text import BadValue, encode
 from bridge.image import Value
 from bridge.mapping.model import ObjectRef
 from bridge.parameter.codec import decode, encode_value

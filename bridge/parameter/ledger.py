@@ -28,7 +28,7 @@ Key = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Saved:
+class WriteRecord:
     """Record of one object: writes so far, and when the last were, in seconds since 1970 UTC."""
 
     writes: int
@@ -36,7 +36,7 @@ class Saved:
 
 
 @dataclass(slots=True)
-class _Count:
+class _WriteCount:
     writes: int = 0
     recent: deque[float] = field(default_factory=lambda: deque[float](maxlen=MOST_A_DAY))
 
@@ -46,7 +46,7 @@ class Ledger:
     them."""
 
     def __init__(self) -> None:
-        self._counts: dict[Key, _Count] = {}
+        self._counts: dict[Key, _WriteCount] = {}
         self._unsaved: dict[Key, list[float]] = {}
 
     def writes(self, key: Key) -> int:
@@ -74,7 +74,7 @@ class Ledger:
 
     def count(self, key: Key, name: str, cycles: int | None, now: float) -> Said:
         """One more write. The warning where it is one of the tenths of ``cycles``, or nothing."""
-        count = self._counts.setdefault(key, _Count())
+        count = self._counts.setdefault(key, _WriteCount())
         count.writes += 1
         count.recent.append(now)
         self._unsaved.setdefault(key, []).append(now)
@@ -92,7 +92,7 @@ class Ledger:
         for key, times in unsaved.items():
             self._unsaved[key] = [*times, *self._unsaved.get(key, ())]
 
-    def restore(self, saved: Mapping[Key, Saved], epoch_s: float, now: float) -> None:
+    def restore(self, saved: Mapping[Key, WriteRecord], epoch_s: float, now: float) -> None:
         """Take over what is kept, which includes all that ``take_unsaved`` has given.
 
         ``epoch_s`` is the wall clock, in seconds since 1970, at monotonic 0. What was written in the
@@ -102,6 +102,6 @@ class Ledger:
             unsaved = self._unsaved.get(key, [])
             times = [time - epoch_s for time in record.last]
             recent = sorted([*(time for time in times if time <= now), *unsaved])[-MOST_A_DAY:]
-            count = self._counts.setdefault(key, _Count())
+            count = self._counts.setdefault(key, _WriteCount())
             count.writes = record.writes + len(unsaved)
             count.recent = deque(recent, maxlen=MOST_A_DAY)

@@ -17,20 +17,20 @@ from typing import Final
 
 import msgspec
 
-from bridge.parameter.ledger import MOST_A_DAY, Key, Ledger, Saved
+from bridge.parameter.ledger import MOST_A_DAY, Key, Ledger, WriteRecord
 
 NAME: Final = "eeprom.json"
 _VERSION: Final = 1
 
 
-class _Kept(msgspec.Struct):
+class _StoredRecord(msgspec.Struct):
     writes: int
     last: list[float] = msgspec.field(default_factory=list[float])
 
 
-class _File(msgspec.Struct):
+class _LedgerFile(msgspec.Struct):
     version: int
-    writes: dict[str, dict[str, _Kept]]
+    writes: dict[str, dict[str, _StoredRecord]]
 
 
 class LedgerFile:
@@ -58,7 +58,7 @@ class LedgerFile:
     def totals(self) -> dict[Key, int]:
         """Writes of each object by the file as it is now; empty where there is none that can be read."""
         try:
-            kept = msgspec.json.decode(self.path.read_bytes(), type=_File)
+            kept = msgspec.json.decode(self.path.read_bytes(), type=_LedgerFile)
         except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
             return {}
         return {
@@ -67,38 +67,38 @@ class LedgerFile:
             for address, one in objects.items()
         }
 
-    def merge(self, writes: Mapping[Key, list[float]]) -> dict[Key, Saved]:
+    def merge(self, writes: Mapping[Key, list[float]]) -> dict[Key, WriteRecord]:
         """Add ``writes``, times in seconds since 1970, to the file; all that is in it."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self._lock():
             totals = self._read()
             for key, times in writes.items():
-                before = totals.get(key, Saved(0))
+                before = totals.get(key, WriteRecord(0))
                 last = sorted([*before.last, *times])[-MOST_A_DAY:]
-                totals[key] = Saved(before.writes + len(times), tuple(last))
+                totals[key] = WriteRecord(before.writes + len(times), tuple(last))
             if writes:
                 self._write(totals)
         return totals
 
-    def _read(self) -> dict[Key, Saved]:
+    def _read(self) -> dict[Key, WriteRecord]:
         try:
             content = self.path.read_bytes()
         except FileNotFoundError:
             return {}
         try:
-            kept = msgspec.json.decode(content, type=_File)
+            kept = msgspec.json.decode(content, type=_LedgerFile)
         except (msgspec.MsgspecError, UnicodeDecodeError):
             aside = self.path.with_suffix(".damaged")
             self.path.replace(aside)
             self.damaged = str(aside)
             return {}
         return {
-            (owner, address): Saved(one.writes, tuple(one.last))
+            (owner, address): WriteRecord(one.writes, tuple(one.last))
             for owner, objects in kept.writes.items()
             for address, one in objects.items()
         }
 
-    def _write(self, totals: Mapping[Key, Saved]) -> None:
+    def _write(self, totals: Mapping[Key, WriteRecord]) -> None:
         writes: dict[str, dict[str, object]] = {}
         for (owner, address), saved in sorted(totals.items()):
             writes.setdefault(owner, {})[address] = {"writes": saved.writes, "last": list(saved.last)}

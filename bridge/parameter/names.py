@@ -1,7 +1,7 @@
 """Names of parameters by the vendors, and the objects that hold them, by the rules of the mapping file.
 
 ``P102``, ``P102[2].3``, ``C00039/1``, ``E08``, ``2066:01`` and the names of points (``p102_2_3``) all lead
-to an ``Entry``. A name that fits the vendor's pattern is taken whether or not the file lists it.
+to an ``ParameterEntry``. A name that fits the vendor's pattern is taken whether or not the file lists it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Final
 
 from bridge.mapping.model import Family, ObjectRef, Parameter
 from bridge.mapping.parameters import indices, object_of
-from bridge.parameter.definition import Entry
+from bridge.parameter.definition import ParameterEntry
 from bridge.parameter.error import ParameterError, Why
 from bridge.parameter.protection import Protection
 from bridge.text import Text
@@ -44,8 +44,8 @@ class Names:
         self._family = family
         self.definitions = tuple(_as_read(parameter) for parameter in family.parameter)
         self._by_name = {definition.name.upper(): definition for definition in self.definitions}
-        self._by_leaf: dict[str, Entry] = {}
-        self._by_address: dict[ObjectRef, Entry] = {}
+        self._by_leaf: dict[str, ParameterEntry] = {}
+        self._by_address: dict[ObjectRef, ParameterEntry] = {}
         for entry in self.entries():
             self._by_leaf.setdefault(entry.leaf, entry)
             self._by_address.setdefault(entry.address, entry)
@@ -57,13 +57,13 @@ class Names:
             family, [(self._entry(one, None, None).address.index, one) for one in self.definitions]
         )
 
-    def resolve(self, text: str) -> Entry:
+    def resolve(self, text: str) -> ParameterEntry:
         """The entry that ``text`` means. Raises ``ParameterError`` with the nearest names."""
         wanted = text.strip()
         match = _OBJECT.fullmatch(wanted)
         if match:
             address = self._family.place(ObjectRef(int(match[1], 16), int(match[2], 16)))
-            return self._by_address.get(address) or Entry(str(address), address)
+            return self._by_address.get(address) or ParameterEntry(str(address), address)
         definition = self._by_name.get(wanted.upper())
         if definition is not None:
             return self._entry(definition, None, None)
@@ -73,14 +73,14 @@ class Names:
             raise ParameterError(Why.UNKNOWN_NAME, said)
         return found
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[ParameterEntry]:
         """Every value that the file lists: each element in each set."""
         for definition in self.definitions:
             for element in self._elements(definition):
                 for number in range(1, definition.sets + 1) if definition.sets else (None,):
                     yield self._entry(definition, element, number)
 
-    def points(self) -> Iterator[Entry]:
+    def points(self) -> Iterator[ParameterEntry]:
         """Every value that is shown as a point: each element, of the first set."""
         for definition in self.definitions:
             if definition.point and definition.readable:
@@ -99,7 +99,7 @@ class Names:
         without sets has its elements that far apart."""
         return max(1, abs(self._rule.element_step)) if self._rule else 1
 
-    def at(self, address: ObjectRef) -> Entry:
+    def at(self, address: ObjectRef) -> ParameterEntry:
         """The entry at ``address``, by the vendor's name where that leads back to it."""
         if listed := self._by_address.get(address):
             return listed
@@ -109,7 +109,7 @@ class Names:
         except ParameterError:
             # Such as P120.2, where the file has P120 without parameter sets.
             leads_back = False
-        return Entry(name if leads_back else str(address), address)
+        return ParameterEntry(name if leads_back else str(address), address)
 
     def _vendors(self, address: ObjectRef) -> str:
         """Spelling of ``address`` by the vendor, in the shape of the family's example; empty if there is
@@ -168,7 +168,7 @@ class Names:
     def _elements(self, definition: Parameter) -> range | tuple[None]:
         return range(self._first, self._first + definition.elements) if definition.elements else (None,)
 
-    def _by_pattern(self, text: str) -> Entry | None:
+    def _by_pattern(self, text: str) -> ParameterEntry | None:
         match = self._pattern.fullmatch(text) if self._pattern else None
         if match is None or self._rule is None:
             return None
@@ -185,7 +185,7 @@ class Names:
         except ValueError:
             return None
         listed = self._by_address.get(found)
-        return Entry(text.upper(), found, listed.definition if listed else None)
+        return ParameterEntry(text.upper(), found, listed.definition if listed else None)
 
     def _check(self, definition: Parameter, element: int | None, number: int | None) -> None:
         """Raises ``ParameterError`` where the parameter has no such element or set."""
@@ -206,17 +206,19 @@ class Names:
                 else Text.of("parameter.no_sets", parameter=name, given=number),
             )
 
-    def _entry(self, definition: Parameter, element: int | None, number: int | None) -> Entry:
+    def _entry(self, definition: Parameter, element: int | None, number: int | None) -> ParameterEntry:
         name = self._spelled(definition.name, element, number)
         base = definition.object
         if base is not None:
             place = self._first if element is None else element
             sub = base.sub + max(definition.sets, 1) * (place - self._first) + (number or 1) - 1
-            return Entry(name, self._family.place(ObjectRef(base.index, min(sub, _MOST_SUB))), definition)
+            return ParameterEntry(
+                name, self._family.place(ObjectRef(base.index, min(sub, _MOST_SUB))), definition
+            )
         if self._rule is None:
             raise ValueError(f"{definition.name} has no object")
         found = object_of(self._rule, name, definition.sets, definition.elements)
-        return Entry(name, self._family.place(found), definition)
+        return ParameterEntry(name, self._family.place(found), definition)
 
     def _spelled(self, name: str, element: int | None, number: int | None) -> str:
         """The name of one element in one set, as the family's pattern reads it."""

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from bridge.mapping.axes import STANDARDISED, on_first
-from bridge.parameter.effect import Effect
+from bridge.parameter.write_effect import Effect
 
 NETWORK_VARIABLES: Final = range(0xA000, 0xC000)
 """CiA 301 §7.4.1: the network and system variables of a programmable device (CiA 302-4). They are process

@@ -17,10 +17,10 @@ from bridge.mapping.aliases import COMMUNICATION
 from bridge.mapping.model import Family, ObjectRef, Parameter
 from bridge.mapping.own_places import places
 from bridge.mapping.parameters import indices
-from bridge.parameter.definition import Entry
-from bridge.parameter.effect import Effect, Verdict, judge
+from bridge.parameter.definition import ParameterEntry
 from bridge.parameter.profiles import effect_of
 from bridge.parameter.transfer import Transfer
+from bridge.parameter.write_effect import Effect, WriteVerdict, judge
 from bridge.text import Text
 
 _PROFILE: Final = 0xFFFF
@@ -28,7 +28,7 @@ _PROFILE: Final = 0xFFFF
 _CIA_402: Final = 402
 _ORDER: Final = tuple(Effect)
 
-Asks = Callable[[Iterable[Entry]], Generator[Transfer, tuple[bytes, float], None]]
+Asks = Callable[[Iterable[ParameterEntry]], Generator[Transfer, tuple[bytes, float], None]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ class Protection:
 
     def may_set(self, address: ObjectRef, *, is_engineer: bool) -> bool:
         """Whether an engineer, or somebody who is none, ever writes an object."""
-        return judge(self.effect(address), is_engineer=is_engineer, is_moving=False) is Verdict.WRITTEN
+        return judge(self.effect(address), is_engineer=is_engineer, is_moving=False) is WriteVerdict.WRITTEN
 
     def tells_own_supervision(self, address: ObjectRef) -> bool:
         """Whether an object says what the node does when the bridge falls silent."""
@@ -121,22 +121,22 @@ class Protection:
             self._is_device and self.effect(address) is Effect.MAKES_SAFE
         )
 
-    def why_not(self, entry: Entry, gate: Gate) -> Text | None:
+    def why_not(self, entry: ParameterEntry, gate: Gate) -> Text | None:
         """Reason why this is not written by whom the gate lets in; None where it is."""
         effect = self.effect(entry.address)
         match judge(effect, is_engineer=gate.is_engineer, is_moving=gate.is_moving()):
-            case Verdict.WRITTEN:
+            case WriteVerdict.WRITTEN:
                 return None
-            case Verdict.NEVER:
+            case WriteVerdict.NEVER:
                 return self.why_never(entry)
-            case Verdict.NOT_AN_ENGINEER:
+            case WriteVerdict.NOT_AN_ENGINEER:
                 return Text.of("protection.needs_engineer", what=self._what(entry, effect))
-            case Verdict.NOT_AT_REST if self._is_device:
+            case WriteVerdict.NOT_AT_REST if self._is_device:
                 return Text.of("protection.output_active", parameter=entry.name)
-            case Verdict.NOT_AT_REST:
+            case WriteVerdict.NOT_AT_REST:
                 return Text.of("protection.drive_enabled", parameter=entry.name)
 
-    def why_never(self, entry: Entry) -> Text | None:
+    def why_never(self, entry: ParameterEntry) -> Text | None:
         """Reason why nobody writes it as a parameter; None where somebody may."""
         name, address, effect = entry.name, entry.address, self.effect(entry.address)
         if self._read_only:
@@ -156,7 +156,7 @@ class Protection:
             return Text.of("protection.process_data", parameter=name)
         return Text.of("protection.commands_drive", parameter=name)
 
-    def why_no_setting(self, entry: Entry) -> Text | None:
+    def why_no_setting(self, entry: ParameterEntry) -> Text | None:
         """Reason why no parameter set holds it: a restore would move something. None where one may. What an
         RPDO can carry to a drive moves nothing while that is disabled, and a set is restored only then."""
         effect = self.effect(entry.address)
@@ -164,18 +164,18 @@ class Protection:
             return Text.of("protection.in_no_set", parameter=entry.name)
         return self.why_never(entry)
 
-    def why_forced(self, entry: Entry) -> Text | None:
+    def why_forced(self, entry: ParameterEntry) -> Text | None:
         """Reason why the command line, which knows no roles, writes it with ``--force`` only, if at all. What
         may move a drive does so only while that is enabled, and then it is not written."""
         effect = self.effect(entry.address)
         if effect is Effect.MAY_MOVE and not self._is_device:
             return None
         verdict = judge(effect, is_engineer=False, is_moving=False)
-        if verdict is Verdict.NOT_AN_ENGINEER:
+        if verdict is WriteVerdict.NOT_AN_ENGINEER:
             return self._what(entry, effect)
         return self.why_never(entry)
 
-    def _what(self, entry: Entry, effect: Effect) -> Text:
+    def _what(self, entry: ParameterEntry, effect: Effect) -> Text:
         if effect is Effect.SUPERVISES:
             return Text.of("protection.supervises", parameter=entry.name)
         if effect is Effect.MAKES_SAFE:

@@ -11,7 +11,7 @@ from typing import Final, cast
 import msgspec
 
 from bridge.base.guard import Guard
-from bridge.command import Event, Kind, Plant
+from bridge.command import Event, EventKind, Plant
 from bridge.command.audit import AuditEntry
 from bridge.config import Site
 from bridge.image import Value
@@ -138,7 +138,7 @@ class AuditLog:
         if fault:
             severity = 600
             said = Text.of("audit.not_written", file=str(file.path), error=Text.plain(fault))
-        self._plant.report(Event(now, Kind.CONFIGURATION, "bridge", severity, said))
+        self._plant.report(Event(now, EventKind.CONFIGURATION, "bridge", severity, said))
 
     def _on_entry(self, entry: AuditEntry) -> None:
         file = self.refused if entry.is_refused else self.file

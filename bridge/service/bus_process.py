@@ -25,7 +25,7 @@ from bridge.lint import Severity, lint
 from bridge.master.ending import Ending
 from bridge.master.master import Master
 from bridge.master.network import Network
-from bridge.master.standstill import Alarm
+from bridge.master.standstill import WatchdogTimer
 from bridge.mirror.endpoint import socket_endpoint, tap_path
 from bridge.mirror.publisher import MirrorPublisher
 from bridge.northbound.gateway.nets import net_of
@@ -64,7 +64,7 @@ def make_bus(table: BusTable) -> Bus:
     return open_bus(table.name, table.interface, table.channel or "", table.bitrate)
 
 
-class Service:
+class BusProcess:
     """The bus process of one site.
 
     ``make_bus`` gives the buses. Of what the site serves by fronts, ``fronts`` are started: without any, this
@@ -77,7 +77,7 @@ class Service:
         make_bus: MakeBus = make_bus,
         *,
         fronts: Collection[str] = FRONTS,
-        alarm: Alarm | None = None,
+        alarm: WatchdogTimer | None = None,
     ) -> None:
         self.project = project
         site = project.site

@@ -81,7 +81,7 @@ class Front:
         ended."""
         ear = None
         try:
-            ear = _Ear(serves) if self._watched else None
+            ear = _LifePipe(serves) if self._watched else None
             process = self._process = await self._spawn(ear)
             return await self._wait(process, ear, serves)
         except (BridgeError, OSError, RuntimeError) as error:
@@ -93,7 +93,7 @@ class Front:
                 ear.close()
             await self._stop()
 
-    async def _spawn(self, ear: _Ear | None) -> asyncio.subprocess.Process:
+    async def _spawn(self, ear: _LifePipe | None) -> asyncio.subprocess.Process:
         arguments, files = [*self._arguments, "--parent", str(os.getpid())], list[int]()
         if ear:
             arguments += ["--signs", str(ear.mouth)]
@@ -118,7 +118,7 @@ class Front:
         return process
 
     async def _wait(
-        self, process: asyncio.subprocess.Process, ear: _Ear | None, serves: Callable[[], None]
+        self, process: asyncio.subprocess.Process, ear: _LifePipe | None, serves: Callable[[], None]
     ) -> Text:
         """Wait until it ends, or is killed because it hangs."""
         # One wait for all looks: of each that is given up, asyncio keeps a future until the process ends.
@@ -153,7 +153,7 @@ class Front:
             await process.wait()
 
 
-class _Ear:
+class _LifePipe:
     """Our end of the pipe on which one front gives its signs of life.
 
     Silence is counted in looks and not in time: where this process itself was stopped for a while, the

@@ -27,7 +27,7 @@ from bridge.parameter.ledger_file import LedgerFile
 from bridge.project import Project
 from bridge.service.front_process import give_signs
 from bridge.service.page.buses import Buses
-from bridge.service.page.system import SystemOf
+from bridge.service.page.system_facts import SystemOf
 from bridge.text import render
 
 _log = logging.getLogger(__name__)

@@ -15,7 +15,7 @@ from bridge.base.errors import BridgeError, Unavailable
 from bridge.base.notify import Notifier
 from bridge.base.quietlog import log_source
 from bridge.base.ratelimit import Pauses
-from bridge.command import Event, Kind, Plant
+from bridge.command import Event, EventKind, Plant
 from bridge.service.front_process import shortened
 from bridge.text import Said, Text, render
 
@@ -163,7 +163,7 @@ class Supervisor:
             self._told.add(part.name)
             what = Text.of("front.what", front=part.title, how=how)
             said = Text.of("front.ended", what=what, pause_s=pause_s)
-            self._plant.report(Event(now, Kind.FRONT, "bridge", 700, said))
+            self._plant.report(Event(now, EventKind.FRONT, "bridge", 700, said))
 
     def _serves(self, part: Supervised) -> None:
         if part.name not in self._failing and part.name not in self._unknown:
@@ -174,7 +174,7 @@ class Supervisor:
         if part.name in self._told:
             self._told.discard(part.name)
             said = Text.of("front.serves_again", part=part.title)
-            self._plant.report(Event(now, Kind.FRONT, "bridge", 200, said))
+            self._plant.report(Event(now, EventKind.FRONT, "bridge", 200, said))
 
     def _settled(self, part: Supervised, now: float) -> None:
         self._unknown.discard(part.name)

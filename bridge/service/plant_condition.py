@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from bridge.command import Event, Kind, Plant
-from bridge.condition.causes import Shown
-from bridge.condition.findings import Rank, Trouble
-from bridge.condition.layout import layout_of
+from bridge.command import Event, EventKind, Plant
+from bridge.condition.causes import TroubleLine
 from bridge.condition.own_faults import with_faults
+from bridge.condition.plant_layout import layout_of
+from bridge.condition.point_troubles import Rank, Trouble
 from bridge.condition.told import condition, recent_json, troubles_json
 from bridge.condition.troubles import Troubles
 from bridge.text import Said, Text
@@ -22,9 +22,9 @@ _NO_NEWS: Final = 500
 """Severity below which events report that something is over, or was done."""
 _UNPROVEN: Final = "stop_unproven"
 _NOTICED: Final = {
-    Kind.NODE_LOST: "node_lost",
-    Kind.WATCHDOG: "controller_silent",
-    Kind.FRONT: "fronts_failing",
+    EventKind.NODE_LOST: "node_lost",
+    EventKind.WATCHDOG: "controller_silent",
+    EventKind.FRONT: "fronts_failing",
 }
 """Kind of trouble that an event is about."""
 
@@ -82,7 +82,7 @@ class PlantCondition:
         plant.set("bridge/stops_unproven", ", ".join(unproven), now)
         self._tell_causes(troubles.shown, now)
 
-    def _tell_causes(self, shown: list[Shown], now: float) -> None:
+    def _tell_causes(self, shown: list[TroubleLine], now: float) -> None:
         """Report causes that no single event tells, each once, as soon as it is found."""
         present: set[tuple[str, str, float]] = set()
         for one in shown:
@@ -94,7 +94,7 @@ class PlantCondition:
             if found not in self._told_causes and one.until_ms is None:
                 source = one.trouble.place.removeprefix("bus/")
                 severity = 900 if one.rank is not Rank.WARNING else 500
-                self._plant.report(Event(now, Kind.CAUSE, source, severity, said))
+                self._plant.report(Event(now, EventKind.CAUSE, source, severity, said))
         self._told_causes = present
 
     def because(self, event: Event) -> Said:

@@ -11,7 +11,7 @@ from bridge.canopen.datatypes import REALS
 from bridge.eds import Description
 from bridge.mapping import Family, load_family
 from bridge.sim.cia402.cia402_catalogue import MAPPINGS, cia402
-from bridge.sim.core.device import SimulatedDevice
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.generic.adopted import adopt
 from bridge.sim.generic.generic_eds import plan_of_description
 from bridge.sim.generic.generic_family import pattern, plan_of_family

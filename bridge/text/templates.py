@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 LANGUAGES: Final = ("en", "de")
 
 
-class Part(NamedTuple):
+class TemplatePart(NamedTuple):
     """Literal words, and the fact that follows them: "" where none does."""
 
     words: str
@@ -27,10 +27,10 @@ class Part(NamedTuple):
     is_quoted: bool
 
 
-def parse(template: str) -> tuple[Part, ...]:
+def parse(template: str) -> tuple[TemplatePart, ...]:
     """Raises ValueError for braces that do not fit."""
     return tuple(
-        Part(words, name or "", form or "", conversion == "r")
+        TemplatePart(words, name or "", form or "", conversion == "r")
         for words, name, form, conversion in Formatter().parse(template)
     )
 
@@ -42,7 +42,7 @@ def source(language: str) -> bytes:
 
 
 @cache
-def templates(language: str) -> Mapping[str, tuple[Part, ...]]:
+def templates(language: str) -> Mapping[str, tuple[TemplatePart, ...]]:
     """The parts of each template by its code."""
     return {code: parse(template) for code, template in json.loads(source(language)).items()}
 

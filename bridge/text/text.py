@@ -7,7 +7,7 @@ from functools import lru_cache
 from math import isfinite
 from typing import Any, Final, Literal
 
-from bridge.text.templates import Part, templates
+from bridge.text.templates import TemplatePart, templates
 
 PLAIN: Final = "plain"
 """Code of words that are somebody else's: of a drive's maker, the site file, or an operating system."""
@@ -94,7 +94,7 @@ def in_english(said: Words) -> str:
     return render(said)
 
 
-def _shown(fact: Fact, part: Part, language: str) -> str:
+def _shown(fact: Fact, part: TemplatePart, language: str) -> str:
     match fact:
         case Text():
             return render(fact, language)

@@ -8,10 +8,10 @@ from typing import Final
 from asyncua.common.connection import TransportLimits
 from asyncua.server.server import Server as LibraryServer
 
-from bridge.uaserver.listener import Listener
+from bridge.uaserver.acceptor import TcpAcceptor
 from bridge.uaserver.security import CheckedPolicy, Trust
 from bridge.uaserver.selfdescription import describe
-from bridge.uaserver.session import Server
+from bridge.uaserver.session import InnerServer
 
 _CHUNK: Final = 65535
 _MOST_CHUNKS: Final = 256
@@ -20,7 +20,7 @@ _MOST_CHUNKS: Final = 256
 class BoundServer(LibraryServer):
     """asyncua's server on a socket that is bound already, with checked channels."""
 
-    def __init__(self, inner: Server, bound: socket.socket, trusted: Trust | None) -> None:
+    def __init__(self, inner: InnerServer, bound: socket.socket, trusted: Trust | None) -> None:
         super().__init__(iserver=inner)
         self._inner = inner
         self._bound = bound
@@ -32,6 +32,6 @@ class BoundServer(LibraryServer):
         policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
         await self._inner.start()
         describe(self._inner.aspace)
-        self.bserver = Listener(self._inner, self._bound, self.limits)
+        self.bserver = TcpAcceptor(self._inner, self._bound, self.limits)
         self.bserver.set_policies(policies)
         await self.bserver.start()

@@ -42,7 +42,7 @@ Monitoring = ua.MonitoringMode
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class ItemSettings:
     """Settings of a monitored item as revised. ``queue_size`` is at least 1."""
 
     client_handle: int
@@ -51,7 +51,7 @@ class Settings:
     discard_oldest: bool
 
 
-def value_settings(asked: ua.MonitoringParameters, publishing_ms: float) -> Settings:
+def value_settings(asked: ua.MonitoringParameters, publishing_ms: float) -> ItemSettings:
     """A negative sampling interval asks for the publishing interval, a queue of 0 for the newest value."""
     wanted: float = get(asked, "SamplingInterval")
     if wanted < 0:
@@ -59,14 +59,14 @@ def value_settings(asked: ua.MonitoringParameters, publishing_ms: float) -> Sett
     # `not >=` puts NaN where the least is, too.
     sampling = min(wanted, MOST_SAMPLING_MS) if wanted >= LEAST_SAMPLING_MS else LEAST_SAMPLING_MS
     size = max(1, min(get(asked, "QueueSize"), VALUE_QUEUE))
-    return Settings(get(asked, "ClientHandle"), sampling, size, get(asked, "DiscardOldest"))
+    return ItemSettings(get(asked, "ClientHandle"), sampling, size, get(asked, "DiscardOldest"))
 
 
-def event_settings(asked: ua.MonitoringParameters) -> Settings:
+def event_settings(asked: ua.MonitoringParameters) -> ItemSettings:
     """Events are not sampled; a queue of 0 or 1 asks for the server's own (Part 4 §7.21)."""
     size: int = get(asked, "QueueSize")
     size = min(size, EVENT_QUEUE) if size > 1 else EVENT_QUEUE
-    return Settings(get(asked, "ClientHandle"), 0.0, size, get(asked, "DiscardOldest"))
+    return ItemSettings(get(asked, "ClientHandle"), 0.0, size, get(asked, "DiscardOldest"))
 
 
 @dataclass(slots=True, eq=False)
@@ -77,7 +77,7 @@ class ValueItem:
     number: int
     target: ua.ReadValueId
     window: Window
-    settings: Settings
+    settings: ItemSettings
     filter: ChangeFilter
     mode: ua.MonitoringMode
     share: Hashable = None
@@ -144,7 +144,7 @@ class ValueItem:
             self._due = -math.inf
         self.mode = mode
 
-    def modify(self, settings: Settings, filter_: ChangeFilter, window: Window) -> None:
+    def modify(self, settings: ItemSettings, filter_: ChangeFilter, window: Window) -> None:
         lost = len(self.queue) - settings.queue_size
         self.settings, self.filter, self.window = settings, filter_, window
         self._due = -math.inf
@@ -175,7 +175,7 @@ class EventItem:
 
     number: int
     node: ua.NodeId
-    settings: Settings
+    settings: ItemSettings
     filter: EventFilter
     mode: ua.MonitoringMode
     share: str = ""
@@ -210,7 +210,7 @@ class EventItem:
             self._loss = None
         self.mode = mode
 
-    def modify(self, settings: Settings, filter_: EventFilter) -> None:
+    def modify(self, settings: ItemSettings, filter_: EventFilter) -> None:
         self.settings, self.filter = settings, filter_
         self._shorten(settings.queue_size)
 

@@ -26,8 +26,8 @@ from bridge.uaserver.library import (
     status,
     ua,
 )
+from bridge.uaserver.quotas import MOST_ON_ONE, EventItemQuota
 from bridge.uaserver.reading import checked_times, window
-from bridge.uaserver.shares import MOST_ON_ONE, EventItemQuota
 from bridge.uaserver.subscription import Subscription
 
 _BATCH: Final = 50

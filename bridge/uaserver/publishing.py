@@ -32,7 +32,7 @@ class PublishRequest:
     results: list[ua.StatusCode] = field(default_factory=list[ua.StatusCode])
 
 
-class Teller(Protocol):
+class PublishingSubscription(Protocol):
     """A subscription, as far as its turn is concerned."""
 
     @property
@@ -48,7 +48,7 @@ class PublishQueue:
 
     def __init__(self) -> None:
         self._requests: deque[PublishRequest] = deque()
-        self._late: dict[Teller, None] = {}
+        self._late: dict[PublishingSubscription, None] = {}
         """Subscriptions that have something to tell and nobody to tell it to, in their order."""
         self._parting: deque[ua.PublishResult] = deque()
         """Last words of subscriptions that are no longer this session's."""
@@ -66,12 +66,12 @@ class PublishQueue:
             if oldest:
                 oldest.refuse(StatusCodes.BadTooManyPublishRequests)
 
-    def ask(self, subscription: Teller, now: float) -> None:
+    def ask(self, subscription: PublishingSubscription, now: float) -> None:
         """``subscription`` has something to tell, now or as soon as a request is there."""
         self._late.setdefault(subscription)
         self._serve(now)
 
-    def forget(self, subscription: Teller) -> None:
+    def forget(self, subscription: PublishingSubscription) -> None:
         self._late.pop(subscription, None)
 
     def say_last(self, result: ua.PublishResult, now: float) -> None:

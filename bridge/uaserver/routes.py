@@ -41,7 +41,7 @@ _Act = Callable[[Session, Any], Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class ServiceRequest:
     """Request on a connection. ``send`` takes the response, ``is_open`` says whether it still can."""
 
     header: Any
@@ -62,7 +62,7 @@ class Route:
     answer: str = "Results"
     most: int = MOST_OPERATIONS
 
-    async def carry_out(self, session: Session, request: Request) -> None:
+    async def carry_out(self, session: Session, request: ServiceRequest) -> None:
         """Raises ServiceError for what is to be answered as a fault."""
         params = struct_from_binary(get(ua, f"{self.name}Parameters"), request.body)
         if self.operations:
@@ -153,7 +153,7 @@ def _limit(operations: Sequence[object] | None, most: int) -> None:
         raise ServiceError(StatusCodes.BadTooManyOperations)
 
 
-def _publish(session: Session, params: ua.PublishParameters, request: Request) -> None:
+def _publish(session: Session, params: ua.PublishParameters, request: ServiceRequest) -> None:
     acknowledged: list[ua.SubscriptionAcknowledgement] = get(params, "SubscriptionAcknowledgements") or []
     if len(acknowledged) > MOST_OPERATIONS:
         raise ServiceError(StatusCodes.BadTooManyOperations)

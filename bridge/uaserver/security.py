@@ -12,6 +12,7 @@ from cryptography.hazmat.primitives.asymmetric.padding import MGF1, OAEP
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 from cryptography.hazmat.primitives.hashes import SHA1, SHA256
 
+from bridge.uaserver.client_notices import tell
 from bridge.uaserver.library import (
     ServiceError,
     StatusCodes,
@@ -19,7 +20,6 @@ from bridge.uaserver.library import (
     get,
     ua,
 )
-from bridge.uaserver.notices import tell
 
 _LONGEST_NAME: Final = 64
 _MOST_BLOCKS: Final = 8
@@ -78,7 +78,7 @@ class CheckedPolicy:
 _NO_SECURITY: Final = "http://opcfoundation.org/UA/SecurityPolicy#None"
 
 
-class Channel(SecureConnection):
+class SecureChannel(SecureConnection):
     """asyncua's, which takes a policy or a mode that is not offered for a malformed message.
 
     ``source`` is whom the log counts it for.

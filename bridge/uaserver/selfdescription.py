@@ -27,14 +27,14 @@ from bridge.uaserver.library import (
     ua,
     variant,
 )
-from bridge.uaserver.routes import MOST_CALLS
-from bridge.uaserver.shares import (
+from bridge.uaserver.quotas import (
     MOST_ITEMS,
     MOST_ITEMS_OF_ADDRESS,
     MOST_OF_SESSION,
     MOST_SESSIONS,
     MOST_SUBSCRIPTIONS,
 )
+from bridge.uaserver.routes import MOST_CALLS
 from bridge.uaserver.where import MOST_OPERANDS
 
 _Type = ua.VariantType

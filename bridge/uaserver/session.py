@@ -18,9 +18,9 @@ from asyncua.server.internal_session import InternalSession, SessionState
 from asyncua.server.subscription_service import SubscriptionService
 
 from bridge.base.guard import Guard
-from bridge.uaserver.admission import MOST_CONNECTIONS
 from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
 from bridge.uaserver.browsing import Browser
+from bridge.uaserver.connection_limits import MOST_CONNECTIONS
 from bridge.uaserver.encoding import Results
 from bridge.uaserver.library import (
     AttributeIds,
@@ -36,8 +36,8 @@ from bridge.uaserver.library import (
 )
 from bridge.uaserver.monitoring import loop_time
 from bridge.uaserver.publishing import PublishQueue
+from bridge.uaserver.quotas import make_room
 from bridge.uaserver.reading import checked_times, window
-from bridge.uaserver.shares import make_room
 from bridge.uaserver.subscriptions import Subscriptions
 
 _LONGEST_SESSION_MS: Final = 120_000.0
@@ -57,7 +57,7 @@ class Session(InternalSession):
     """One client. ``channel_certificate`` is that of the channel the session was made on."""
 
     def __init__(
-        self, server: Server, aspace: AddressSpace, subscriptions: SubscriptionService, name: str
+        self, server: InnerServer, aspace: AddressSpace, subscriptions: SubscriptionService, name: str
     ) -> None:
         # Registered below, under a token that nobody can guess.
         super().__init__(server, aspace, subscriptions, name, User(UserRole.Anonymous), external=False)
@@ -196,7 +196,7 @@ class Session(InternalSession):
         await super().close_session(delete_subs=False)
 
 
-class Server(InternalServer):
+class InnerServer(InternalServer):
     """asyncua's inner server with our sessions, subscriptions and limits.
 
     ``application`` is set once the address space is built, before the first client is let in.

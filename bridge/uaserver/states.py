@@ -14,7 +14,7 @@ from bridge.uaserver.library import StatusCodes, ua
 from bridge.uaserver.services import request_type
 
 
-class State(Enum):
+class RequestSession(Enum):
     """Session of a connection, seen from one of its requests."""
 
     NONE = "no session on this connection"
@@ -37,15 +37,23 @@ class Need(Enum):
 
 _NOT_THIS_ONE: Final = StatusCodes.BadSessionIdInvalid
 
-REFUSALS: Final[Mapping[Need, Mapping[State, int]]] = {
+REFUSALS: Final[Mapping[Need, Mapping[RequestSession, int]]] = {
     Need.DISCOVER: {},
-    Need.CREATE: dict.fromkeys((State.CREATED, State.ACTIVATED, State.OTHER), StatusCodes.BadTooManySessions),
+    Need.CREATE: dict.fromkeys(
+        (RequestSession.CREATED, RequestSession.ACTIVATED, RequestSession.OTHER),
+        StatusCodes.BadTooManySessions,
+    ),
     # One that is not this connection's is looked up by its token, and has its own conditions.
-    Need.ACTIVATE: {State.OTHER: _NOT_THIS_ONE},
-    Need.CLOSE: dict.fromkeys((State.NONE, State.OTHER, State.ENDED, State.MOVED), _NOT_THIS_ONE),
+    Need.ACTIVATE: {RequestSession.OTHER: _NOT_THIS_ONE},
+    Need.CLOSE: dict.fromkeys(
+        (RequestSession.NONE, RequestSession.OTHER, RequestSession.ENDED, RequestSession.MOVED), _NOT_THIS_ONE
+    ),
     Need.USE: {
-        **dict.fromkeys((State.NONE, State.OTHER, State.ENDED, State.MOVED), _NOT_THIS_ONE),
-        State.CREATED: StatusCodes.BadSessionNotActivated,
+        **dict.fromkeys(
+            (RequestSession.NONE, RequestSession.OTHER, RequestSession.ENDED, RequestSession.MOVED),
+            _NOT_THIS_ONE,
+        ),
+        RequestSession.CREATED: StatusCodes.BadSessionNotActivated,
     },
 }
 """Status codes by what a service needs; it is carried out in the states that are not named."""

@@ -57,7 +57,7 @@ def terms(params: object) -> Terms:
     return Terms(interval, lifetime, keep_alive, most, get(params, "Priority"))
 
 
-class Owner(Protocol):
+class SubscriptionOwner(Protocol):
     """The session that a subscription is told to. ``holder`` is None while it has no connection; the last one
     ended at ``left_at``."""
 
@@ -88,7 +88,7 @@ class Subscription:
     pub_result_callback: object = None
     pub_request_callback: object = None
 
-    def __init__(self, number: int, owner: Owner, agreed: Terms, *, enabled: bool) -> None:
+    def __init__(self, number: int, owner: SubscriptionOwner, agreed: Terms, *, enabled: bool) -> None:
         self.number = number
         self.owner = owner
         self.terms = agreed

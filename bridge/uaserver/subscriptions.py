@@ -18,8 +18,8 @@ from bridge.base.sources import source_of
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.uaserver.monitoring import MonitoredItems, code_of, loop_time
 from bridge.uaserver.publishing import PublishRequest
-from bridge.uaserver.shares import MOST_ITEMS, MOST_SUBSCRIPTIONS, room_for_items
-from bridge.uaserver.subscription import Owner, Subscription, terms
+from bridge.uaserver.quotas import MOST_ITEMS, MOST_SUBSCRIPTIONS, room_for_items
+from bridge.uaserver.subscription import Subscription, SubscriptionOwner, terms
 
 _T = TypeVar("_T")
 
@@ -37,10 +37,10 @@ class Subscriptions:
         """The address space is complete."""
         self.items.event_types.look()
 
-    def of(self, owner: Owner) -> list[Subscription]:
+    def of(self, owner: SubscriptionOwner) -> list[Subscription]:
         return [found for found in self.subscriptions.values() if found.owner is owner]
 
-    def own(self, owner: Owner, number: int) -> Subscription:
+    def own(self, owner: SubscriptionOwner, number: int) -> Subscription:
         """Raises ServiceError where this subscription is another session's or nobody's."""
         found = self.subscriptions.get(number)
         if found is None or found.owner is not owner:
@@ -50,7 +50,9 @@ class Subscriptions:
 
     # the Subscription service set
 
-    def create(self, owner: Owner, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
+    def create(
+        self, owner: SubscriptionOwner, params: ua.CreateSubscriptionParameters
+    ) -> ua.CreateSubscriptionResult:
         self.drop_left_behind()
         if len(self.subscriptions) >= MOST_SUBSCRIPTIONS:
             raise ServiceError(StatusCodes.BadTooManySubscriptions)
@@ -60,7 +62,9 @@ class Subscriptions:
         self._begin(made)
         return change(_revised(ua.CreateSubscriptionResult(), made), SubscriptionId=made.number)
 
-    def modify(self, owner: Owner, params: ua.ModifySubscriptionParameters) -> ua.ModifySubscriptionResult:
+    def modify(
+        self, owner: SubscriptionOwner, params: ua.ModifySubscriptionParameters
+    ) -> ua.ModifySubscriptionResult:
         found = self.own(owner, get(params, "SubscriptionId"))
         before = found.terms.interval_ms
         found.modify(terms(params))
@@ -70,14 +74,16 @@ class Subscriptions:
         return _revised(ua.ModifySubscriptionResult(), found)
 
     def set_publishing_mode(
-        self, owner: Owner, params: ua.SetPublishingModeParameters
+        self, owner: SubscriptionOwner, params: ua.SetPublishingModeParameters
     ) -> list[ua.StatusCode]:
         def set_one(number: int) -> None:
             self.own(owner, number).set_enabled(get(params, "PublishingEnabled"))
 
         return [code_of(set_one, number) for number in get(params, "SubscriptionIds")]
 
-    def delete(self, owner: Owner, params: ua.DeleteSubscriptionsParameters) -> list[ua.StatusCode]:
+    def delete(
+        self, owner: SubscriptionOwner, params: ua.DeleteSubscriptionsParameters
+    ) -> list[ua.StatusCode]:
         results = [
             code_of(lambda one: self._close(self.own(owner, one)), number)
             for number in get(params, "SubscriptionIds")
@@ -94,14 +100,17 @@ class Subscriptions:
         """Subscriptions whose session has ended, the oldest first."""
         return (found for found in self.subscriptions.values() if found.owner.is_gone)
 
-    def end(self, owner: Owner, *, delete: bool) -> None:
+    def end(self, owner: SubscriptionOwner, *, delete: bool) -> None:
         """The session ends. What it leaves behind is for the same client; without one it goes, too."""
         if delete or not _is_known(owner):
             for found in self.of(owner):
                 self._close(found)
 
     def publish(
-        self, owner: Owner, acknowledged: Sequence[ua.SubscriptionAcknowledgement], request: PublishRequest
+        self,
+        owner: SubscriptionOwner,
+        acknowledged: Sequence[ua.SubscriptionAcknowledgement],
+        request: PublishRequest,
     ) -> None:
         """Acknowledge messages and have the request answered when there is something to tell."""
         for one in acknowledged:
@@ -115,15 +124,17 @@ class Subscriptions:
             raise ServiceError(StatusCodes.BadNoSubscription)
         owner.publishing.put(request, subscriptions, loop_time())
 
-    def republish(self, owner: Owner, params: ua.RepublishParameters) -> ua.NotificationMessage:
+    def republish(self, owner: SubscriptionOwner, params: ua.RepublishParameters) -> ua.NotificationMessage:
         found = self.own(owner, get(params, "SubscriptionId"))
         return found.republish(get(params, "RetransmitSequenceNumber"))
 
-    def transfer(self, owner: Owner, params: ua.TransferSubscriptionsParameters) -> list[ua.TransferResult]:
+    def transfer(
+        self, owner: SubscriptionOwner, params: ua.TransferSubscriptionsParameters
+    ) -> list[ua.TransferResult]:
         initial: bool = get(params, "SendInitialValues")
         return [self._transfer(owner, number, initial) for number in get(params, "SubscriptionIds")]
 
-    def _transfer(self, owner: Owner, number: int, initial: bool) -> ua.TransferResult:
+    def _transfer(self, owner: SubscriptionOwner, number: int, initial: bool) -> ua.TransferResult:
         found = self.subscriptions.get(number)
         if found is None:
             return make(ua.TransferResult, StatusCode=status(StatusCodes.BadSubscriptionIdInvalid))
@@ -144,7 +155,7 @@ class Subscriptions:
     # the MonitoredItem service set
 
     async def create_items(
-        self, owner: Owner, params: ua.CreateMonitoredItemsParameters
+        self, owner: SubscriptionOwner, params: ua.CreateMonitoredItemsParameters
     ) -> list[ua.MonitoredItemCreateResult]:
         def room() -> int:
             return room_for_items(owner.address, self.subscriptions.values())
@@ -196,7 +207,7 @@ class Subscriptions:
         for item in list(subscription.items.values()):
             self.items.drop(subscription, item)
 
-    def _release_requests(self, owner: Owner) -> None:
+    def _release_requests(self, owner: SubscriptionOwner) -> None:
         """Answer the Publish requests of a session without subscriptions, to which nothing can come."""
         if not self.of(owner):
             owner.publishing.refuse_all(StatusCodes.BadNoSubscription, loop_time())
@@ -212,13 +223,13 @@ def _revised(result: _T, subscription: Subscription) -> _T:
     )
 
 
-def _is_same_client(before: Owner, now: Owner) -> bool:
+def _is_same_client(before: SubscriptionOwner, now: SubscriptionOwner) -> bool:
     """Part 4 §5.14.7: the same user. Anybody can come without a name: then the same certificate."""
     if not before.identity.is_same(now.identity) or not _is_known(now):
         return False
     return not now.identity.is_anonymous or now.channel_certificate == before.channel_certificate
 
 
-def _is_known(owner: Owner) -> bool:
+def _is_known(owner: SubscriptionOwner) -> bool:
     """Whether a client can be told from others: by its name or its certificate."""
     return not owner.identity.is_anonymous or owner.channel_certificate is not None

@@ -28,9 +28,10 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from bridge.base import clock
 from bridge.base.sources import source_of
 from bridge.uaserver import decoding
-from bridge.uaserver.admission import Stage
 from bridge.uaserver.application import LoginAttempt, UserIdentity
 from bridge.uaserver.arrivals import NEVER, received_at
+from bridge.uaserver.client_notices import tell
+from bridge.uaserver.connection_limits import ConnectionStage
 from bridge.uaserver.encoding import encode
 from bridge.uaserver.library import (
     InvalidSignature,
@@ -44,13 +45,12 @@ from bridge.uaserver.library import (
     status,
     ua,
 )
-from bridge.uaserver.notices import tell
-from bridge.uaserver.routes import ROUTES, Request, Route
-from bridge.uaserver.security import Channel
+from bridge.uaserver.quotas import make_room_for_session
+from bridge.uaserver.routes import ROUTES, Route, ServiceRequest
+from bridge.uaserver.security import SecureChannel
 from bridge.uaserver.services import REFUSED, request_type
-from bridge.uaserver.session import Server, Session
-from bridge.uaserver.shares import make_room_for_session
-from bridge.uaserver.states import REFUSALS, Need, State, need_of
+from bridge.uaserver.session import InnerServer, Session
+from bridge.uaserver.states import REFUSALS, Need, RequestSession, need_of
 
 _SLOW: Final = (request_type("Write"), request_type("Call"))
 """Services that may take seconds."""
@@ -83,10 +83,10 @@ _MALFORMED: Final = (
 class Processor(UaProcessor):
     """One connection's messages."""
 
-    def __init__(self, server: Server, transport: asyncio.Transport, limits: TransportLimits) -> None:
+    def __init__(self, server: InnerServer, transport: asyncio.Transport, limits: TransportLimits) -> None:
         super().__init__(server, transport, limits)
         self._server = server
-        self._connection = Channel(self._connection.security_policy, self._limits)
+        self._connection = SecureChannel(self._connection.security_policy, self._limits)
         self._waiting: set[asyncio.Task[Any]] = set()
         self._source = source_of(str(self.name[0]) if isinstance(self.name, tuple) else str(self.name))
         self._connection.source = self._source
@@ -96,18 +96,18 @@ class Processor(UaProcessor):
         order."""
 
     @property
-    def stage(self) -> Stage:
+    def stage(self) -> ConnectionStage:
         session = self.session
         if isinstance(session, Session) and session.holder is self and session.is_activated():
-            return Stage.SESSION
+            return ConnectionStage.SESSION
         if self._connection.is_open():
-            return Stage.CHANNEL
-        return Stage.GREETED if self._was_greeted else Stage.CONNECTED
+            return ConnectionStage.CHANNEL
+        return ConnectionStage.GREETED if self._was_greeted else ConnectionStage.CONNECTED
 
     @property
     def most_bytes(self) -> int:
         """Limit for messages that wait for their turn: little as long as nobody has a session."""
-        return _MOST_UNDER_WAY if self.stage is Stage.SESSION else MOST_BEFORE_SESSION
+        return _MOST_UNDER_WAY if self.stage is ConnectionStage.SESSION else MOST_BEFORE_SESSION
 
     @property
     def _incoming(self) -> int:
@@ -121,7 +121,9 @@ class Processor(UaProcessor):
         return self._incoming + (len(answer.encoded) if answer else 0)
 
     def _begin(self) -> None:
-        most = decoding.MOST_ELEMENTS if self.stage is Stage.SESSION else decoding.MOST_BEFORE_SESSION
+        most = (
+            decoding.MOST_ELEMENTS if self.stage is ConnectionStage.SESSION else decoding.MOST_BEFORE_SESSION
+        )
         decoding.begin(most)
 
     def _check_size(self, header: Any) -> None:
@@ -300,7 +302,7 @@ class Processor(UaProcessor):
         def is_open() -> bool:
             return session.holder is self and not self._transport.is_closing()
 
-        await route.carry_out(session, Request(requesthdr, body, send, is_open))
+        await route.carry_out(session, ServiceRequest(requesthdr, body, send, is_open))
         return True
 
     async def close(self) -> None:
@@ -330,22 +332,22 @@ class Processor(UaProcessor):
             tell("refused channels", self._source, "a session on one without security, which is not offered")
             raise ServiceError(StatusCodes.BadSecurityPolicyRejected)
         state = self._state(requesthdr)
-        if state in (State.ENDED, State.MOVED):
+        if state in (RequestSession.ENDED, RequestSession.MOVED):
             self.session = None
         if state in REFUSALS[need]:
             raise ServiceError(REFUSALS[need][state])
 
-    def _state(self, requesthdr: Any) -> State:
+    def _state(self, requesthdr: Any) -> RequestSession:
         session = self.session
         if not isinstance(session, Session):
-            return State.NONE
+            return RequestSession.NONE
         if session.holder is not self:
-            return State.MOVED  # and this one has lost it (Part 4 §5.6.3)
+            return RequestSession.MOVED  # and this one has lost it (Part 4 §5.6.3)
         if session.state is SessionState.Closed:
-            return State.ENDED
+            return RequestSession.ENDED
         if requesthdr.AuthenticationToken != session.auth_token:
-            return State.OTHER
-        return State.ACTIVATED if session.is_activated() else State.CREATED
+            return RequestSession.OTHER
+        return RequestSession.ACTIVATED if session.is_activated() else RequestSession.CREATED
 
     def _is_secured(self) -> bool:
         return self._connection.security_policy.Mode is not ua.MessageSecurityMode.None_

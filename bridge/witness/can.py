@@ -21,7 +21,7 @@ _AGE_MOST_S: Final = 1.0
 meanwhile."""
 
 
-class Listener:
+class CanSocket:
     """Frames with these identifiers on ``channel``. Raises OSError where there is no such interface."""
 
     def __init__(self, channel: str, can_ids: Sequence[int]) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final
 from xml.etree import ElementTree
 
-from bridge.witness.modules import Sections, plug
+from bridge.witness.plugged_modules import Sections, plug
 
 At = tuple[int, int]
 """Index and sub-index."""
@@ -33,7 +33,7 @@ class Unreadable(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class DictionaryEntry:
     """One object, or one element of it. ``data_type`` is its code (CiA 301 §7.4.7), ``number`` what it holds
     as far as the file says; ``is_configured`` where that is a ParameterValue."""
 
@@ -44,11 +44,11 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Description:
+class ObjectDictionary:
     """``entries`` by index and sub-index; ``names`` of the objects that have elements, by index;
     ``by_modules`` are the elements that plugged modules bring and that an RPDO may set."""
 
-    entries: Mapping[At, Entry]
+    entries: Mapping[At, DictionaryEntry]
     names: Mapping[int, str]
     by_modules: frozenset[At] = frozenset()
 
@@ -62,7 +62,7 @@ class Description:
         return entry.name if entry.name.lower().startswith(whole.lower()) else f"{whole} {entry.name}"
 
 
-def describe(content: bytes, node_id: int, modules: Sequence[str] = ()) -> Description:
+def describe(content: bytes, node_id: int, modules: Sequence[str] = ()) -> ObjectDictionary:
     """Description of the node with this id and these modules. Raises ``Unreadable``."""
     text = _decoded(content)
     is_xml = text.lstrip().startswith("<")
@@ -72,7 +72,7 @@ def describe(content: bytes, node_id: int, modules: Sequence[str] = ()) -> Descr
         raise Unreadable("describes no objects")
     parts = {index for index, sub in sections if sub is not None}
     names = {index: sections.get((index, None), {}).get("parametername", "") for index in parts}
-    entries: dict[At, Entry] = {}
+    entries: dict[At, DictionaryEntry] = {}
     for (index, sub), keys in sections.items():
         if sub is not None or index not in parts:
             kind = keys.get("datatype") or sections.get((index, None), {}).get("datatype")
@@ -80,8 +80,8 @@ def describe(content: bytes, node_id: int, modules: Sequence[str] = ()) -> Descr
             given = keys.get("parametervalue", "")
             number = _number(given or keys.get("defaultvalue", ""), node_id)
             name = keys.get("parametername", "")
-            entries[index, sub or 0] = Entry(name, _number(kind, node_id), number, bool(given))
-    return Description(entries, names, by_modules)
+            entries[index, sub or 0] = DictionaryEntry(name, _number(kind, node_id), number, bool(given))
+    return ObjectDictionary(entries, names, by_modules)
 
 
 def _decoded(content: bytes) -> str:

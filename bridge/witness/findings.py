@@ -15,7 +15,7 @@ class Cause(StrEnum):
     DRIVE = "drive by itself"
 
 
-class Kind(StrEnum):
+class AlarmKind(StrEnum):
     """Kind of alarm."""
 
     LATE = "late"
@@ -53,7 +53,7 @@ class Alarm:
     outputs, a bus."""
 
     source: str
-    kind: Kind
+    kind: AlarmKind
     time: float
     message: str
 

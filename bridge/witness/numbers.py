@@ -25,7 +25,7 @@ _QUESTIONS: Final = ((_READ_HOLDING, TIMEOUT_REGISTER), (_READ_INPUTS, NUMBER_RE
 """Questions, that for the number last: its answer completes the reading."""
 
 
-class Reading(NamedTuple):
+class UnitReading(NamedTuple):
     """Reading of one drive's unit. ``timeout_ms`` is None where it was not answered."""
 
     unit: int
@@ -125,7 +125,7 @@ class Numbers:
         self._asked = {(function, unit): now for unit, function, _ in self._questions}
         self._asked_at = now
 
-    def receive(self, now: float) -> list[Reading]:
+    def receive(self, now: float) -> list[UnitReading]:
         """Readings completed by the answers received since the last call."""
         if self._socket is None:
             return []
@@ -142,7 +142,7 @@ class Numbers:
             self._give_up(now, ended)
             return []
         self._buffer += data
-        readings: list[Reading] = []
+        readings: list[UnitReading] = []
         while len(self._buffer) >= _HEADER.size:
             _, _, length, unit = _HEADER.unpack_from(self._buffer)
             end = 6 + length
@@ -155,7 +155,7 @@ class Numbers:
                 readings.append(reading)
         return readings
 
-    def _reading(self, unit: int, pdu: bytes, now: float) -> Reading | None:
+    def _reading(self, unit: int, pdu: bytes, now: float) -> UnitReading | None:
         function = pdu[0] & 0x7F if pdu else 0
         asked = self._asked.pop((function, unit), None)
         if asked is None:
@@ -169,7 +169,7 @@ class Numbers:
         if function == _READ_HOLDING:
             self._timeouts_ms[unit] = value
             return None
-        return Reading(unit, value, self._timeouts_ms.get(unit), asked, now)
+        return UnitReading(unit, value, self._timeouts_ms.get(unit), asked, now)
 
 
 def _text(error: OSError) -> str:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from bridge.config import BusTable, NodeTable, SafeValue
-from bridge.witness.description import At, Description, Unreadable, describe
+from bridge.witness.description import At, ObjectDictionary, Unreadable, describe
 
 _RPDOS, _TPDOS = (0x1400, 0x1600), (0x1800, 0x1A00)
 _MOST_PDOS: Final = 512
@@ -159,18 +159,18 @@ def output_frames(bus: BusTable, node: NodeTable, folder: Path) -> OutputFrames 
 # a device description
 
 
-def _described(path: Path, node_id: int, modules: Sequence[str] = ()) -> Description:
+def _described(path: Path, node_id: int, modules: Sequence[str] = ()) -> ObjectDictionary:
     try:
         return describe(path.read_bytes(), node_id, modules)
     except Unreadable as error:
         raise Unreadable(f"{path}: {error}") from None
 
 
-def _numbers(description: Description) -> dict[At, int]:
+def _numbers(description: ObjectDictionary) -> dict[At, int]:
     return {at: one.number for at, one in description.entries.items() if one.number is not None}
 
 
-def _described_outputs(description: Description, node: NodeTable) -> dict[At, _Output]:
+def _described_outputs(description: ObjectDictionary, node: NodeTable) -> dict[At, _Output]:
     """Outputs by object: those that RPDOs carry, also RPDOs that are off, and those that modules bring for
     them. All of them have names."""
     carried: list[At] = []

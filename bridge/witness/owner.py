@@ -20,7 +20,7 @@ _COUNTED: Final = 1 << 16
 """Modulus of the telegrams' numbers."""
 
 
-class Owner:
+class WatchedOwner:
     """One owner. ``timeout_ms`` and ``beside_ms`` are those of ``WatchedDrive``."""
 
     def __init__(self, name: str, timeout_ms: int, beside_ms: int | None) -> None:

@@ -43,7 +43,7 @@ _NUMBERS: Final = {base + 0x100 * place: place + 1 for base in (0x180, 0x200) fo
 
 
 @dataclass(frozen=True, slots=True)
-class Word:
+class EnableWord:
     """A word in a PDO, and the bits by which it says "enabled"."""
 
     byte: int
@@ -85,8 +85,8 @@ class WatchedDrive:
     unit_id: int
     rpdo: int
     tpdo: int
-    control: Word
-    status: Word
+    control: EnableWord
+    status: EnableWord
     timeout_ms: int
     beside_ms: int | None
     silent_ms: int
@@ -261,8 +261,8 @@ def _drive(
         unit_id=unit_id,
         rpdo=_cob_id(table.rpdo, slot["rpdo"], node.id),
         tpdo=_cob_id(table.tpdo, slot["tpdo"], node.id),
-        control=Word(**family["control"]),
-        status=Word(**family["status"]),
+        control=EnableWord(**family["control"]),
+        status=EnableWord(**family["status"]),
         timeout_ms=timeout_ms or 0,
         beside_ms=beside_ms if is_watched else None,
         silent_ms=own_ms + tpdo_ms if own_ms else 0,

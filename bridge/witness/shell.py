@@ -6,11 +6,11 @@ import select
 import time
 from collections.abc import Callable, Sequence
 
-from bridge.witness.can import Listener
+from bridge.witness.bus_judge import BusJudge
+from bridge.witness.can import CanSocket
 from bridge.witness.findings import Finding
 from bridge.witness.numbers import Numbers
 from bridge.witness.plan import WatchedBus
-from bridge.witness.watch import Watch
 
 _TICK_S = 0.05
 
@@ -30,7 +30,7 @@ class Witness:
     ) -> None:
         self._numbers = numbers
         self._tell = tell
-        self._lines: list[tuple[Listener, Watch]] = []
+        self._lines: list[tuple[CanSocket, BusJudge]] = []
         self._places = {
             one.unit_id: (place, one.name)
             for place, bus in enumerate(buses)
@@ -38,9 +38,9 @@ class Witness:
         }
         failures: list[str] = []
         for bus in buses:
-            watch = Watch(bus, asks=numbers is not None)
+            watch = BusJudge(bus, asks=numbers is not None)
             try:
-                self._lines.append((Listener(bus.channel, watch.identifiers), watch))
+                self._lines.append((CanSocket(bus.channel, watch.identifiers), watch))
             except OSError as error:
                 failures.append(f"cannot listen on {bus.channel}: {error.strerror or error}")
         if failures:

@@ -9,9 +9,9 @@ It knows no key layout: both the zenoh server and the link between our processes
 
 from bridge.zenohlink.incoming_query import IncomingQuery
 from bridge.zenohlink.link import ZenohLink
-from bridge.zenohlink.message import Answer, Message
+from bridge.zenohlink.message import GetReply, Sample
 from bridge.zenohlink.pace import Pace
 from bridge.zenohlink.publishers import Value
-from bridge.zenohlink.settings import zenoh_config
+from bridge.zenohlink.zenoh_config import zenoh_config
 
-__all__ = ["Answer", "IncomingQuery", "Message", "Pace", "Value", "ZenohLink", "zenoh_config"]
+__all__ = ["GetReply", "IncomingQuery", "Pace", "Sample", "Value", "ZenohLink", "zenoh_config"]

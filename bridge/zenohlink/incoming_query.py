@@ -12,7 +12,7 @@ from typing import Protocol
 import zenoh
 
 from bridge.zenohlink.lane import Lane
-from bridge.zenohlink.message import Message
+from bridge.zenohlink.message import Sample
 from bridge.zenohlink.worker import ZENOH_ERRORS
 
 
@@ -50,7 +50,7 @@ class IncomingQuery:
         for a client that does not read."""
         return replace(self, _lane=self._link.own_lane(self._lane), _is_apart=True)
 
-    def send(self, messages: Sequence[Message]) -> None:
+    def send(self, messages: Sequence[Sample]) -> None:
         """With the present time stamp: what is published later counts as newer, whenever this is sent."""
         try:
             stamp = self._lane.session.new_timestamp()
@@ -75,7 +75,7 @@ class IncomingQuery:
             self._lane.end()
 
 
-def _reply(query: zenoh.Query, messages: Sequence[Message], stamp: zenoh.Timestamp) -> None:
+def _reply(query: zenoh.Query, messages: Sequence[Sample], stamp: zenoh.Timestamp) -> None:
     """``stamp``: if a storage has another sample of the key, the client's zenoh takes the newer one, and one
     without a time counts as the oldest."""
     for message in messages:

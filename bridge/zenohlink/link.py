@@ -17,9 +17,9 @@ import zenoh
 from bridge.base.errors import OperationFailed, Unavailable
 from bridge.zenohlink.incoming_query import IncomingQuery
 from bridge.zenohlink.lane import LIMIT, Job, Lane
-from bridge.zenohlink.message import Answer, Message, sentence
+from bridge.zenohlink.message import GetReply, Sample, sentence
 from bridge.zenohlink.publishers import Publishers, Readers, Value
-from bridge.zenohlink.worker import Inbox, Worker
+from bridge.zenohlink.worker import CallQueue, Worker
 
 Result = TypeVar("Result")
 
@@ -29,7 +29,7 @@ _PUTS_AT_ONCE: Final = 100
 """Puts made before another job gets its turn: with a stalled subscriber each takes up to 1 ms."""
 
 Share = Callable[[str, bytes | None], str]
-"""The share of the ``Inbox`` in which a query or sample waits, by key and payload."""
+"""The share of the ``CallQueue`` in which a query or sample waits, by key and payload."""
 
 
 def _one_for_all(key: str, payload: bytes | None) -> str:
@@ -82,7 +82,7 @@ class ZenohLink:
         Raises Unavailable with the reason if zenoh refuses.
         """
         self._loop = asyncio.get_running_loop()
-        self._inbox = Inbox()
+        self._inbox = CallQueue()
         self._opened: asyncio.Future[Exception | None] = self._loop.create_future()
         self._closed: asyncio.Future[None] = self._loop.create_future()
         self._worker.start()
@@ -142,7 +142,7 @@ class ZenohLink:
             self.is_publishing = False
         return self.is_publishing
 
-    def send(self, message: Message) -> bool:
+    def send(self, message: Sample) -> bool:
         """Publish each message in order. False: there was no room, the message is dropped."""
         return self.submit(lambda session: _publish(session, message))
 
@@ -171,9 +171,9 @@ class ZenohLink:
         *,
         timeout_s: float = 2.0,
         attachment: bytes | None = None,
-    ) -> list[Answer]:
+    ) -> list[GetReply]:
         """The replies to a query; none if nobody answers within ``timeout_s``."""
-        answers: list[Answer] = []
+        answers: list[GetReply] = []
         done: asyncio.Future[None] = self._loop.create_future()
 
         def on_reply(reply: zenoh.Reply) -> None:
@@ -250,7 +250,7 @@ class ZenohLink:
     def declare_subscriber(
         self,
         key: str,
-        handler: Callable[[Message], None],
+        handler: Callable[[Sample], None],
         share: Share = _one_for_all,
         *,
         from_others: bool = False,
@@ -329,7 +329,7 @@ def _resolve(future: asyncio.Future[Result], result: Result) -> None:
         future.set_result(result)
 
 
-def _publish(session: zenoh.Session, message: Message) -> None:
+def _publish(session: zenoh.Session, message: Sample) -> None:
     """Never waits for a peer that does not read: that peer loses the message."""
     session.put(
         message.key,
@@ -340,17 +340,17 @@ def _publish(session: zenoh.Session, message: Message) -> None:
     )
 
 
-def _to_answer(reply: zenoh.Reply) -> Answer:
+def _to_answer(reply: zenoh.Reply) -> GetReply:
     result = reply.result
     if isinstance(result, zenoh.Sample):
-        return Answer(True, _to_message(result))
-    return Answer(False, Message("", result.payload.to_bytes(), str(result.encoding)))
+        return GetReply(True, _to_message(result))
+    return GetReply(False, Sample("", result.payload.to_bytes(), str(result.encoding)))
 
 
-def _to_message(sample: zenoh.Sample) -> Message:
+def _to_message(sample: zenoh.Sample) -> Sample:
     attachment, source = _to_bytes(sample.attachment), _source(sample.source_info)
     payload, encoding = sample.payload.to_bytes(), str(sample.encoding)
-    return Message(str(sample.key_expr), payload, encoding, attachment, time.monotonic(), source)
+    return Sample(str(sample.key_expr), payload, encoding, attachment, time.monotonic(), source)
 
 
 def _source(info: zenoh.SourceInfo | None) -> str:

@@ -10,7 +10,7 @@ _SOURCE_PLACE: Final = re.compile(r"\s+at /\S+?\.rs:\d+\.?")
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class Sample:
     """A payload with its key, sent or received. ``encoding`` is zenoh's name for it; ``received_at`` is in
     monotonic seconds; ``source`` is the id of the sender's zenoh session, where it gives it, not proved."""
 
@@ -23,11 +23,11 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class GetReply:
     """One reply to a ``get``; if ``ok`` is False, the payload says why."""
 
     ok: bool
-    message: Message
+    message: Sample
 
 
 def sentence(error: Exception) -> str:

@@ -14,7 +14,7 @@ _SO_DOMAIN: Final = 39
 """Constant of asm-generic/socket.h; Python's socket module has no name for it."""
 
 
-class Connections:
+class TcpConnections:
     """The TCP connections of this process that are made to wait when they are closed: zenoh's.
 
     zenoh has ``close`` wait for 10 s until the peer has read everything (SO_LINGER, socket(7)), on one of the

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Final
 
 PATIENCE_S: Final = 2.0
-"""Longer than a connection may take to become a session (``settings.py``)."""
+"""Longer than a connection may take to become a session (``zenoh_config.py``)."""
 _MORE: Final = re.compile(r"%[^\]]*|[?#].*")
 
 

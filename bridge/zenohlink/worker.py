@@ -23,7 +23,7 @@ import zenoh
 from bridge.base.ratelimit import Pauses
 from bridge.zenohlink.lane import Job, Lane
 from bridge.zenohlink.message import sentence
-from bridge.zenohlink.sockets import Connections
+from bridge.zenohlink.sockets import TcpConnections
 from bridge.zenohlink.strangers import Strangers
 
 _log = logging.getLogger(__name__)
@@ -79,7 +79,7 @@ class Worker:
         self.subscribers: dict[str, Declared] = {}
         self._config = config
         self._on_strangers = on_strangers
-        self._connections = Connections()
+        self._connections = TcpConnections()
         self._strangers = Strangers()
         self._look_at = time.monotonic()
         self._opened = opened
@@ -203,7 +203,7 @@ class Worker:
             self.complain(error)
 
 
-class Inbox:
+class CallQueue:
     """Calls that other threads hand over to be made in the loop. Belongs to the loop it is created in.
 
     Calls of one share keep their order; shares take turns, so that a full one delays no other.

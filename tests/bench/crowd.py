@@ -13,8 +13,8 @@ from pathlib import Path
 from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.frame import Frame
 from bridge.catalogue import Catalogue
-from bridge.command import Event, Kind, Plant
-from bridge.command.link import NodeState
+from bridge.command import Event, EventKind, Plant
+from bridge.command.drive_link import NodeState
 from bridge.master.master import Master
 from bridge.master.network import Network
 from tests.bench.figures import as_the_service, lateness, show
@@ -107,7 +107,7 @@ async def measure(running: AbstractAsyncContextManager[Crowd]) -> tuple[int, int
             begin, wall, spent = time.monotonic(), time.time(), time.process_time()
             await asyncio.sleep(MEASURED_S)
             took_s, spent = time.monotonic() - begin, time.process_time() - spent
-            told = [event.message for event in nodes.events if event.kind is Kind.NODE_LOST]
+            told = [event.message for event in nodes.events if event.kind is EventKind.NODE_LOST]
             syncs, sent = await nodes.end()
     sent, heard = (sum(at > begin for at in times) for times in (sent, nodes.network.heard))
     syncs = [at for at in syncs if wall <= at < wall + took_s]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bridge.eds.model import Report
-from bridge.eds.text import decode
+from bridge.eds.text_file import decode
 from tests.support.eds_dialects import in_every_dialect
 from tests.support.foreign import Result, served, table
 from tests.support.process import REPOSITORY

@@ -13,7 +13,7 @@ from bridge.can.burstend import Burst, BurstEnd
 from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.frame import Frame
 from bridge.canopen.sync import burst_length
-from bridge.zenohlink.sockets import Connections
+from bridge.zenohlink.sockets import TcpConnections
 from tests.support.sniffer import sniffing
 
 DEADMAN_MS = 100
@@ -136,5 +136,5 @@ def test_zenohs_look_at_the_sockets_leaves_no_copy_of_the_manager() -> None:
     with manager, socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW):
         manager.connect(("vcan0",))
         before = len(list(Path("/proc/self/fd").iterdir()))
-        Connections().settle()
+        TcpConnections().settle()
         assert len(list(Path("/proc/self/fd").iterdir())) == before

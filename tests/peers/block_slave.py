@@ -11,7 +11,7 @@ import struct
 import sys
 
 from bridge.sim.core.dictionary import Dictionary, Domain
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 
 FRAME = struct.Struct("=IB3x8s")
 OBJECT = 0x1F20
@@ -32,7 +32,7 @@ def main(channel: str, node_id: int) -> None:
     value = Value()
     objects = Dictionary()
     objects.add(OBJECT, 0, Domain(4096, value.get, value.set))
-    server = SdoServer(objects, block_segments=50)
+    server = SimulatedSdoServer(objects, block_segments=50)
     unheard, unsent = True, True
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as bus:
         bus.setsockopt(

@@ -18,9 +18,9 @@ from bridge.cli import logs
 from bridge.cli.simulation import simulated_nodes
 from bridge.config import BusTable
 from bridge.project import load_project
-from bridge.service.bus_process import Service
+from bridge.service.bus_process import BusProcess
 from bridge.sim.nord.nord_tu4 import NordTu4
-from bridge.sim.shell import Simulation
+from bridge.sim.runner import Simulation
 
 
 class Plant(asyncio.DatagramProtocol):
@@ -84,7 +84,7 @@ class Plant(asyncio.DatagramProtocol):
 
 async def main(site: Path, port: int) -> None:
     plant = Plant(site)
-    service = Service(plant.project, plant.bus)
+    service = BusProcess(plant.project, plant.bus)
     await asyncio.get_running_loop().create_datagram_endpoint(lambda: plant, ("127.0.0.1", port))
     async with asyncio.TaskGroup() as tasks:
         for one in plant.simulations:

@@ -18,10 +18,10 @@ from bridge.can.virtual import VirtualWire
 from bridge.cli import logs
 from bridge.command import Plant
 from bridge.image import DataType
-from bridge.northbound.page.describe import layout_of
+from bridge.northbound.page.site_description import layout_of
 from bridge.northbound.page.topics import topics_of
 from bridge.project import load_project
-from bridge.service.bus_process import Service
+from bridge.service.bus_process import BusProcess
 
 LIVE = 500
 SLOW_HZ, FAST_HZ = 5, 20
@@ -56,7 +56,7 @@ async def fast(plant: Plant, names: list[str]) -> None:
 
 async def main(path: Path) -> None:
     project = load_project(path)
-    service = Service(project, lambda table: VirtualWire().end(table.name))
+    service = BusProcess(project, lambda table: VirtualWire().end(table.name))
     plant = service.plant
     points = plant.image.points
     layout = layout_of(plant.image.points, plant.catalogue)

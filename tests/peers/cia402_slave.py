@@ -11,7 +11,7 @@ import sys
 
 from bridge.can import open_bus
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.shell import Simulation
+from bridge.sim.runner import Simulation
 
 
 async def main(channel: str, node_id: int, bitrate: int) -> None:

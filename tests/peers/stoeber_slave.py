@@ -10,7 +10,7 @@ import signal
 import sys
 
 from bridge.can import open_bus
-from bridge.sim.shell import Simulation
+from bridge.sim.runner import Simulation
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 
 

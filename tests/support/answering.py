@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from typing import TypeVar
 
-from bridge.canopen.dialogue import Read, Write
+from bridge.canopen.dialogue import SdoRead, SdoWrite
 from bridge.canopen.sdo import SdoError
 
 T = TypeVar("T")
@@ -33,14 +33,14 @@ class Answering:
             answer = self._answer(asked)
 
     def _answer(self, asked: object) -> bytes | SdoError | None:
-        if isinstance(asked, Read):
+        if isinstance(asked, SdoRead):
             key = asked.index, asked.sub
             self.reads.append(key)
             if key in self.silent:
                 return SdoError(*key, 0x0504_0000, by_server=False)
             data = self.objects.get(key)
             return SdoError(*key, NO_OBJECT, by_server=True) if data is None else data
-        if isinstance(asked, Write):
+        if isinstance(asked, SdoWrite):
             key = asked.index, asked.sub
             if key in self.refused:
                 return SdoError(*key, NO_OBJECT, by_server=True)

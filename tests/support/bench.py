@@ -17,9 +17,9 @@ from bridge.catalogue import Catalogue
 from bridge.command import Action, Event, Identity, Outcome, Plant, PlantView, Request, Source, command_of
 from bridge.config import Site, load_site
 from bridge.mapping import Family, load_family
-from bridge.master.listening import Listening, listen_s
 from bridge.master.master import Master
 from bridge.master.network import Network
+from bridge.master.standby import Standby, listen_s
 from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support import sites
 
@@ -135,7 +135,7 @@ class Bench:
         self.plant.on_event(self.events.append)
         self.bus = self.make_bus()
         # Most tests begin where the bridge has listened already.
-        listening = Listening(listen_s(site.bus[0]) if listens else 0.0, lambda: 0.0)
+        listening = Standby(listen_s(site.bus[0]) if listens else 0.0, lambda: 0.0)
         self.network = Network(site.bus[0], self.plant.side_of(site.bus[0]), epoch_ns, listening=listening)
         self.master = Master([(self.bus, self.network)], self.plant, self.clock)
         self.view = PlantView(self.plant, self.clock, epoch_ns, self.master.carry_out, self.master.wake)

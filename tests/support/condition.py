@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from bridge.condition.layout import layout_of
 from bridge.condition.own_faults import with_faults
+from bridge.condition.plant_layout import layout_of
 from bridge.condition.told import recent_json, troubles_json
 from bridge.condition.troubles import Troubles
 from bridge.image import Image, Quality, Value

@@ -8,7 +8,7 @@ from pathlib import Path
 import canopen
 
 from bridge.eds import Description, Entry
-from bridge.sim.core.dictionary import Number, Text
+from bridge.sim.core.dictionary import Number, VisibleString
 
 Find = Callable[[int, int], object]
 """The simulated node's object of this index and subindex."""
@@ -34,7 +34,7 @@ def compare_types_and_access(listed: Iterable[Entry], find: Find, *, static: boo
     for entry in listed:
         node = find(entry.index, entry.sub)
         assert entry.data_type
-        if isinstance(node, Text):
+        if isinstance(node, VisibleString):
             assert entry.data_type.name == "VISIBLE_STRING"
             continue
         assert isinstance(node, Number)

@@ -17,14 +17,14 @@ from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.mapping import Family, load_family
 from bridge.project import load_project
-from bridge.service.bus_process import Service
+from bridge.service.bus_process import BusProcess
 from bridge.sim.catalogue import simulate_node
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.core.device import SimulatedDevice
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.lenze.lenze_motec import LenzeMotec
 from bridge.sim.nord.nord_single import NordSingle
 from bridge.sim.nord.nord_tu4 import NordTu4
-from bridge.sim.shell import Simulation
+from bridge.sim.runner import Simulation
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from tests.support import sites
 from tests.support.process import free_port, until
@@ -111,7 +111,7 @@ class FamilyBridge:
     async def _serve(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._work = asyncio.current_task()
-        self.service = Service(self._project, self._open_bus)
+        self.service = BusProcess(self._project, self._open_bus)
         assert self._simulation
         playing = asyncio.create_task(self._simulation.run())
         try:

@@ -11,10 +11,10 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import Result as SdoResult
 from bridge.canopen.sdo import SdoChannel
 from bridge.canopen.sdo_transfer import SdoError
-from bridge.derive.axes import axes_of
+from bridge.derive.axis_descriptions import axes_of
 from bridge.eds import Description, Entry, read_whole_device_file
 from bridge.image import Quality
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.generic.generic_eds import plan_of_description
 from bridge.sim.generic.generic_node import GenericNode
 from tests.support.invented_eds import NODE_ID, DerivedBench
@@ -66,7 +66,7 @@ def served(folder: Path, name: str, content: bytes) -> Result:
     except BridgeError as error:
         return result("mapping", str(error))
     status = str(bench.value("conveyor/node/boot_status"))
-    if bench.generic.slave.state is not NmtState.OPERATIONAL:
+    if bench.generic.slave.state is not SlaveState.OPERATIONAL:
         return result("boot", status)
     bad = list(_not_served(bench))
     return result("serve", f"{'; '.join(bad[:_MOST_SHOWN])}: {status}") if bad else result("served")
@@ -94,7 +94,7 @@ def simulated(description: Description) -> list[str]:
     booted = [frame.can_id for frame in node.take_frames()]
     unlike = [] if 0x700 + NODE_ID in booted else ["it does not report itself"]
     node.on_frame(Frame(0, bytes((1, NODE_ID))), 0.0)
-    if node.slave.state is not NmtState.OPERATIONAL:
+    if node.slave.state is not SlaveState.OPERATIONAL:
         unlike.append("it cannot be started")
     return [*unlike, *_objects_unlike(node, description)]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from bridge.mapping.site import load_site_and_families
+from bridge.mapping.site_families import load_site_and_families
 from tests.support.bench import Bench
 from tests.support.pdo_node import PdoNode
 

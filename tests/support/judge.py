@@ -9,13 +9,13 @@ from bridge.command.stop_check.event import (
     NodeOperational,
     NodeRestarted,
     NodeStopped,
-    Pause,
-    Report,
     Sends,
-    Telegram,
-    Time,
+    StatusChange,
+    TelegramGap,
+    TelegramHeard,
+    TimePassed,
 )
-from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopState, Verdict
+from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopState, StopVerdict
 from bridge.command.stop_check.step import next_deadline, step
 
 
@@ -70,16 +70,16 @@ class Judge:
         self._step(NodeRestarted())
 
     def on_pause(self, at: float) -> None:
-        self._step(Pause(at))
+        self._step(TelegramGap(at))
 
     def on_report(self, says: Says, at: float) -> None:
-        self._step(Report(says, at))
+        self._step(StatusChange(says, at))
 
     def on_telegram(self, at: float, speed: float | None) -> None:
-        self._step(Telegram(at, speed))
+        self._step(TelegramHeard(at, speed))
 
-    def on_time(self, now: float, heard_at: float | None, pause_s: float | None) -> list[Verdict]:
-        self.stop, verdicts = step(self.stop, Time(now, heard_at, pause_s))
+    def on_time(self, now: float, heard_at: float | None, pause_s: float | None) -> list[StopVerdict]:
+        self.stop, verdicts = step(self.stop, TimePassed(now, heard_at, pause_s))
         return list(verdicts)
 
     def _step(self, event: Event) -> None:

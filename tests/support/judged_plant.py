@@ -5,7 +5,7 @@ from __future__ import annotations
 from bridge.command import Action, Event, Request, command_of
 from bridge.command.audit import AuditEntry
 from bridge.command.drive import Drive
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.stop_check.state import LastStop
 from bridge.image import Value
 from bridge.text import Text

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from bridge.command import Action, Command, Do, Identity, Outcome, Request, Source, Write
+from bridge.command.leg.draft import Draft
 from bridge.command.leg.effect import Answer, Effect, Tell
-from bridge.command.leg.event import Event, NodeBack, Report, Time
+from bridge.command.leg.event import Event, NodeBack, StatusReport, Time
 from bridge.command.leg.outlook import next_deadline
 from bridge.command.leg.settings import LegSettings, leg_settings
 from bridge.command.leg.state import WANTS_STOP_WORD, Way
 from bridge.command.leg.step import initial, step
-from bridge.command.leg.turn import Turn
 from bridge.command.messages.life_sign import LifeSign
 from bridge.command.messages.telegram import TelegramDecoder
 from bridge.config import DriveTable
@@ -56,9 +56,9 @@ class Leg:
 
     # the drive and its node
 
-    def says(self, state: DriveState, after_s: float = 0.0, *, is_taken: bool = False) -> int:
+    def says(self, state: DriveState, after_s: float = 0.0, *, is_acknowledged: bool = False) -> int:
         self.now += after_s
-        return self.happens(Report(state, is_taken, "it says so"))
+        return self.happens(StatusReport(state, is_acknowledged, "it says so"))
 
     def restarts(self) -> int:
         """The node has restarted: what the owner wants stays, behind the interlock."""
@@ -143,8 +143,8 @@ def running_nord(**given: object) -> Leg:
     return leg
 
 
-def turn_of(leg: Leg, at: float | None = None) -> Turn:
-    return Turn(leg.settings, leg.state, leg.now if at is None else at)
+def draft_of(leg: Leg, at: float | None = None) -> Draft:
+    return Draft(leg.settings, leg.state, leg.now if at is None else at)
 
 
 def told(effects: list[Effect]) -> list[Any]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from bridge.command.leg.state import BLOCKED, REACTING, RESTS, LegState, Motion
-from bridge.command.leg.words import at_rest
+from bridge.command.leg.word_table import at_rest
 from bridge.drive import ControlWords, DriveState
 from tests.support.leg_seen import Seen
 from tests.support.leg_time import State
@@ -35,9 +35,9 @@ class Forgetting:
         if not leg.way.is_open and seen.is_heard:
             # It has to be heard anew.
             leg, seen = leg._replace(way=leg.way._replace(is_heard=False)), seen._replace(is_heard=False)
-        if leg.drive is not DriveState.OPERATION_ENABLED and seen.is_taken:
+        if leg.drive is not DriveState.OPERATION_ENABLED and seen.is_acknowledged:
             # It says so anew with its next state.
-            leg, seen = leg._replace(is_taken=False), seen._replace(is_taken=False)
+            leg, seen = leg._replace(is_acknowledged=False), seen._replace(is_acknowledged=False)
         return self._words_of(leg), seen
 
     def _words_of(self, leg: LegState) -> LegState:

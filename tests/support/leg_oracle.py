@@ -172,7 +172,7 @@ class Oracle(Model):
         assert silent is (until == self.deadline and rules.mutes_after_s == 0 and self.watches)
 
     def _check_handshake(self, is_up: bool) -> None:
-        now, taken = self.now, self.is_taken
+        now, taken = self.now, self.is_acknowledged
         commanded = self.sends and self.says == "enabled" and self.is_heard
         if not self.may_enable:
             self._forget()

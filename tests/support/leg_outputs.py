@@ -8,15 +8,15 @@ from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 from bridge.command import Action, Do, Outcome, Request, Write
+from bridge.command.drive_link import NodeState
 from bridge.command.leg.event import BridgeGap, Event, StartAnew, Time
 from bridge.command.leg.state import LegState
-from bridge.command.link import NodeState
 from bridge.command.messages.request import STOP_ACTIONS
 from bridge.command.output_words import OutputWords
 from bridge.command.outputs import OutputChannel
 from bridge.config import OutputsTable, SafeValue
 from bridge.image import Value
-from bridge.mapping.device import Output
+from bridge.mapping.device_signals import Output
 from tests.support.leg_requests import OPERATOR, OTHER_PLC, PLC
 from tests.support.leg_seen import Seen, Times
 from tests.support.leg_time import NOW, ahead, come, timeless

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from time import process_time
 from typing import Any, Final
 
-from bridge.command.leg.event import NodeBack, Report
+from bridge.command.leg.event import NodeBack, StatusReport
 from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import Stage, Way
 from bridge.command.leg.step import initial, step
@@ -214,7 +214,7 @@ def space(
     decode = TelegramDecoder(f"n/{name}", family, family.slot[0], meanings, {}).decode
     drive = leg_settings(family, table, decode, LIFE)
     leg = initial(drive)
-    for event in (NodeBack(), Way(True, "", "", True), Report(DriveState.READY, False, "")):
+    for event in (NodeBack(), Way(True, "", "", True), StatusReport(DriveState.READY, False, "")):
         leg, _ = step(drive, leg, event, NOW)
     reaction = table.on_expiry
     rules = Rules(

@@ -300,12 +300,12 @@ class Model(Memory):
             self.stop()
         self.may_enable = self.is_open
 
-    def hear(self, says: str, *, is_taken: bool) -> None:
+    def hear(self, says: str, *, is_acknowledged: bool) -> None:
         """The drive says something."""
         before, self.says = self.says, says
         self.is_braking &= says == "braking"
         was_enabled = before == "enabled" and self.is_heard
-        self.is_taken = is_taken
+        self.is_acknowledged = is_acknowledged
         self.is_heard = True
         self.followed |= says in ("enabled", "braking")
         if self.coasts_at is not None and says in RESTING:

@@ -106,7 +106,7 @@ class Seen(NamedTuple):
     """The bit that hands it over, as it should be."""
     was_up: bool = False
     """The same bit as it was on the bus."""
-    is_taken: bool = False
+    is_acknowledged: bool = False
     was_commanded: bool = False
     is_unsent: bool = False
     """No words to the drive are on the bus."""
@@ -183,7 +183,7 @@ class Memory:
             self.handed,
             self.is_up,
             self.was_up,
-            self.is_taken,
+            self.is_acknowledged,
             self.was_commanded,
             self.is_unsent,
             self.has_set,

@@ -29,9 +29,9 @@ from bridge.command.leg.event import (
     Connection,
     Event,
     NodeBack,
-    OwnWatch,
-    Report,
     StartAnew,
+    StatusReport,
+    StopsOnSilence,
     Time,
 )
 from bridge.command.leg.outlook import next_deadline, output_then, until
@@ -104,7 +104,7 @@ class Space:
             "drive follows": self._follows,
             "drive repeats": self._repeats,
             "drive is moved": self._moved,
-            "drive takes the setpoint": lambda state: self._follows(state, is_taken=True),
+            "drive takes the setpoint": lambda state: self._follows(state, is_acknowledged=True),
             "drive's own watch is off": lambda state: self._watches(state, watches=False),
             "drive's own watch is on": lambda state: self._watches(state, watches=True),
             "node lost": lambda state: self._way(state, _SHUT),
@@ -263,13 +263,13 @@ class Space:
 
     # the drive
 
-    def _follows(self, state: State, *, is_taken: bool = False) -> State:
+    def _follows(self, state: State, *, is_acknowledged: bool = False) -> State:
         sent = state[0].sent
         enables = self.rules.words.enabling.fit(sent.words[0]) and not sent.silent
-        return self._hear(state, "enabled" if enables else "ready", is_taken=is_taken)
+        return self._hear(state, "enabled" if enables else "ready", is_acknowledged=is_acknowledged)
 
     def _repeats(self, state: State) -> State:
-        return self._hear(state, state[1].says, is_taken=state[1].is_taken)
+        return self._hear(state, state[1].says, is_acknowledged=state[1].is_acknowledged)
 
     def _says(self, state: State, says: str) -> State:
         _, seen = state
@@ -277,13 +277,13 @@ class Space:
             return state  # nothing that was sent would have brought it there
         return self._hear(state, says)
 
-    def _hear(self, state: State, says: str, *, is_taken: bool = False) -> State:
+    def _hear(self, state: State, says: str, *, is_acknowledged: bool = False) -> State:
         leg, seen = state
         oracle = Oracle(self.rules, seen, NOW)
         if not seen.is_there:
             return state
-        after, effects = self._step(leg, Report(_SAYS[says], is_taken, "a fault"))
-        oracle.hear(says, is_taken=is_taken)
+        after, effects = self._step(leg, StatusReport(_SAYS[says], is_acknowledged, "a fault"))
+        oracle.hear(says, is_acknowledged=is_acknowledged)
         self._check(after, oracle, leg, effects)
         return self._time(after, after, oracle, [])
 
@@ -302,7 +302,7 @@ class Space:
     def _watches(self, state: State, *, watches: bool) -> State:
         leg, seen = state
         oracle = Oracle(self.rules, seen, NOW)
-        after, effects = self._step(leg, OwnWatch(watches))
+        after, effects = self._step(leg, StopsOnSilence(watches))
         oracle.watches = watches
         return self._time(leg, after, oracle, effects)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from bridge.config import Site
 from bridge.config.download import Download
 from bridge.eds import Description
-from bridge.lint import Severity, Verdict, family_dictionaries, lint
+from bridge.lint import CheckResult, Severity, family_dictionaries, lint
 from bridge.mapping import Family, load_family
 
 NORD = "nord/sk-tu4-cao"
@@ -58,7 +58,7 @@ def judge(
     families: dict[str, Family] | None = None,
     dictionary: Description | None = DICTIONARY,
     downloads: tuple[Download, ...] = (),
-) -> Verdict:
+) -> CheckResult:
     text = SITE.format(bus=bus, node=node, drive=drive, more=more)
     path = folder / "site.toml"
     path.write_text(text)
@@ -67,11 +67,11 @@ def judge(
     return lint(site, known, path, {"conveyor": downloads}, {NORD: dictionary} if dictionary else {})
 
 
-def findings(verdict: Verdict, severity: Severity) -> list[str]:
+def findings(verdict: CheckResult, severity: Severity) -> list[str]:
     return [f"{one.fault.key}: {one.fault.message}" for one in verdict.of(severity)]
 
 
-def only(verdict: Verdict, severity: Severity) -> str:
+def only(verdict: CheckResult, severity: Severity) -> str:
     """The one finding there is."""
     [finding] = verdict.findings
     assert finding.severity is severity, finding

@@ -12,11 +12,11 @@ from pathlib import Path
 
 from bridge.can.virtual import VirtualBus, VirtualWire
 from bridge.canopen.frame import Frame
-from bridge.command import Identity, Kind, Request, Source, Write
+from bridge.command import EventKind, Identity, Request, Source, Write
 from bridge.project import load_project
-from bridge.service.bus_process import Service
+from bridge.service.bus_process import BusProcess
 from bridge.sim.nord.nord_tu4 import NordTu4
-from bridge.sim.shell import Simulation
+from bridge.sim.runner import Simulation
 from tests.support import sites
 from tests.support.process import free_port
 
@@ -30,7 +30,7 @@ _PLC = Identity(Source.MODBUS, "127.0.0.1")
 class Load:
     """A running bus process with its OPC UA front, on a virtual wire."""
 
-    service: Service
+    service: BusProcess
     end: VirtualBus
     opcua_url: str
     syncs: list[float] = field(default_factory=list[float])
@@ -94,13 +94,13 @@ async def loaded(folder: Path) -> AsyncIterator[Load]:
     bus = sites.bus(sites.node(*drives, more="supervision_ms = 1000"), more="deadman_ms = 500")
     path = sites.write(folder, bus, sites.modbus(free_port()), sites.opcua(opcua))
     wire = VirtualWire()
-    service = Service(load_project(path), lambda table: wire.end(table.name))
+    service = BusProcess(load_project(path), lambda table: wire.end(table.name))
     load = Load(service, wire.end("firehose"), f"opc.tcp://127.0.0.1:{opcua}")
     load.end.open(lambda: load.end.drain(time.monotonic()))
     wire.listeners.append(load.on_frame)
     simulation = Simulation(wire.end("simulation"), [NordTu4(5)])
     ready, booted = asyncio.Event(), asyncio.Event()
-    service.plant.on_event(lambda event: booted.set() if event.kind is Kind.NODE_BACK else None)
+    service.plant.on_event(lambda event: booted.set() if event.kind is EventKind.NODE_BACK else None)
     load.serving = asyncio.create_task(service.run(ready.set))
     tasks = [asyncio.create_task(simulation.run()), load.serving]
     try:

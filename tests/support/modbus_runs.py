@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Final
 
-from bridge.northbound.modbus.registers import Row, Table
+from bridge.northbound.modbus.registers import RegisterTable, Row
 
 FUNCTIONS: Final = {
-    Table.COIL: 1,
-    Table.DISCRETE_INPUT: 2,
-    Table.HOLDING_REGISTER: 3,
-    Table.INPUT_REGISTER: 4,
+    RegisterTable.COIL: 1,
+    RegisterTable.DISCRETE_INPUT: 2,
+    RegisterTable.HOLDING_REGISTER: 3,
+    RegisterTable.INPUT_REGISTER: 4,
 }
-_MOST: Final = {Table.COIL: 2000, Table.DISCRETE_INPUT: 2000}
+_MOST: Final = {RegisterTable.COIL: 2000, RegisterTable.DISCRETE_INPUT: 2000}
 _MOST_REGISTERS: Final = 124
 """Registers of one request: 125, and an even number for values of two registers."""
 
@@ -24,7 +24,7 @@ _MOST_REGISTERS: Final = 124
 class Run:
     """Rows of one table that follow each other without a gap."""
 
-    table: Table
+    table: RegisterTable
     rows: tuple[Row, ...]
 
     @property

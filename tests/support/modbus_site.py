@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 
 from bridge.command import Drive, Identity, Plant, Source
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import WordOrder
 from tests.support import sites
 from tests.support.node_states import node_goes

@@ -4,8 +4,8 @@ the bus."""
 from __future__ import annotations
 
 from bridge.command import Commanded, Node, Plant
-from bridge.command.link import NodeState
-from bridge.node.view import NodeView
+from bridge.command.drive_link import NodeState
+from bridge.node.node_view import NodeView
 
 
 def node_goes(plant: Plant, node: Node, state: NodeState, now: float, *, tell: bool = True) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from bridge.catalogue import Catalogue
 from bridge.command import Plant
 from bridge.command.node import Node
-from bridge.mapping.site import load_site_and_families
+from bridge.mapping.site_families import load_site_and_families
 from tests.support import sites
 from tests.support.devices import SITE
 

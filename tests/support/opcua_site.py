@@ -11,7 +11,7 @@ from pathlib import Path
 from asyncua import Client, ua
 
 from bridge.command import Identification, Outcome, Plant, PlantView, Rejection, Request, Role
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import DONE, NODE_ACTIONS, Code, Reply
 from bridge.config import OpcUaTable
 from bridge.northbound.opcua.server import OpcUaServer

@@ -15,9 +15,9 @@ from bridge.command import Action, Event, Identity, Outcome, Plant, Request, Rol
 from bridge.config import Site, load_site
 from bridge.mapping import load_family
 from bridge.master.line import Repeated
-from bridge.master.listening import Listening
 from bridge.master.network import Network
-from bridge.node.node import NodeCore
+from bridge.master.standby import Standby
+from bridge.node.node_core import NodeCore
 
 NORD = load_family("nord/sk-tu4-cao")
 MAPPING = "nord/sk-tu4-cao"
@@ -141,7 +141,7 @@ class Quick:
         self.plant = Plant(Catalogue.of(site, {MAPPING: NORD}), "0", self.now)
         self.plant.on_event(self.events.append)
         # These tests begin where the bridge has listened already.
-        self.network = Network(site.bus[0], self.plant.side_of(site.bus[0]), listening=Listening(0.0))
+        self.network = Network(site.bus[0], self.plant.side_of(site.bus[0]), listening=Standby(0.0))
         self.repeated = Repeated(self.network, self.plant)
         self.nodes = {table.id: QuickNode(table.id) for table in site.bus[0].node}
         self.lose: Callable[[Frame], bool] = lambda frame: False

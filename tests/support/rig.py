@@ -4,9 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from bridge.command import Action, Code, Event, Identity, Kind, Outcome, Request, Role, Source, command_of
+from bridge.command import (
+    Action,
+    Code,
+    Event,
+    EventKind,
+    Identity,
+    Outcome,
+    Request,
+    Role,
+    Source,
+    command_of,
+)
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import DriveTable
 from bridge.drive import EmergencyMeaning, EmergencyReader, LinearScale
 from bridge.image import Value
@@ -158,5 +169,5 @@ class Rig:
     def watchdog(self) -> str:
         return self.channel.watchdog_state.label
 
-    def told(self, kind: Kind) -> list[str]:
+    def told(self, kind: EventKind) -> list[str]:
         return [event.message for event in self.events if event.kind is kind]

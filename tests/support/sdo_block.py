@@ -8,7 +8,7 @@ from collections.abc import Callable
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import Result, SdoChannel, SdoError
 from bridge.sim.core.dictionary import Dictionary, Domain
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 
 REQUEST, REPLY = 0x605, 0x585
 LONG = bytes(range(256)) * 4
@@ -33,7 +33,7 @@ class Link:
         self.stored = data
         objects = Dictionary()
         objects.add(INDEX, 0, Domain(1 << 16, lambda: self.stored, self._store))
-        self.server = SdoServer(objects, block)
+        self.server = SimulatedSdoServer(objects, block)
         self.channel = SdoChannel(REQUEST, REPLY, 0.5, retries=retries, segment_s=segment_s)
         self.lose = lose
         self.now = 0.0

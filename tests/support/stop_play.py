@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
-from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, Verdict
+from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopVerdict
 from tests.support.judge import Judge
 
 STEP_S = 1 / 16
@@ -56,7 +56,7 @@ class Play:
     shown: Says | None = None
     looks: list[float] = field(default_factory=list[float])
     """Times at which it was asked."""
-    verdicts: list[Verdict] = field(default_factory=list[Verdict])
+    verdicts: list[StopVerdict] = field(default_factory=list[StopVerdict])
 
     def run(self, script: Script, end: float = END_S) -> Play:
         self.follow.on_node(is_there=True)

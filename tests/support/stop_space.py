@@ -17,12 +17,12 @@ from bridge.command.stop_check.event import (
     NodeOperational,
     NodeRestarted,
     NodeStopped,
-    Pause,
-    Report,
     Sends,
-    Time,
+    StatusChange,
+    TelegramGap,
+    TimePassed,
 )
-from bridge.command.stop_check.state import Bounds, Says, Sent, StopState, Verdict
+from bridge.command.stop_check.state import Bounds, Says, Sent, StopState, StopVerdict
 from tests.support import stop_rules
 from tests.support.stop_rules import LATE, LONGEST, OFF, RAMP, SILENCE, Memory, Told
 
@@ -135,18 +135,18 @@ class StopSpace:
         return self._step(world, NodeRestarted(), stop_rules.restarted(world.memory))
 
     def _pause(self, world: World) -> World:
-        then = self._step(world, Pause(0), stop_rules.paused(world.memory))
+        then = self._step(world, TelegramGap(0), stop_rules.paused(world.memory))
         return then._replace(heard_at=0)
 
     def _says(self, world: World, says: Says) -> World:
-        then = self._step(world, Report(says, 0), stop_rules.says(world.memory, says.name))
+        then = self._step(world, StatusChange(says, 0), stop_rules.says(world.memory, says.name))
         return then._replace(heard_at=0)
 
     def _tick(self, world: World, is_heard: bool) -> World:
         """The judge is asked."""
         memory = stop_rules.tick(world.memory, is_heard=is_heard)
         heard_at = 0 if is_heard else None if world.heard_at is None else world.heard_at - 1
-        stop, verdicts = judge.step(_earlier(world.stop), Time(0, heard_at, self.pause))
+        stop, verdicts = judge.step(_earlier(world.stop), TimePassed(0, heard_at, self.pause))
         assert not verdicts or memory.words, "what is over is not told"
         for verdict in verdicts[len(world.stop.untold) :]:
             memory = stop_rules.check_told(memory, _told(verdict))
@@ -187,7 +187,7 @@ def _bind(happen: Callable[..., World], what: object) -> Callable[[World], World
     return lambda world: happen(world, what)
 
 
-def _told(verdict: Verdict) -> Told:
+def _told(verdict: StopVerdict) -> Told:
     return Told(
         verdict.outcome.name,
         verdict.before.name,
@@ -206,8 +206,8 @@ def _earlier(stop: StopState) -> StopState:
     )
 
 
-def _verdict_earlier(verdict: Verdict) -> Verdict:
-    return Verdict(
+def _verdict_earlier(verdict: StopVerdict) -> StopVerdict:
+    return StopVerdict(
         verdict.outcome,
         verdict.before,
         verdict.since - 1,

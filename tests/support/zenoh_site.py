@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from bridge.command import Drive, Plant
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from tests.support import sites
 from tests.support.node_states import node_goes
 

@@ -12,7 +12,7 @@ from bridge.cli.simulation import simulated_nodes
 from bridge.drive import OwnVerdict
 from bridge.exports import modbus_table
 from bridge.lint import lint
-from bridge.northbound.page.parameters import holders_of
+from bridge.northbound.page.parameter_page import holders_of
 from bridge.project import Project, load_project
 from bridge.sim.generic.generic_node import GenericNode
 from tests.support import sites

@@ -99,7 +99,7 @@ def test_a_witness_names_those_that_are_missing_and_no_others(
 
         def close(self) -> None: ...
 
-    monkeypatch.setattr(shell, "Listener", Listener)
+    monkeypatch.setattr(shell, "CanSocket", Listener)
     drive = sites.drive("fu1", "none", 0)
     buses = (
         sites.bus(sites.node(drive, name=name), name=name, interface="socketcan", more=f'channel = "{name}"')

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.cli.signals import ENDING
+from bridge.cli.ending_signals import ENDING
 from bridge.lint import lint
 from bridge.project import load_project
 from bridge.service.bus_process import _START_S

@@ -19,7 +19,7 @@ from bridge.canopen.frame import Frame
 from bridge.cli.app import make_app
 from bridge.cli.parameter_drive import find
 from bridge.lint import family_dictionaries
-from bridge.parameter import Names, Reading
+from bridge.parameter import Names, ParameterReading
 from bridge.project import load_project
 from bridge.sim.catalogue import simulate_description
 from tests.support import sites
@@ -161,7 +161,7 @@ def test_a_parameter_is_written_to_them_without_asking_for_a_status_word(site: P
     entry = target.access.names.resolve("6000")
     node = simulate_description(description_of("encoder.eds"), 20)
     node.start(0.0)
-    found: list[Reading] = []
+    found: list[ParameterReading] = []
 
     def procedure(now: float):
         yield from guard.check([entry])

@@ -13,7 +13,7 @@ from typing import Final
 import pytest
 
 from bridge.catalogue import Catalogue, rights_of
-from bridge.cli.own_check import audit_drives
+from bridge.cli.audit_command import audit_drives
 from bridge.command import (
     Action,
     Code,
@@ -36,7 +36,7 @@ from bridge.exports import dbc_file, modbus_table, opcua_table, zenoh_table
 from bridge.image import Image, Point, Quality
 from bridge.lint import lint
 from bridge.mapping import family_names
-from bridge.northbound.modbus.registers import STOP, Row, Table
+from bridge.northbound.modbus.registers import STOP, RegisterTable, Row
 from bridge.northbound.modbus.units import drive_maps, units_of
 from bridge.project import load_project
 from tests.support import sites
@@ -123,7 +123,7 @@ class Client:
 
     def write_row(self, unit: int, row: Row) -> int:
         """0 or the exception; what is written is what is there, or something harmless."""
-        if row.table is Table.COIL:
+        if row.table is RegisterTable.COIL:
             answer = self.ask(unit, struct.pack(">BHH", 5, row.address, 0))
             return answer[1] if answer[0] & 0x80 else 0
         if row.address == STOP:
@@ -147,7 +147,7 @@ def test_a_register_is_exported_as_writable_where_it_can_be_written(tmp_path: Pa
         for row in drive_map.rows:
             if row.name in unserved:
                 continue  # of what its words carry the site file says nothing
-            if row.table in (Table.HOLDING_REGISTER, Table.COIL):
+            if row.table in (RegisterTable.HOLDING_REGISTER, RegisterTable.COIL):
                 code = client.write_row(drive_map.unit_id, row)
                 is_writable = code not in NOT_ALLOWED
                 assert (row.access == "rw") == is_writable, f"{drive_map.drive_name} {row}: {code:02X}h"

@@ -18,17 +18,17 @@ from bridge.base.sources import source_of
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Plant, Rejection, Request, Source, command_of
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import ModbusTable, ZenohTable
 from bridge.mirror.client import MirrorClient
+from bridge.northbound.modbus.connection import ModbusConnection
 from bridge.northbound.modbus.server import ModbusServer
-from bridge.northbound.modbus.session import Session
 from bridge.northbound.modbus.units import units_of
-from bridge.northbound.zenoh.session import ZenohServer
+from bridge.northbound.zenoh.server import ZenohServer
 from bridge.service.event_log import log_event
 from bridge.service.parts import Supervisor
 from bridge.text import Text
-from bridge.zenohlink import Message, zenoh_config
+from bridge.zenohlink import Sample, zenoh_config
 from bridge.zenohlink.worker import Worker
 from tests.support import sites
 from tests.support.bench import Bench, write_site
@@ -317,7 +317,7 @@ async def test_connections_that_come_and_go(log: QuietLog, stranger: str, guest:
     server = ModbusServer(view_of(plant, lambda: log.now), units_of(plant.catalogue), table, lambda: log.now)
     for number in range(TIMES):
         host = guest.format(number)
-        visitor = cast(Session, _Visitor(source=source_of(host)))
+        visitor = cast(ModbusConnection, _Visitor(source=source_of(host)))
         server.admit(visitor, stranger.format(number), number)
         server.admit(visitor, host, number)
         server.on_fault(visitor, f"protocol id {number}")
@@ -333,7 +333,7 @@ async def test_puts_that_are_no_commands(log: QuietLog) -> None:
     table = ZenohTable.model_validate({"accept_put": True})
     server = ZenohServer(view_of(plant, lambda: log.now), table, "hall", lambda: log.now)
     for number in range(TIMES):
-        server._on_put(Message(f"drives/hall/attic/{number}", b"\xff"))
+        server._on_put(Sample(f"drives/hall/attic/{number}", b"\xff"))
     assert len(log.lines) == 1
     assert len(log.pass_minute()) == 1
 
@@ -341,7 +341,7 @@ async def test_puts_that_are_no_commands(log: QuietLog) -> None:
 async def test_messages_between_processes(log: QuietLog) -> None:
     mirror = MirrorClient("unixsock-stream/none", lambda: log.now)
     for _ in range(TIMES):
-        mirror._on_event(Message("mirror/event", b"\xff"))
+        mirror._on_event(Sample("mirror/event", b"\xff"))
     assert mirror.malformed == TIMES
     assert len(log.lines) == 1
 

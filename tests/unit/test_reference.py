@@ -14,7 +14,7 @@ from bridge import __version__
 from bridge.catalogue import Catalogue
 from bridge.catalogue.codes import CONTROLLER_STATES, NMT_STATES, NODE_STATES, WATCHDOG_STATES
 from bridge.cli.app import make_app
-from bridge.command import Kind, Plant
+from bridge.command import EventKind, Plant
 from bridge.command.leg.state import Stage
 from bridge.command.leg.table import TABLE
 from bridge.command.messages.request import Code
@@ -22,18 +22,18 @@ from bridge.config import Reaction, Site
 from bridge.drive import DRIVE_STATES
 from bridge.image import Point, Quality
 from bridge.mapping.model import Family, MappedObject, ObjectRef
-from bridge.node.boot.status import ABSENT, HINTS
+from bridge.node.boot.error_status import ABSENT, HINTS
 from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import Function
-from bridge.northbound.modbus.registers import DriveMap, Row, Table
+from bridge.northbound.modbus.registers import DriveMap, RegisterTable, Row
 from bridge.northbound.modbus.units import drive_maps, units_of
+from bridge.northbound.opcua.data_values import OUTCOME_STATUS, QUALITY_STATUS
 from bridge.northbound.opcua.events import type_name
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
-from bridge.northbound.opcua.values import OUTCOME_STATUS, QUALITY_STATUS
 from bridge.northbound.zenoh.commands import MALFORMED, METHODS, NODE_METHODS
 from bridge.project import load_project
 from bridge.uaserver.services import SERVICES
-from bridge.uaserver.states import REFUSALS, Need, State
+from bridge.uaserver.states import REFUSALS, Need, RequestSession
 from tests.support.docs import (
     page,
 )
@@ -154,8 +154,11 @@ def test_the_register_map_is_that_of_the_export(plant: Plant) -> None:
     reference = page("reference/modbus.md")
     drive: DriveMap = drive_maps(plant.catalogue)[0]
     for heading, rows in (
-        ("Input registers of a drive", [r for r in drive.rows if r.table is Table.INPUT_REGISTER]),
-        ("Holding registers of a drive", [r for r in drive.rows if r.table is Table.HOLDING_REGISTER]),
+        ("Input registers of a drive", [r for r in drive.rows if r.table is RegisterTable.INPUT_REGISTER]),
+        (
+            "Holding registers of a drive",
+            [r for r in drive.rows if r.table is RegisterTable.HOLDING_REGISTER],
+        ),
     ):
         shown = [
             (row["address"], row["name"], row["type"], row["access"], row["unit"])
@@ -211,7 +214,9 @@ def call(method: MethodNode) -> str:
 
 def test_the_events_are_those_that_are_sent() -> None:
     rows = page("reference/opcua.md").table("Events")
-    assert [(row["type"], row["kind"]) for row in rows] == [(type_name(kind), kind.value) for kind in Kind]
+    assert [(row["type"], row["kind"]) for row in rows] == [
+        (type_name(kind), kind.value) for kind in EventKind
+    ]
 
 
 def test_the_services_are_those_of_the_table_in_the_code() -> None:
@@ -236,11 +241,15 @@ def test_the_codes_of_sessions_are_those_of_the_table_in_the_code() -> None:
         "every other service": Need.USE,
     }
     rows = page("reference/opcua.md").table("Which code when")
-    assert [row["session"] for row in rows] == [state.value for state in State]
-    for row, state in zip(rows, State, strict=True):
+    assert [row["session"] for row in rows] == [state.value for state in RequestSession]
+    for row, state in zip(rows, RequestSession, strict=True):
         for name, need in needs.items():
             code = REFUSALS[need].get(state)
-            is_elsewhere = need is Need.ACTIVATE and state in (State.NONE, State.ENDED, State.MOVED)
+            is_elsewhere = need is Need.ACTIVATE and state in (
+                RequestSession.NONE,
+                RequestSession.ENDED,
+                RequestSession.MOVED,
+            )
             expected = status_name(code) if code else "BadSessionIdInvalid" if is_elsewhere else "done"
             assert row[name].partition(",")[0] == expected, (state, name)
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Action, Code, Do, Identity, Plant, Reply, Request, Source
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import ModbusTable, ZenohTable
 from bridge.mirror import MirrorClient, MirrorPublisher, socket_endpoint
 from bridge.northbound.modbus.server import ModbusServer

@@ -14,14 +14,14 @@ from typer.testing import CliRunner
 
 from bridge.can import Bus
 from bridge.can.virtual import VirtualWire
-from bridge.cli import bus as cli_bus
-from bridge.cli import drop_test
+from bridge.cli import bus_runner as cli_bus
+from bridge.cli import drop_test_command
 from bridge.cli.app import make_app
 from bridge.sim.catalogue import simulate_description
-from bridge.sim.core.device import SimulatedDevice
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.generic.generic_node import GenericNode
-from bridge.sim.shell import Simulation
+from bridge.sim.runner import Simulation
 from tests.support.devices import DEVICES, description_of
 
 RUN = CliRunner()
@@ -40,7 +40,7 @@ class Hall:
             # It stays switched on from one command to the next.
             monkeypatch.setattr(node, "start", lambda now: None)
         monkeypatch.setattr(cli_bus, "open_bus", lambda *_, **__: self._bus(monkeypatch))
-        monkeypatch.setattr(drop_test, "make_bus", lambda _: self._bus(monkeypatch))
+        monkeypatch.setattr(drop_test_command, "make_bus", lambda _: self._bus(monkeypatch))
 
     @staticmethod
     def _node(file: str, node_id: int) -> GenericNode:
@@ -121,7 +121,7 @@ def test_parameters_are_read_written_backed_up_and_restored(hall: Hall, tmp_path
 def test_they_are_looked_at_like_any_node(hall: Hall) -> None:
     assert "IO 16" in hall.said("sdo", "read", "SITE", "io_16", "1008")
     hall.said("nmt", "SITE", "start", "io_16")
-    assert hall.io.slave.state is NmtState.OPERATIONAL
+    assert hall.io.slave.state is SlaveState.OPERATIONAL
     frames = [
         json.loads(line)
         for line in hall.said(

@@ -21,7 +21,7 @@ from pymodbus.client import ModbusTcpClient
 
 from bridge.canclient import DrivebridgeBus
 from bridge.dictionary import load_dictionary
-from bridge.northbound.gateway.datatypes import TYPES
+from bridge.northbound.gateway.cia309_types import TYPES
 from tests.support.process import drivebridge, free_port, until
 from tests.support.zenoh_peer import zenoh_peer
 

@@ -25,8 +25,8 @@ from bridge.command import (
     Command,
     Do,
     Event,
+    EventKind,
     Identity,
-    Kind,
     Outcome,
     Plant,
     Request,
@@ -36,7 +36,7 @@ from bridge.command import (
     TakeControl,
     Write,
 )
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Image, Quality, Value
 from bridge.mirror import MirrorClient, MirrorPublisher, PointsChanged, protocol, socket_endpoint
 from bridge.mirror import client as mirror_client
@@ -44,7 +44,7 @@ from bridge.mirror.client import UNREACHABLE
 from bridge.mirror.endpoint import socket_path
 from bridge.northbound.view import View
 from bridge.text import Text
-from bridge.zenohlink import IncomingQuery, Message, ZenohLink, zenoh_config
+from bridge.zenohlink import IncomingQuery, Sample, ZenohLink, zenoh_config
 from tests.support.outcomes import in_english
 from tests.support.views import view_of
 from tests.support.zenoh_peer import until
@@ -308,9 +308,9 @@ async def test_events_arrive_with_wall_clock_time(endpoint: str) -> None:
     heard: list[Event] = []
     async with publishing(endpoint, plant), front(endpoint) as client:
         client.on_event(heard.append)
-        plant.report(Event(time.monotonic(), Kind.BUS, "can0", 900, Text.plain("bus-off")))
+        plant.report(Event(time.monotonic(), EventKind.BUS, "can0", 900, Text.plain("bus-off")))
         await until(lambda: heard, "the event")
-        assert (heard[0].kind, heard[0].source, heard[0].message) == (Kind.BUS, "can0", "bus-off")
+        assert (heard[0].kind, heard[0].source, heard[0].message) == (EventKind.BUS, "can0", "bus-off")
         assert abs(heard[0].time - time.time()) < 5
 
 
@@ -352,8 +352,8 @@ async def test_garbage_on_the_link_does_no_harm(endpoint: str) -> None:
         assert not (await other.get(protocol.key_of(protocol.REQUESTS, "front")))[0].ok
         assert publisher.malformed == 2
         await other.close()
-        publisher._link.send(Message(protocol.DELTA, b"nonsense"))
-        publisher._link.send(Message(protocol.EVENT, b"\x91\xc1"))
+        publisher._link.send(Sample(protocol.DELTA, b"nonsense"))
+        publisher._link.send(Sample(protocol.EVENT, b"\x91\xc1"))
         await until(lambda: client.malformed == 2, "both are counted")
         plant.set("bridge/drives_good", 1, time.monotonic())
         await until(lambda: shown(client.image) == shown(plant.image), "the client goes on")

@@ -20,10 +20,10 @@ from pymodbus.client import AsyncModbusTcpClient
 
 from bridge.base.errors import Unavailable
 from bridge.command import Code, Identification, Outcome, Plant, PlantView, Reply, Request
-from bridge.command.link import FurtherTpdo, NodeState
+from bridge.command.drive_link import FurtherTpdo, NodeState
 from bridge.config import ModbusTable
 from bridge.config.model import AuditTable
-from bridge.northbound.modbus import session
+from bridge.northbound.modbus import connection
 from bridge.northbound.modbus.registers import DriveMap
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
@@ -394,7 +394,7 @@ async def closed_by_the_other_side(reader: asyncio.StreamReader) -> bool:
 async def test_a_client_that_reads_nothing_is_dropped_and_harms_no_other(
     plant: Plant, server: ModbusServer, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(session, "STALL_LIMIT_S", 0.3)
+    monkeypatch.setattr(connection, "STALL_LIMIT_S", 0.3)
     _, writer = await asyncio.open_connection(HOST, server.port)
     request = adu(1, 1, bytes.fromhex("03 0000 0020")) * 1000
     flood = asyncio.create_task(pour(writer, request))

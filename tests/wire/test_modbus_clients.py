@@ -14,7 +14,7 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 
 from bridge.image import Quality
-from bridge.northbound.modbus.registers import MIRROR, Table
+from bridge.northbound.modbus.registers import MIRROR, RegisterTable
 from bridge.northbound.modbus.units import drive_maps, units_of
 from bridge.sim.catalogue import SIMULATED
 from tests.support.families import FamilyBridge, family_bridge
@@ -67,7 +67,7 @@ def _runs(bridge: FamilyBridge) -> Iterator[Asked]:
             names = [f"{drive_map.drive_name}/{row.name}" for row in run.rows]
             there = [name not in index or image.read(name).quality.has_value for name in names]
             yield _asked(drive_map.unit_id, run, has_values=any(there))
-            if run.table is Table.INPUT_REGISTER:
+            if run.table is RegisterTable.INPUT_REGISTER:
                 yield Asked(drive_map.unit_id, 3, MIRROR + run.start, run.count, any(there))
     for run in runs_of(units_of(plant.catalogue).bridge_rows):
         yield _asked(255, run, has_values=True)

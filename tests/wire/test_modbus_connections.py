@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from bridge.command import Event, Kind, Plant
+from bridge.command import Event, EventKind, Plant
 from bridge.northbound.modbus.server import ModbusServer
 from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY
@@ -33,7 +33,7 @@ class Hall:
     server: ModbusServer
     events: list[Event]
 
-    def told(self, kind: Kind) -> list[str]:
+    def told(self, kind: EventKind) -> list[str]:
         return [event.message for event in self.events if event.kind is kind]
 
     @property
@@ -64,7 +64,7 @@ async def test_two_programs_behind_one_address_do_not_move_a_drive_in_turns(hall
         ports = [client.ctx.transport.get_extra_info("sockname")[1] for client in (one, other)]
         names = [f"modbus:{HOST} port {port}" for port in ports]
         why = f"write by {names[1]} refused: the drive is controlled by {names[0]}"
-        assert set(hall.told(Kind.REFUSED)) == {why}
+        assert set(hall.told(EventKind.REFUSED)) == {why}
 
 
 async def test_the_second_one_may_read_and_stop(hall: Hall):
@@ -110,7 +110,7 @@ async def test_a_client_that_connects_anew_for_each_write_moves_the_drive(hall: 
         status, output = await mbpoll(hall.server, "-a", "1", "-r", "0", "-t", "4", "--", str(word))
         assert status == 0, output
         assert hall.runs is (word == RUN)
-    assert not hall.told(Kind.REFUSED)
+    assert not hall.told(EventKind.REFUSED)
 
 
 def _write(word: int) -> bytes:
@@ -131,7 +131,7 @@ async def test_hundreds_of_connections_one_after_the_other_are_one_controller(ha
     for _ in range(300):
         assert await _over_a_new_connection(hall.server.port, RUN) == _write(RUN)
         assert hall.runs
-    assert not hall.told(Kind.REFUSED)
+    assert not hall.told(EventKind.REFUSED)
 
 
 async def test_the_order_in_which_an_end_and_a_beginning_are_read_does_not_matter(hall: Hall):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.northbound.page.bus import Captured, IsGone
+from bridge.northbound.page.bus_page import Captured, IsGone
 from bridge.project import load_project
 from bridge.service.page import buses as page_buses
 from bridge.service.page.buses import Buses

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from bridge.command import Event, Kind
+from bridge.command import Event, EventKind
 from bridge.northbound.page import server as page_server
 from tests.support.page import Served, Stalled, message, until
 from tests.support.quiet import quiet_log
@@ -95,7 +95,7 @@ async def test_a_tab_that_would_miss_an_outcome_is_closed_instead(served: Served
         await tab.send(token)
         await message(tab, "you")
         for number in range(1100):
-            served.view.happen(Event(0.0, Kind.WATCHDOG, DRIVE, 500, f"event {number}"))
+            served.view.happen(Event(0.0, EventKind.WATCHDOG, DRIVE, 500, f"event {number}"))
         with pytest.raises(ConnectionClosed) as closed:
             await message(tab, "nothing")
     assert closed.value.rcvd is not None
@@ -210,13 +210,13 @@ async def test_a_tab_is_told_the_time_once_a_second(served: Served) -> None:
 
 async def test_a_new_tab_gets_what_has_happened_in_one_message(served: Served) -> None:
     for number in range(250):
-        served.view.happen(Event(0.0, Kind.WATCHDOG, DRIVE, 500, f"event {number}"))
+        served.view.happen(Event(0.0, EventKind.WATCHDOG, DRIVE, 500, f"event {number}"))
     cookie, token = await served.login("observer")
     async with served.live(cookie) as tab:
         await tab.send(token)
         told = (await message(tab, "events"))["events"]
         assert [one["message"] for one in told] == [f"event {number}" for number in range(50, 250)]
-        served.view.happen(Event(0.0, Kind.WATCHDOG, DRIVE, 500, "one more"))
+        served.view.happen(Event(0.0, EventKind.WATCHDOG, DRIVE, 500, "one more"))
         assert (await message(tab, "event"))["event"]["message"] == "one more"
 
 

@@ -12,9 +12,9 @@ import pytest
 
 from bridge.base.errors import Unavailable
 from bridge.can.virtual import VirtualWire
-from bridge.command import Event, Kind
+from bridge.command import Event, EventKind
 from bridge.project import load_project
-from bridge.service.bus_process import Service
+from bridge.service.bus_process import BusProcess
 from bridge.service.front_process import FRONTS
 from bridge.service.parts import Ports
 from tests.support import sites
@@ -31,11 +31,13 @@ def taken() -> Iterator[socket.socket]:
 @asynccontextmanager
 async def serving(
     folder: Path, *tables: str, more: str = "", fronts: bool = False
-) -> AsyncIterator[tuple[Service, list[Event]]]:
+) -> AsyncIterator[tuple[BusProcess, list[Event]]]:
     """The bus process on a bus of its own."""
     path = sites.write(folder, sites.bus(sites.node(sites.drive("fu1", "modbus", 1000)), more=more), *tables)
     wire = VirtualWire()
-    service = Service(load_project(path), lambda table: wire.end(table.name), fronts=FRONTS if fronts else ())
+    service = BusProcess(
+        load_project(path), lambda table: wire.end(table.name), fronts=FRONTS if fronts else ()
+    )
     events: list[Event] = []
     service.plant.on_event(events.append)
     is_open = asyncio.Event()
@@ -52,7 +54,7 @@ async def serving(
         await asyncio.gather(running, return_exceptions=True)
 
 
-async def until(service: Service, failing: str) -> None:
+async def until(service: BusProcess, failing: str) -> None:
     """Until the point names ``failing``, or nothing where that is empty."""
     async with asyncio.timeout(20):
         while True:
@@ -79,7 +81,7 @@ async def test_one_port_that_is_taken_keeps_nothing_else_from_being_served(tmp_p
             assert answers(gateway)
             await asyncio.wait_for(service.supervisor.all_known(), 20)
             assert answers(zenoh)
-            [told] = [event for event in events if event.kind is Kind.FRONT]
+            [told] = [event for event in events if event.kind is EventKind.FRONT]
             assert "is taken by another program" in told.message and "it is started again" in told.message
             assert "not served: modbus" in service.supervisor.status
 
@@ -105,7 +107,7 @@ async def test_a_front_whose_port_is_taken_keeps_nothing_else_from_being_served(
         async with serving(tmp_path, *tables, fronts=True) as (service, events):
             await until(service, "opcua: cannot be started: opcua.listen")
             assert answers(modbus)
-            [told] = [event for event in events if event.kind is Kind.FRONT]
+            [told] = [event for event in events if event.kind is EventKind.FRONT]
             assert told.message.startswith("the opcua front cannot be started")
 
 

@@ -13,11 +13,11 @@ from pymodbus.client import AsyncModbusTcpClient
 
 from bridge.can.virtual import VirtualWire
 from bridge.canopen.frame import Frame
-from bridge.command import Event, Identity, Kind, Request, Source, Write
+from bridge.command import Event, EventKind, Identity, Request, Source, Write
 from bridge.project import load_project
-from bridge.service.bus_process import Service
+from bridge.service.bus_process import BusProcess
 from bridge.sim.nord.nord_tu4 import NordTu4
-from bridge.sim.shell import Simulation
+from bridge.sim.runner import Simulation
 from bridge.text import Text
 from tests.support import sites
 from tests.support.process import free_port
@@ -53,7 +53,7 @@ class SlowFront:
 class Moving:
     """A service in this process whose drive runs, and what happened in which order."""
 
-    def __init__(self, service: Service, running: asyncio.Task[None]) -> None:
+    def __init__(self, service: BusProcess, running: asyncio.Task[None]) -> None:
         self.service = service
         self.running = running
         self.happened: list[str] = []
@@ -86,9 +86,9 @@ async def moving(folder: Path) -> AsyncIterator[Moving]:
     node = sites.node(sites.drive("fu1", "modbus", 20_000), more="supervision_ms = 1000")
     path = sites.write(folder, sites.bus(node), sites.modbus(free_port()))
     wire = VirtualWire()
-    service = Service(load_project(path), lambda table: wire.end(table.name))
+    service = BusProcess(load_project(path), lambda table: wire.end(table.name))
     booted, enabled = asyncio.Event(), asyncio.Event()
-    service.plant.on_event(lambda event: booted.set() if event.kind is Kind.NODE_BACK else None)
+    service.plant.on_event(lambda event: booted.set() if event.kind is EventKind.NODE_BACK else None)
     simulating = asyncio.create_task(Simulation(wire.end("simulation"), [NordTu4(5)]).run())
 
     move = Moving(service, asyncio.create_task(service.run(), name="service"))
@@ -154,7 +154,7 @@ async def test_no_drive_stops_when_a_part_fails(tmp_path: Path, name: str) -> No
         failing = move.service.plant.image.index["bridge/fronts_failing"]
         await until(lambda: name in str(move.service.plant.image[failing].value), "it is said")
         await until(lambda: not move.service.plant.image[failing].value, "it serves again")
-        told = [event.message for event in move.events if event.kind is Kind.FRONT]
+        told = [event.message for event in move.events if event.kind is EventKind.FRONT]
         assert "broken" in told[0]
         assert told[1].endswith(" serves again")
         assert not move.running.done()

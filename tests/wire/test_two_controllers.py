@@ -18,11 +18,11 @@ from pymodbus.client import AsyncModbusTcpClient
 
 from bridge.can.virtual import VirtualWire
 from bridge.canopen.frame import Frame
-from bridge.command import Kind, Source
+from bridge.command import EventKind, Source
 from bridge.project import load_project
-from bridge.service.bus_process import Service
+from bridge.service.bus_process import BusProcess
 from bridge.sim.nord.nord_tu4 import NordTu4
-from bridge.sim.shell import Simulation
+from bridge.sim.runner import Simulation
 from tests.support import sites
 from tests.support.opcua_client import call, word, write_all, write_value
 from tests.support.opcua_site import namespace
@@ -63,7 +63,7 @@ class Seen:
 
 @dataclass(slots=True)
 class Arena:
-    service: Service
+    service: BusProcess
     modbus: AsyncModbusTcpClient
     opcua: Client
     zenoh: Peer
@@ -132,7 +132,7 @@ async def arena(folder: Path) -> AsyncIterator[Arena]:
     bus = sites.bus(sites.node(*drives, more="supervision_ms = 1000"), more="deadman_ms = 500")
     tables = (sites.modbus(ports["modbus"]), sites.opcua(ports["opcua"]), sites.zenoh(ports["zenoh"]))
     wire = VirtualWire()
-    service = Service(load_project(sites.write(folder, bus, *tables)), lambda table: wire.end(table.name))
+    service = BusProcess(load_project(sites.write(folder, bus, *tables)), lambda table: wire.end(table.name))
     seen = {drive: Seen() for drive in RPDO_OF.values()}
 
     def on_frame(frame: Frame) -> None:
@@ -145,7 +145,7 @@ async def arena(folder: Path) -> AsyncIterator[Arena]:
     wire.listeners.append(on_frame)
     simulation = Simulation(wire.end("simulation"), [NordTu4(NODE_ID)])
     ready, booted = asyncio.Event(), asyncio.Event()
-    service.plant.on_event(lambda event: booted.set() if event.kind is Kind.NODE_BACK else None)
+    service.plant.on_event(lambda event: booted.set() if event.kind is EventKind.NODE_BACK else None)
     tasks = [asyncio.create_task(simulation.run()), asyncio.create_task(service.run(ready.set))]
     try:
         await asyncio.wait_for(asyncio.gather(ready.wait(), booted.wait()), 30)

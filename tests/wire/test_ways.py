@@ -19,8 +19,8 @@ async def test_the_page_draws_the_ways_that_values_take(tmp_path: Path) -> None:
         name: count for name, count in counts.items() if count > BY_TWO_PROCESSES.get(name, MOST_FILES)
     } == {}
     assert [list(files)[-1] for files in found.values()] == [
-        "northbound/modbus/session.py",
-        "northbound/opcua/values.py",
+        "northbound/modbus/connection.py",
+        "northbound/opcua/data_values.py",
         "zenohlink/publishers.py",
         "can/softbus.py",
     ]

@@ -9,11 +9,11 @@ from collections.abc import Callable
 import pytest
 
 from bridge.command import Action, Do, Identity, Plant, Request, SetTimeout, Source
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import ModbusTable
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
-from bridge.witness.numbers import Numbers, Reading
+from bridge.witness.numbers import Numbers, UnitReading
 from tests.support.modbus_site import READY, make_plant
 from tests.support.node_states import node_goes
 from tests.support.views import view_of
@@ -30,9 +30,9 @@ async def served(plant: Plant, **settings: object) -> ModbusServer:
     return server
 
 
-async def readings(numbers: Numbers, enough: Callable[[list[Reading]], bool]) -> list[Reading]:
+async def readings(numbers: Numbers, enough: Callable[[list[UnitReading]], bool]) -> list[UnitReading]:
     """What is read until that is enough, or ``numbers`` are lost."""
-    found: list[Reading] = []
+    found: list[UnitReading] = []
     until = time.monotonic() + 10.0
     while time.monotonic() < until:
         now = time.monotonic()

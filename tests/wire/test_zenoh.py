@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import ZenohTable
 from bridge.northbound.zenoh import ZenohServer
 from bridge.zenohlink import Value

@@ -13,7 +13,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from tests.support.zenoh_peer import free_port, zenoh_peer
 from tests.support.zenoh_rig import TOP, rig
 from tests.support.zenoh_site import READY, drive_says, node_is

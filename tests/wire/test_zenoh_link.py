@@ -15,8 +15,8 @@ from bridge.base.errors import OperationFailed, Unavailable
 from bridge.can.virtual import VirtualWire
 from bridge.mirror import protocol
 from bridge.project import load_project
-from bridge.service.bus_process import Service
-from bridge.zenohlink import IncomingQuery, Message, ZenohLink, zenoh_config
+from bridge.service.bus_process import BusProcess
+from bridge.zenohlink import IncomingQuery, Sample, ZenohLink, zenoh_config
 from bridge.zenohlink import link as link_module
 from bridge.zenohlink.publishers import Publishers
 from tests.support import sites
@@ -77,7 +77,7 @@ async def test_a_client_waits_for_its_router_and_can_be_closed_meanwhile() -> No
     waiting = ZenohLink(zenoh_config(mode="client", connect=[endpoint]), "zenoh")
     assert not await waiting.open(patience_s=0.2)
     waiting.publish([("a/b", b"early", None)])
-    got: list[Message] = []
+    got: list[Sample] = []
     async with link(endpoint) as server:
         server.declare_subscriber("a/*", got.append)
         await until(
@@ -104,7 +104,7 @@ async def test_queries_are_answered_from_the_loop() -> None:
             if asked.payload == b"bad":
                 asked.fail(b"no", "text/plain")
             else:
-                asked.send([Message(asked.key, b"1"), Message(asked.key, b"2", "text/plain", b"beside")])
+                asked.send([Sample(asked.key, b"1"), Sample(asked.key, b"2", "text/plain", b"beside")])
                 asked.finish()
 
         server.declare_queryable("q/**", answer)
@@ -129,7 +129,7 @@ async def test_a_hundred_queries_wait_side_by_side() -> None:
         asking = [asyncio.create_task(client.get("q", str(i).encode())) for i in range(100)]
         await until(lambda: len(held) == 100, "all have arrived")
         for asked in reversed(held):
-            asked.send([Message("q", asked.payload or b"")])
+            asked.send([Sample("q", asked.payload or b"")])
             asked.finish()
         answers = await asyncio.gather(*asking)
         assert [a[0].message.payload for a in answers] == [str(i).encode() for i in range(100)]
@@ -140,7 +140,7 @@ async def test_a_handler_that_fails_takes_no_other_with_it() -> None:
     errors: list[object] = []
     asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context["exception"]))
 
-    def handler(message: Message) -> None:
+    def handler(message: Sample) -> None:
         if message.payload == b"1":
             raise LookupError("ours")
         seen.append(message.payload)
@@ -150,7 +150,7 @@ async def test_a_handler_that_fails_takes_no_other_with_it() -> None:
         await server.settle()
         await asyncio.sleep(0.1)
         for i in range(5):
-            client.send(Message("a", str(i).encode()))
+            client.send(Sample("a", str(i).encode()))
         await until(lambda: len(seen) == 4, "the others arrive")
         assert len(errors) == 1
 
@@ -170,7 +170,7 @@ async def test_each_value_arrives_in_its_order_however_many_keys_there_are() -> 
     async with pair("text/plain") as (server, client):
         kinds = set[str]()
 
-        def hear(message: Message) -> None:
+        def hear(message: Sample) -> None:
             got.setdefault(message.key, []).append(message.payload)
             kinds.add(message.encoding)
 
@@ -264,7 +264,7 @@ async def test_nothing_raises_after_the_end() -> None:
         await server.close()
         assert not server.publish([("a", b"1", None)])
         assert not server.is_publishing
-        assert not server.send(Message("a", b"1"))
+        assert not server.send(Sample("a", b"1"))
         server.declare_token("a/@/b")
         await server.settle()
         assert await server.get("x") == []
@@ -273,7 +273,7 @@ async def test_nothing_raises_after_the_end() -> None:
 
 
 async def test_a_job_that_raises_costs_nothing_but_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    got: list[Message] = []
+    got: list[Sample] = []
     async with pair() as (server, client):
         client.declare_subscriber("v/*", got.append)
         await client.settle()
@@ -282,7 +282,7 @@ async def test_a_job_that_raises_costs_nothing_but_itself(monkeypatch: pytest.Mo
             patched.setattr(link_module, "_publish", broken)
             patched.setattr(Publishers, "put", broken)
             server.publish([("v/1", b"lost", None)])
-            server.send(Message("v/1", b"lost too"))
+            server.send(Sample("v/1", b"lost too"))
             await until(lambda: server.errors == 2, "both are counted")
         server.publish([("v/1", b"later", None)])
         await until(lambda: [message.payload for message in got] == [b"later"], "the later one")
@@ -313,7 +313,7 @@ def dies(_: object) -> None:
 async def test_a_link_of_the_service_that_dies_is_opened_again(tmp_path: Path) -> None:
     path = sites.write(tmp_path, sites.bus(sites.node(sites.drive("fu1", "none", 1000))), name="link")
     wire = VirtualWire()
-    service = Service(load_project(path), lambda table: wire.end(table.name))
+    service = BusProcess(load_project(path), lambda table: wire.end(table.name))
     events: list[str] = []
     service.plant.on_event(lambda event: events.append(event.message))
     ready = asyncio.Event()

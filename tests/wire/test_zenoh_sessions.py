@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from tests.support.zenoh_peer import Peer, until, zenoh_peer
 from tests.support.zenoh_rig import FU3, Rig, rig
 from tests.support.zenoh_site import READY, drive_says, node_is

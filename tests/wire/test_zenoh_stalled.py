@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from tests.support.zenoh_rig import FU3, TOP, Rig, rig
 from tests.support.zenoh_site import ENABLED, drive_says, node_is
 

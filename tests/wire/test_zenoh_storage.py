@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from tests.support.zenoh_peer import until, zenoh_peer
 from tests.support.zenoh_rig import FU3, TOP, Rig, rig
 from tests.support.zenoh_router import zenoh_router

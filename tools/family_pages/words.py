@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from bridge.mapping import Family
-from bridge.mapping.fields import pattern_bits
+from bridge.mapping.entry_types import pattern_bits
 from bridge.mapping.model import Command
 from tools.family_pages.text import table
 

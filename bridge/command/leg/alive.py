@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.command.leg.turn import Turn
+from bridge.command.leg.draft import Draft
 from bridge.command.messages.request import Action, Code, Identity, Request
 from bridge.command.messages.telegram import Refusal
 from bridge.image import Value
@@ -15,48 +15,48 @@ _PROVES: Final = frozenset((Action.KEEP_ALIVE, Action.RESET_FAULT, Action.START)
 """Commands that have no place for a token, and count as telegrams."""
 
 
-def read(turn: Turn, who: Identity, token: Value | None) -> float | None:
+def read(draft: Draft, who: Identity, token: Value | None) -> float | None:
     """Until when telegrams count with this token, or with the one that ``who`` has brought back before; None
     where there is none. Raises ``Refusal``."""
-    life = turn.settings.life
+    life = draft.settings.life
     if life is None:
         if token is not None:
             raise Refusal(Code.UNKNOWN_POINT, Text.of("life_sign.not_asked_for"))
         return None
-    until = turn.owner.alive_until if who.goes_on_as(turn.owner.identity) else None
+    until = draft.owner.alive_until if who.goes_on_as(draft.owner.identity) else None
     if token is None:
         return until
     if isinstance(token, bool) or not isinstance(token, int | float) or token not in range(0x1_0000):
         raise Refusal(Code.OUT_OF_RANGE, Text.of("life_sign.range"))
-    issued_at = life.issued_at(int(token), turn.now)
+    issued_at = life.issued_at(int(token), draft.now)
     if issued_at is None:
         return until
-    ends_at = issued_at + turn.timer.timeout_ms / 1000
+    ends_at = issued_at + draft.timer.timeout_ms / 1000
     return ends_at if until is None else max(until, ends_at)
 
 
-def is_missing(turn: Turn, until: float | None) -> bool:
+def is_missing(draft: Draft, until: float | None) -> bool:
     """Whether a telegram that counts until then, as ``read`` says, does not count at all."""
-    return turn.settings.life is not None and (until is None or turn.now >= until)
+    return draft.settings.life is not None and (until is None or draft.now >= until)
 
 
 def refusal() -> Refusal:
     return Refusal(Code.NOT_VALID, Text.of("life_sign.missing"))
 
 
-def is_there(turn: Turn, who: Identity) -> bool:
+def is_there(draft: Draft, who: Identity) -> bool:
     """Whether what ``who`` does without a token proves that its program lives."""
-    until = turn.owner.alive_until if who.goes_on_as(turn.owner.identity) else None
-    return not is_missing(turn, until)
+    until = draft.owner.alive_until if who.goes_on_as(draft.owner.identity) else None
+    return not is_missing(draft, until)
 
 
-def check(turn: Turn, request: Request) -> None:
+def check(draft: Draft, request: Request) -> None:
     """Raises ``Refusal`` for a command that would be a telegram of a program that may be dead."""
-    if request.action in _PROVES and not is_there(turn, request.identity):
+    if request.action in _PROVES and not is_there(draft, request.identity):
         raise refusal()
 
 
-def note(turn: Turn, until: float | None) -> None:
+def note(draft: Draft, until: float | None) -> None:
     """The owner's telegrams count until then."""
-    if until is not None and until != turn.owner.alive_until:
-        turn.owner = turn.owner._replace(alive_until=until)
+    if until is not None and until != draft.owner.alive_until:
+        draft.owner = draft.owner._replace(alive_until=until)

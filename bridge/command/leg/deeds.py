@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 from bridge.command.leg import order
+from bridge.command.leg.draft import Draft
 from bridge.command.leg.effect import LetGo, StartEnded, Tripped
-from bridge.command.leg.forwarded import SENT_BEFORE, Asked, Stop
-from bridge.command.leg.state import STARTING, Output, Stage, Start, Trip
+from bridge.command.leg.forwarded import SENT_BEFORE, Asked, StopRule
+from bridge.command.leg.state import STARTING, RpdoWords, Stage, StartProgress, Trip
 from bridge.command.leg.table import TABLE, Deed, Stimulus
-from bridge.command.leg.turn import Turn
-from bridge.command.leg.words import at_rest
+from bridge.command.leg.word_table import at_rest
 from bridge.command.messages.request import DONE, Code, Outcome
 from bridge.command.messages.telegram import Refusal
 from bridge.drive import DriveState
@@ -53,160 +53,160 @@ class About(NamedTuple):
 _NOTHING: Final = About()
 
 
-def happen(turn: Turn, stimulus: Stimulus, about: About = _NOTHING) -> None:
+def happen(draft: Draft, stimulus: Stimulus, about: About = _NOTHING) -> None:
     """Go on as the table says. Raises ``Refusal`` where its deed is to refuse."""
-    turn.stage, deed = TABLE[turn.stage, stimulus]
+    draft.stage, deed = TABLE[draft.stage, stimulus]
     if deed is Deed.NOTHING:
         return
-    ends_start = turn.start is not None and turn.stage not in STARTING
+    ends_start = draft.start is not None and draft.stage not in STARTING
     if ends_start:
-        turn.effects.append(StartEnded(about.start_ends))
-    _DONE_BY[deed](turn, about)
+        draft.effects.append(StartEnded(about.start_ends))
+    _DONE_BY[deed](draft, about)
     if ends_start:
-        turn.start = None
+        draft.start = None
 
 
-def start_of(turn: Turn) -> Start:
+def start_of(draft: Draft) -> StartProgress:
     """The start that goes on: the deeds of one are in no other cells."""
-    assert turn.start is not None
-    return turn.start
+    assert draft.start is not None
+    return draft.start
 
 
 # what the owner and others ask
 
 
-def _forward(turn: Turn, about: About) -> None:
-    turn.asked = about.asked
-    turn.answer(about.done)
+def _forward(draft: Draft, about: About) -> None:
+    draft.asked = about.asked
+    draft.answer(about.done)
 
 
-def _take(turn: Turn, about: About) -> None:
-    turn.answer(Outcome(Code.OK, turn.why_blocked, forwarded=False))
+def _take(draft: Draft, about: About) -> None:
+    draft.answer(Outcome(Code.OK, draft.why_blocked, forwarded=False))
 
 
-def _refuse(turn: Turn, about: About) -> None:
+def _refuse(draft: Draft, about: About) -> None:
     assert about.refusal is not None
     raise about.refusal
 
 
-def _stop_as_asked(turn: Turn, about: About) -> None:
+def _stop_as_asked(draft: Draft, about: About) -> None:
     """A stop by a command, made from the word that is sent. A reaction of the watchdog goes on from it, too:
     after a ramp was begun, somebody may still disable the voltage. Silence is broken for it, once for each
     stop: whoever asks for the same again and again must not keep the drive's own supervision from
     tripping."""
-    assert isinstance(about.asked, Stop)
-    word = about.asked.of(turn.sent.words[0])
-    is_new = word != turn.trip.burst
-    turn.stop(word, is_asked=True)
-    turn.sent = Output((word, *turn.rest), turn.sent.silent)
-    turn.effects.append(LetGo())
-    if turn.stage is Stage.BURST and (is_new or turn.trip.burst_until is None):
-        turn.trip = turn.trip._replace(burst_until=turn.now + _BURST_S)
-    _forward(turn, about)
+    assert isinstance(about.asked, StopRule)
+    word = about.asked.of(draft.sent.words[0])
+    is_new = word != draft.trip.burst
+    draft.stop(word, is_asked=True)
+    draft.sent = RpdoWords((word, *draft.rest), draft.sent.silent)
+    draft.effects.append(LetGo())
+    if draft.stage is Stage.BURST and (is_new or draft.trip.burst_until is None):
+        draft.trip = draft.trip._replace(burst_until=draft.now + _BURST_S)
+    _forward(draft, about)
 
 
-def _keep_silent(turn: Turn, about: About) -> None:
-    turn.answer(Outcome(Code.OK, SENT_BEFORE, forwarded=False))
+def _keep_silent(draft: Draft, about: About) -> None:
+    draft.answer(Outcome(Code.OK, SENT_BEFORE, forwarded=False))
 
 
-def _clear(turn: Turn, about: About) -> None:
-    turn.trip = Trip()
+def _clear(draft: Draft, about: About) -> None:
+    draft.trip = Trip()
     if about.pulse:
-        turn.pulse_until = turn.now + _PULSE_S
+        draft.pulse_until = draft.now + _PULSE_S
 
 
-def _clear_and_stop(turn: Turn, about: About) -> None:
+def _clear_and_stop(draft: Draft, about: About) -> None:
     """Stop a drive that would go on after a fault of its own."""
-    _clear(turn, about)
-    turn.stop(about.word)
+    _clear(draft, about)
+    draft.stop(about.word)
 
 
 # what the bridge does by itself
 
 
-def _stop(turn: Turn, about: About) -> None:
-    turn.stop(turn.settings.words.stop(turn.sent.words[0]))
+def _stop(draft: Draft, about: About) -> None:
+    draft.stop(draft.settings.words.stop(draft.sent.words[0]))
 
 
-def _block(turn: Turn, about: About) -> None:
+def _block(draft: Draft, about: About) -> None:
     """The owner's word stays; a position that was ordered is not gone to any more."""
-    turn.order = order.dropped(turn.order)
+    draft.order = order.dropped(draft.order)
 
 
-def _react(turn: Turn, about: About) -> None:
-    reaction, then_silence_s = turn.settings.reaction, turn.settings.then_silence_s
-    turn.drop_setpoints()
-    turn.trip = Trip(
-        turn.now + _RAMP_LIMIT_S if reaction == "quick_stop" else None,
-        turn.now + then_silence_s if then_silence_s and reaction != "silence" else None,
+def _react(draft: Draft, about: About) -> None:
+    reaction, then_silence_s = draft.settings.reaction, draft.settings.then_silence_s
+    draft.drop_setpoints()
+    draft.trip = Trip(
+        draft.now + _RAMP_LIMIT_S if reaction == "quick_stop" else None,
+        draft.now + then_silence_s if then_silence_s and reaction != "silence" else None,
     )
-    _hold(turn, about)
+    _hold(draft, about)
 
 
-def _hold(turn: Turn, about: About) -> None:
-    turn.effects.append(Tripped(about.due, turn.owner.identity, turn.timer.timeout_ms))
+def _hold(draft: Draft, about: About) -> None:
+    draft.effects.append(Tripped(about.due, draft.owner.identity, draft.timer.timeout_ms))
 
 
-def _end_ramp(turn: Turn, about: About) -> None:
-    turn.trip = turn.trip._replace(ramps_until=None)
+def _end_ramp(draft: Draft, about: About) -> None:
+    draft.trip = draft.trip._replace(ramps_until=None)
 
 
-def _fall_silent(turn: Turn, about: About) -> None:
-    turn.trip = turn.trip._replace(silent_from=None, burst_until=None)
+def _fall_silent(draft: Draft, about: About) -> None:
+    draft.trip = draft.trip._replace(silent_from=None, burst_until=None)
 
 
 # a start
 
 
-def _wait(turn: Turn, about: About) -> None:
+def _wait(draft: Draft, about: About) -> None:
     """Hold the stop until it is known to be over: to become ready may mean to coast."""
-    turn.lead(at_rest(turn.settings.words, turn.sent.words[0]))
+    draft.lead(at_rest(draft.settings.words, draft.sent.words[0]))
 
 
-def _await_rest(turn: Turn, about: About) -> None:
-    turn.start = start_of(turn)._replace(settles_at=None, believed_at=None)
+def _await_rest(draft: Draft, about: About) -> None:
+    draft.start = start_of(draft)._replace(settles_at=None, believed_at=None)
 
 
-def _make_ready(turn: Turn, about: About) -> None:
-    turn.start = start_of(turn)._replace(believed_at=turn.now + BELIEVED_S, leaves_at=None)
-    turn.lead(turn.settings.words.ready)
+def _make_ready(draft: Draft, about: About) -> None:
+    draft.start = start_of(draft)._replace(believed_at=draft.now + BELIEVED_S, leaves_at=None)
+    draft.lead(draft.settings.words.ready)
 
 
-def _begin(turn: Turn, about: About) -> None:
+def _begin(draft: Draft, about: About) -> None:
     """Make the drive ready anew: where a stop was on its way, its last report was out of date."""
-    turn.lead(turn.settings.words.ready)
-    _go_on(turn, about)
+    draft.lead(draft.settings.words.ready)
+    _go_on(draft, about)
 
 
-def _go_on(turn: Turn, about: About) -> None:
+def _go_on(draft: Draft, about: About) -> None:
     """The next word for the state that the drive is in."""
-    start = start_of(turn)
-    turn.start = Start(start.word, start.until)
-    if turn.drive in _CAN_BE_ENABLED:
-        turn.lead(start.word)
-    elif turn.drive is DriveState.SWITCH_ON_INHIBITED:
-        turn.lead(turn.settings.words.ready)
+    start = start_of(draft)
+    draft.start = StartProgress(start.word, start.until)
+    if draft.drive in _CAN_BE_ENABLED:
+        draft.lead(start.word)
+    elif draft.drive is DriveState.SWITCH_ON_INHIBITED:
+        draft.lead(draft.settings.words.ready)
 
 
-def _enable(turn: Turn, about: About) -> None:
-    turn.start = start_of(turn)._replace(believed_at=None)
-    turn.lead(start_of(turn).word)
+def _enable(draft: Draft, about: About) -> None:
+    draft.start = start_of(draft)._replace(believed_at=None)
+    draft.lead(start_of(draft).word)
 
 
-def _leave(turn: Turn, about: About) -> None:
-    words = turn.settings.words
-    turn.lead(words.disable_voltage(words.ready))
+def _leave(draft: Draft, about: About) -> None:
+    words = draft.settings.words
+    draft.lead(words.disable_voltage(words.ready))
 
 
-def _finish(turn: Turn, about: About) -> None:
-    turn.lead(start_of(turn).word | turn.settings.words.begin)
+def _finish(draft: Draft, about: About) -> None:
+    draft.lead(start_of(draft).word | draft.settings.words.begin)
 
 
-def _give_up(turn: Turn, about: About) -> None:
-    turn.stop(at_rest(turn.settings.words, turn.sent.words[0]))
+def _give_up(draft: Draft, about: About) -> None:
+    draft.stop(at_rest(draft.settings.words, draft.sent.words[0]))
 
 
-_DONE_BY: Final[Mapping[Deed, Callable[[Turn, About], None]]] = {
+_DONE_BY: Final[Mapping[Deed, Callable[[Draft, About], None]]] = {
     Deed.FORWARD: _forward,
     Deed.TAKE: _take,
     Deed.REFUSE: _refuse,

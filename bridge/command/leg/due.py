@@ -7,10 +7,10 @@ from typing import Final
 
 from bridge.command.leg import owners
 from bridge.command.leg.deeds import About, happen
+from bridge.command.leg.draft import Draft
 from bridge.command.leg.effect import Ignored
 from bridge.command.leg.table import Stimulus
-from bridge.command.leg.turn import Turn
-from bridge.command.messages.event import Kind
+from bridge.command.messages.event import EventKind
 from bridge.command.messages.request import Code, Outcome
 from bridge.config import Reaction
 from bridge.text import Text
@@ -24,31 +24,31 @@ _EXPIRED: Final[dict[Reaction, Stimulus]] = {
 }
 
 
-def judge(turn: Turn) -> None:
+def judge(draft: Draft) -> None:
     """Find out whether the controller is still there."""
-    timer = turn.timer
-    if timer.deadline is not None and turn.now >= timer.deadline:
-        turn.timer = timer._replace(deadline=None, is_overdue=True)
-        if turn.settings.ignores_errors:
-            turn.effects.append(Ignored())
-        elif not turn.is_tripped:
+    timer = draft.timer
+    if timer.deadline is not None and draft.now >= timer.deadline:
+        draft.timer = timer._replace(deadline=None, is_overdue=True)
+        if draft.settings.ignores_errors:
+            draft.effects.append(Ignored())
+        elif not draft.is_tripped:
             ends = Outcome(Code.CANCELLED, Text.of("start.watchdog_tripped"))
-            happen(turn, _EXPIRED[turn.settings.reaction], About(ends, due=timer.deadline))
-    lease_until = turn.owner.lease_until
-    if lease_until is not None and turn.now >= lease_until:
-        turn.tell(Kind.OWNER, 300, Text.of("owner.lease_ran_out", who=str(turn.owner.identity)))
-        owners.leave(turn)
+            happen(draft, _EXPIRED[draft.settings.reaction], About(ends, due=timer.deadline))
+    lease_until = draft.owner.lease_until
+    if lease_until is not None and draft.now >= lease_until:
+        draft.tell(EventKind.OWNER, 300, Text.of("owner.lease_ran_out", who=str(draft.owner.identity)))
+        owners.leave(draft)
 
 
-def run_out(turn: Turn) -> None:
+def run_out(draft: Draft) -> None:
     """End what has its time only."""
-    now = turn.now
-    ramps_until, silent_from, burst_until, _ = turn.trip
+    now = draft.now
+    ramps_until, silent_from, burst_until, _ = draft.trip
     if ramps_until is not None and now >= ramps_until:
-        happen(turn, Stimulus.RAMP_OVERDUE)
+        happen(draft, Stimulus.RAMP_OVERDUE)
     if silent_from is not None and now >= silent_from:
-        happen(turn, Stimulus.SILENCE_DUE)
+        happen(draft, Stimulus.SILENCE_DUE)
     if burst_until is not None and now >= burst_until:
-        happen(turn, Stimulus.BURST_OVER)
-    if turn.pulse_until is not None and now >= turn.pulse_until:
-        turn.pulse_until = None
+        happen(draft, Stimulus.BURST_OVER)
+    if draft.pulse_until is not None and now >= draft.pulse_until:
+        draft.pulse_until = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bridge.command.messages.event import Kind
+from bridge.command.messages.event import EventKind
 from bridge.command.messages.request import Identity, Outcome
 from bridge.text import Text
 
@@ -57,7 +57,7 @@ class Ignored:
 class Tell:
     """An event for people."""
 
-    kind: Kind
+    kind: EventKind
     severity: int
     said: Text
 

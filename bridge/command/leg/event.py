@@ -11,12 +11,12 @@ from bridge.text import Words
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
-    """The drive's status word says this. ``is_taken``: with the bit "set-point acknowledge"; ``fault`` is
-    empty but for a fault."""
+class StatusReport:
+    """The drive's status word says this. ``is_acknowledged``: with the bit "set-point acknowledge"; ``fault``
+    is empty but for a fault."""
 
     state: DriveState
-    is_taken: bool
+    is_acknowledged: bool
     fault: Words
 
 
@@ -52,7 +52,7 @@ class BridgeGap:
 
 
 @dataclass(frozen=True, slots=True)
-class OwnWatch:
+class StopsOnSilence:
     """Whether the drive stops by itself when it gets no RPDO any more."""
 
     stops: bool
@@ -67,4 +67,15 @@ class Connection:
     has_others: bool = False
 
 
-Event = Request | Time | Report | ActualWords | Way | NodeBack | StartAnew | BridgeGap | OwnWatch | Connection
+Event = (
+    Request
+    | Time
+    | StatusReport
+    | ActualWords
+    | Way
+    | NodeBack
+    | StartAnew
+    | BridgeGap
+    | StopsOnSilence
+    | Connection
+)

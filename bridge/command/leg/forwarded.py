@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 
 from bridge.command.leg.effect import Answer, Effect
 from bridge.command.leg.settings import LegSettings
-from bridge.command.leg.state import Output, Way
+from bridge.command.leg.state import RpdoWords, Way
 from bridge.command.messages.request import Code, Outcome
 from bridge.text import Said, Text
 
@@ -25,7 +25,7 @@ class Words(NamedTuple):
     setpoints: tuple[int, ...]
 
 
-class Stop(NamedTuple):
+class StopRule(NamedTuple):
     """A stop, by the function that makes it of a control word: it leaves one as it is that stops as much."""
 
     of: Callable[[int], int]
@@ -35,10 +35,10 @@ class Edge(NamedTuple):
     """An acknowledge bit of the bridge's own."""
 
 
-Asked = Words | Stop | Edge
+Asked = Words | StopRule | Edge
 
 
-def why_not(settings: LegSettings, asked: Asked, way: Way, sent: Output) -> Said:
+def why_not(settings: LegSettings, asked: Asked, way: Way, sent: RpdoWords) -> Said:
     """The reason why the bus does not say what is asked, where ``sent`` goes this ``way``; empty where it
     does."""
     if way.why_unsent:
@@ -48,7 +48,7 @@ def why_not(settings: LegSettings, asked: Asked, way: Way, sent: Output) -> Said
     words = settings.words
     word, *setpoints = sent.words
     match asked:
-        case Stop(of=of):
+        case StopRule(of=of):
             return "" if of(word) == word & ~words.acknowledge_mask else _REPLACED
         case Edge():
             return "" if word & words.acknowledge_mask else _REPLACED
@@ -67,7 +67,7 @@ def _free(settings: LegSettings) -> int:
 
 
 def judged(
-    settings: LegSettings, asked: Asked | None, way: Way, sent: Output, effects: list[Effect]
+    settings: LegSettings, asked: Asked | None, way: Way, sent: RpdoWords, effects: list[Effect]
 ) -> list[Effect]:
     """``effects`` of a request with its answer as the bus has it."""
     why = "" if asked is None else why_not(settings, asked, way, sent)

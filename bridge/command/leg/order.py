@@ -31,7 +31,7 @@ def ordered(order: Order, words: tuple[int, ...]) -> Order:
 
 
 def went_on(
-    order: Order, words: tuple[int, ...], now: float, *, is_taken: bool, commanded: bool
+    order: Order, words: tuple[int, ...], now: float, *, is_acknowledged: bool, commanded: bool
 ) -> tuple[Order, bool]:
     """The order after what the drive says, and whether the drive has failed to take it."""
     if order.rises_at is not None and now >= order.rises_at:
@@ -39,11 +39,11 @@ def went_on(
     if not commanded:
         order = dropped(order) if order.was_commanded else order
     elif order.is_raised:
-        if is_taken:
+        if is_acknowledged:
             order = order._replace(is_raised=False, deadline=None)
         elif order.deadline is not None and now >= order.deadline:
             order = order._replace(is_raised=False, deadline=None, taken=None, rises_at=now + _LOW_S)
             return order._replace(was_commanded=True), True
-    elif order.is_waiting and not is_taken and order.rises_at is None:
+    elif order.is_waiting and not is_acknowledged and order.rises_at is None:
         order = order._replace(is_waiting=False, is_raised=True, taken=words, deadline=now + _LIMIT_S)
     return (order if order.was_commanded is commanded else order._replace(was_commanded=commanded)), False

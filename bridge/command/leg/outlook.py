@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from bridge.catalogue.codes import WatchdogState
 from bridge.command.leg import start
+from bridge.command.leg.draft import Draft
 from bridge.command.leg.due import judge
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.settle import settle
-from bridge.command.leg.state import LegState, Output
-from bridge.command.leg.turn import Turn
+from bridge.command.leg.state import LegState, RpdoWords
 
 
 def watchdog_state(settings: LegSettings, state: LegState) -> WatchdogState:
@@ -34,12 +34,12 @@ def until(settings: LegSettings, state: LegState) -> float | None:
     return lease if trip is None or (lease is not None and lease < trip) else trip
 
 
-def output_then(settings: LegSettings, state: LegState) -> Output:
+def output_then(settings: LegSettings, state: LegState) -> RpdoWords:
     """Output from ``until`` on, made by the leg itself; the present one where ``until`` is None."""
     at = until(settings, state)
     if at is None:
         return state.sent
-    then = Turn(settings, state, at)
+    then = Draft(settings, state, at)
     judge(then)
     settle(then)
     return then.sent

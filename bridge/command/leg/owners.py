@@ -14,11 +14,11 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.command.leg.deeds import About, happen
+from bridge.command.leg.draft import Draft
 from bridge.command.leg.event import Connection
 from bridge.command.leg.state import Owner, Timer
 from bridge.command.leg.table import Stimulus
-from bridge.command.leg.turn import Turn
-from bridge.command.messages.event import Kind
+from bridge.command.messages.event import EventKind
 from bridge.command.messages.freshness import arrival_of
 from bridge.command.messages.request import DONE, STOP_ACTIONS, Action, Code, Identity, Outcome, Request, Role
 from bridge.command.messages.telegram import Refusal
@@ -66,157 +66,157 @@ def _take_refusal(control: str, owner: Owner, identity: Identity, *, is_replacea
     return None if identity.goes_on_as(owner.identity) else _taken(owner.identity, identity)
 
 
-def check_authority(turn: Turn, request: Request) -> None:
+def check_authority(draft: Draft, request: Request) -> None:
     """Raises ``Refusal`` where somebody else controls the drive. Stopping it is every operator's, unless the
     site file forbids it, and then where the owner is gone."""
-    identity, settings = request.identity, turn.settings
-    may_stop = settings.stop_by_anyone or _owner_is_gone(turn)
+    identity, settings = request.identity, draft.settings
+    may_stop = settings.stop_by_anyone or _owner_is_gone(draft)
     if request.action in STOP_ACTIONS and may_stop and identity.role >= Role.OPERATOR:
         return
     judge = _take_refusal if request.action is Action.TAKE_CONTROL else refusal
-    is_replaceable = _owner_is_replaceable(turn) or _is_quiet_beside(turn, identity)
-    why = judge(settings.control, turn.owner, identity, is_replaceable=is_replaceable)
+    is_replaceable = _owner_is_replaceable(draft) or _is_quiet_beside(draft, identity)
+    why = judge(settings.control, draft.owner, identity, is_replaceable=is_replaceable)
     if why:
         raise Refusal(Code.NOT_ALLOWED, why)
 
 
-def _owner_is_replaceable(turn: Turn) -> bool:
+def _owner_is_replaceable(draft: Draft) -> bool:
     """Without a lease, an owner that has sent no telegram yet holds nobody up either: no time ends that."""
-    timer = turn.timer
-    is_idle = timer.timeout_ms > 0 and timer.heard_at is None and turn.settings.control != "lease"
-    return timer.is_overdue or is_idle or _owner_is_gone(turn)
+    timer = draft.timer
+    is_idle = timer.timeout_ms > 0 and timer.heard_at is None and draft.settings.control != "lease"
+    return timer.is_overdue or is_idle or _owner_is_gone(draft)
 
 
-def _is_quiet_beside(turn: Turn, identity: Identity) -> bool:
+def _is_quiet_beside(draft: Draft, identity: Identity) -> bool:
     """Another connection of the owner's user asks, and the owner's, which may be half open, has said nothing
     for ``GONE_S`` where no watchdog judges it. A lease has an end of its own."""
-    quiet_until = turn.owner.quiet_until
-    is_over = quiet_until is not None and turn.now >= quiet_until
-    return is_over and identity.is_same(turn.owner.identity)
+    quiet_until = draft.owner.quiet_until
+    is_over = quiet_until is not None and draft.now >= quiet_until
+    return is_over and identity.is_same(draft.owner.identity)
 
 
-def _owner_is_gone(turn: Turn) -> bool:
+def _owner_is_gone(draft: Draft) -> bool:
     """True if the owner is gone and no watchdog says so: it has had no connection for ``GONE_S``, or not
     answered to a stop for so long."""
-    if turn.timer.timeout_ms:
+    if draft.timer.timeout_ms:
         return False
-    times = turn.owner.absent_until, turn.owner.stopped_until
-    return any(time is not None and turn.now >= time for time in times)
+    times = draft.owner.absent_until, draft.owner.stopped_until
+    return any(time is not None and draft.now >= time for time in times)
 
 
-def own(turn: Turn, request: Request) -> None:
+def own(draft: Draft, request: Request) -> None:
     """A valid telegram: who sent it owns the drive from now on."""
-    identity, owner = request.identity, turn.owner.identity
-    if request.pressed is False and identity.goes_on_as(turn.edges.pressed_by):
-        turn.edges = turn.edges._replace(pressed_by=None)
+    identity, owner = request.identity, draft.owner.identity
+    if request.pressed is False and identity.goes_on_as(draft.edges.pressed_by):
+        draft.edges = draft.edges._replace(pressed_by=None)
     if owner is None or not identity.goes_on_as(owner):
-        _hand_over(turn, identity)
+        _hand_over(draft, identity)
     elif identity.connection != owner.connection:
-        turn.owner = turn.owner._replace(identity=identity)
-    _renew(turn, arrival_of(request, turn.now))
+        draft.owner = draft.owner._replace(identity=identity)
+    _renew(draft, arrival_of(request, draft.now))
 
 
-def hear(turn: Turn, request: Request) -> None:
+def hear(draft: Draft, request: Request) -> None:
     """A valid telegram that says no more than that its sender is there."""
-    own(turn, request)
-    turn.hear(arrival_of(request, turn.now))
+    own(draft, request)
+    draft.hear(arrival_of(request, draft.now))
 
 
-def _renew(turn: Turn, at: float) -> None:
+def _renew(draft: Draft, at: float) -> None:
     """The owner has shown that it is there: its lease runs anew."""
-    identity, lease_s, lease_until, *times, alive_until = turn.owner
+    identity, lease_s, lease_until, *times, alive_until = draft.owner
     quiet_until = None
-    if turn.settings.control == "lease":
+    if draft.settings.control == "lease":
         lease_until = at + lease_s
-    elif not turn.timer.timeout_ms:
+    elif not draft.timer.timeout_ms:
         quiet_until = at + GONE_S
     elif times == _NO_TIMES:
         return
-    turn.owner = Owner(identity, lease_s, lease_until, quiet_until=quiet_until, alive_until=alive_until)
+    draft.owner = Owner(identity, lease_s, lease_until, quiet_until=quiet_until, alive_until=alive_until)
 
 
-def _hand_over(turn: Turn, identity: Identity, lease_s: float | None = None) -> None:
+def _hand_over(draft: Draft, identity: Identity, lease_s: float | None = None) -> None:
     """Another owner, or a lease taken anew; the drive is stopped where the owner changes."""
-    before = turn.owner.identity
+    before = draft.owner.identity
     changes = not identity.goes_on_as(before)
     if changes and before is not None:
-        leave(turn)
-    if lease_s is None or turn.settings.control != "lease":
-        lease_s = turn.owner.lease_s
-    turn.owner = Owner(identity, lease_s, alive_until=None if changes else turn.owner.alive_until)
-    _renew(turn, turn.now)
+        leave(draft)
+    if lease_s is None or draft.settings.control != "lease":
+        lease_s = draft.owner.lease_s
+    draft.owner = Owner(identity, lease_s, alive_until=None if changes else draft.owner.alive_until)
+    _renew(draft, draft.now)
     if changes:
-        turn.tell(Kind.OWNER, 200, Text.of("owner.controls", who=identity.named_beside(before)))
+        draft.tell(EventKind.OWNER, 200, Text.of("owner.controls", who=identity.named_beside(before)))
 
 
-def leave(turn: Turn) -> None:
+def leave(draft: Draft) -> None:
     """The owner goes; the drive is stopped first."""
-    site_ms = turn.settings.timeout_ms
-    if turn.timer.timeout_ms != site_ms:
-        turn.tell(Kind.CONFIGURATION, 400, Text.of("owner.timeout_of_site", timeout_ms=site_ms))
-    turn.timer = Timer(site_ms)
-    happen(turn, Stimulus.LEFT, About(Outcome(Code.CANCELLED, Text.of("start.owner_changed"))))
-    turn.owner = Owner(lease_s=turn.owner.lease_s)
-    turn.edges = turn.edges._replace(bit=None)
+    site_ms = draft.settings.timeout_ms
+    if draft.timer.timeout_ms != site_ms:
+        draft.tell(EventKind.CONFIGURATION, 400, Text.of("owner.timeout_of_site", timeout_ms=site_ms))
+    draft.timer = Timer(site_ms)
+    happen(draft, Stimulus.LEFT, About(Outcome(Code.CANCELLED, Text.of("start.owner_changed"))))
+    draft.owner = Owner(lease_s=draft.owner.lease_s)
+    draft.edges = draft.edges._replace(bit=None)
 
 
-def take_control(turn: Turn, identity: Identity, ttl_ms: int) -> None:
+def take_control(draft: Draft, identity: Identity, ttl_ms: int) -> None:
     low, high = _LEASE_MS
-    if turn.settings.control == "lease" and not low <= ttl_ms <= high:
+    if draft.settings.control == "lease" and not low <= ttl_ms <= high:
         raise Refusal(Code.OUT_OF_RANGE, Text.of("request.ttl_range", low=low, high=high))
-    owner = turn.owner.identity
-    if owner is not None and not _owner_is_replaceable(turn) and not identity.goes_on_as(owner):
+    owner = draft.owner.identity
+    if owner is not None and not _owner_is_replaceable(draft) and not identity.goes_on_as(owner):
         who, whom = identity.named_beside(owner), owner.named_beside(identity)
-        turn.tell(Kind.OWNER, 500, Text.of("owner.taken_away", who=who, whom=whom))
-    _hand_over(turn, identity, ttl_ms / 1000)
+        draft.tell(EventKind.OWNER, 500, Text.of("owner.taken_away", who=who, whom=whom))
+    _hand_over(draft, identity, ttl_ms / 1000)
 
 
-def release(turn: Turn, identity: Identity) -> Outcome:
-    if not identity.goes_on_as(turn.owner.identity):
+def release(draft: Draft, identity: Identity) -> Outcome:
+    if not identity.goes_on_as(draft.owner.identity):
         return Outcome(Code.OK, Text.of("request.not_in_control"))
-    turn.tell(Kind.OWNER, 200, Text.of("owner.released", who=str(turn.owner.identity)))
-    leave(turn)
+    draft.tell(EventKind.OWNER, 200, Text.of("owner.released", who=str(draft.owner.identity)))
+    leave(draft)
     return DONE
 
 
-def set_timeout(turn: Turn, identity: Identity, timeout_ms: int) -> None:
+def set_timeout(draft: Draft, identity: Identity, timeout_ms: int) -> None:
     """Another time for as long as the owner owns the drive, counted from its last telegram: setting it is
     none. A trip stays a trip."""
-    settings, timer = turn.settings, turn.timer
+    settings, timer = draft.settings, draft.timer
     if not settings.timeout_writable:
         raise Refusal(Code.NOT_ALLOWED, Text.of("request.timeout_fixed"))
-    if not identity.goes_on_as(turn.owner.identity):
+    if not identity.goes_on_as(draft.owner.identity):
         raise Refusal(Code.NOT_ALLOWED, Text.of("request.timeout_of_owner"))
     low, high = settings.timeout_range_ms
     if not low <= timeout_ms <= high:
         raise Refusal(Code.OUT_OF_RANGE, Text.of("request.timeout_range", low=low, high=high))
     runs = timeout_ms and timer.heard_at is not None and not timer.is_overdue
     deadline = (timer.heard_at or 0.0) + timeout_ms / 1000 if runs else None
-    alive_until = turn.owner.alive_until
+    alive_until = draft.owner.alive_until
     if alive_until is not None:
         alive_until += (timeout_ms - timer.timeout_ms) / 1000
         deadline = deadline and min(deadline, alive_until)
-    turn.timer = Timer(timeout_ms, timer.heard_at, deadline, timer.is_overdue)
+    draft.timer = Timer(timeout_ms, timer.heard_at, deadline, timer.is_overdue)
     judges_by_itself = timeout_ms > 0 or settings.control == "lease"
-    quiet_until = None if judges_by_itself else (timer.heard_at or turn.now) + GONE_S
-    turn.owner = turn.owner._replace(quiet_until=quiet_until, alive_until=alive_until)
+    quiet_until = None if judges_by_itself else (timer.heard_at or draft.now) + GONE_S
+    draft.owner = draft.owner._replace(quiet_until=quiet_until, alive_until=alive_until)
     said = Text.of("owner.timeout_set", timeout_ms=timeout_ms, who=str(identity))
-    turn.tell(Kind.CONFIGURATION, 400, said)
+    draft.tell(EventKind.CONFIGURATION, 400, said)
 
 
-def on_connection(turn: Turn, event: Connection) -> None:
+def on_connection(draft: Draft, event: Connection) -> None:
     """A connection has begun or ended: no telegram, and no end of control. What its user does next, over any
     connection, goes on where the one that has ended was."""
-    identity, owner, pressed_by = event.identity, turn.owner, turn.edges.pressed_by
+    identity, owner, pressed_by = event.identity, draft.owner, draft.edges.pressed_by
     if not event.is_there and pressed_by is not None and identity.goes_on_as(pressed_by):
-        turn.edges = turn.edges._replace(pressed_by=pressed_by.without_connection())
+        draft.edges = draft.edges._replace(pressed_by=pressed_by.without_connection())
     if owner.identity is None or not identity.is_same(owner.identity):
         return
     if event.is_there:
-        turn.owner = owner._replace(absent_until=None)
+        draft.owner = owner._replace(absent_until=None)
         return
     if identity.goes_on_as(owner.identity):
         owner = owner._replace(identity=owner.identity.without_connection())
     if not event.has_others:
-        owner = owner._replace(absent_until=turn.now + GONE_S)
-    turn.owner = owner
+        owner = owner._replace(absent_until=draft.now + GONE_S)
+    draft.owner = owner

@@ -4,54 +4,54 @@ from __future__ import annotations
 
 from bridge.command.leg import order
 from bridge.command.leg.deeds import About, happen
+from bridge.command.leg.draft import Draft
 from bridge.command.leg.due import run_out
 from bridge.command.leg.settings import HandshakeSettings
 from bridge.command.leg.state import Motion, Stage
 from bridge.command.leg.table import Stimulus
-from bridge.command.leg.turn import Turn
-from bridge.command.leg.words import send
-from bridge.command.messages.event import Kind
+from bridge.command.leg.word_table import send
+from bridge.command.messages.event import EventKind
 from bridge.command.messages.request import Code, Outcome
 from bridge.drive import DriveState
 from bridge.text import Text
 
 
-def look_at_way(turn: Turn) -> None:
+def look_at_way(draft: Draft) -> None:
     """Go on as the way to the drive is now. What was sent last may have closed it: a drive that is stopped
     needs a known position before it is enabled anew."""
-    if turn.may_enable:
-        happen(turn, Stimulus.WAY_OPEN)
+    if draft.may_enable:
+        happen(draft, Stimulus.WAY_OPEN)
     else:
-        happen(turn, Stimulus.WAY_CLOSED, About(Outcome(Code.NOT_READY, turn.why_blocked)))
+        happen(draft, Stimulus.WAY_CLOSED, About(Outcome(Code.NOT_READY, draft.why_blocked)))
 
 
-def settle(turn: Turn) -> None:
-    look_at_way(turn)
-    run_out(turn)
-    was_enabling = turn.is_enabling
-    if turn.drive is DriveState.FAULT and turn.word & turn.settings.words.acknowledge_mask:
+def settle(draft: Draft) -> None:
+    look_at_way(draft)
+    run_out(draft)
+    was_enabling = draft.is_enabling
+    if draft.drive is DriveState.FAULT and draft.word & draft.settings.words.acknowledge_mask:
         # It ends with the fault: what was asked for then would hold the motor after it.
-        turn.is_asked = False
-    send(turn)
-    if turn.stage is Stage.BURST:
-        turn.trip = turn.trip._replace(burst=turn.sent.words[0])
-    handshake = turn.settings.handshake
+        draft.is_asked = False
+    send(draft)
+    if draft.stage is Stage.BURST:
+        draft.trip = draft.trip._replace(burst=draft.sent.words[0])
+    handshake = draft.settings.handshake
     if handshake is not None:
-        _hand_position_over(turn, handshake)
-    if turn.is_enabling:
+        _hand_position_over(draft, handshake)
+    if draft.is_enabling:
         if not was_enabling:
-            turn.motion = Motion.SEEN if turn.is_enabled else Motion.EXPECTED
-        turn.is_asked = False
+            draft.motion = Motion.SEEN if draft.is_enabled else Motion.EXPECTED
+        draft.is_asked = False
 
 
-def _hand_position_over(turn: Turn, handshake: HandshakeSettings) -> None:
-    turn.order, is_untaken = order.went_on(
-        turn.order,
-        tuple(turn.setpoints[place] for place in handshake.places),
-        turn.now,
-        is_taken=turn.is_taken,
-        commanded=turn.is_commanded,
+def _hand_position_over(draft: Draft, handshake: HandshakeSettings) -> None:
+    draft.order, is_untaken = order.went_on(
+        draft.order,
+        tuple(draft.setpoints[place] for place in handshake.places),
+        draft.now,
+        is_acknowledged=draft.is_acknowledged,
+        commanded=draft.is_commanded,
     )
-    send(turn)
+    send(draft)
     if is_untaken:
-        turn.tell(Kind.REFUSED, 500, Text.of("start.position_not_taken"))
+        draft.tell(EventKind.REFUSED, 500, Text.of("start.position_not_taken"))

@@ -100,7 +100,7 @@ RESTS: Final = frozenset((Motion.ENDED, Motion.FAULTED))
 MAY_FOLLOW_LATE: Final = frozenset((Motion.EXPECTED, Motion.FAULTED))
 
 
-class Output(NamedTuple):
+class RpdoWords(NamedTuple):
     """Words of the RPDO, the control word first; ``silent``: send nothing at all."""
 
     words: tuple[int, ...]
@@ -142,7 +142,7 @@ class Edges(NamedTuple):
     pressed_by: Identity | None = None
 
 
-class Start(NamedTuple):
+class StartProgress(NamedTuple):
     """``word`` is the one that enables. Until ``settles_at`` a report may describe the time before a stop;
     at ``believed_at`` the last report is accepted although no new one came; at ``leaves_at`` a quick stop is
     left; at ``until`` the start is given up."""
@@ -199,7 +199,7 @@ class LegState(NamedTuple):
     timer: Timer
     word: int
     """The owner's control word, as it would like it, or what was led or stopped with since."""
-    sent: Output
+    sent: RpdoWords
     setpoints: tuple[int, ...]
     rest: tuple[int, ...]
     """The setpoints of a drive that nobody commands."""
@@ -211,10 +211,10 @@ class LegState(NamedTuple):
     is_asked: bool = False
     """The stop in force is one that somebody has asked for: it stays as it is."""
     drive: DriveState = DriveState.UNKNOWN
-    is_taken: bool = False
+    is_acknowledged: bool = False
     """The drive's status word has the bit "set-point acknowledge"."""
     motion: Motion = Motion.SEEN
-    start: Start | None = None
+    start: StartProgress | None = None
     trip: Trip = Trip()
     order: Order = Order()
     pulse_until: float | None = None

@@ -2,7 +2,8 @@
 
 The next stage and the deed come from this table and from nowhere else (``bridge.command.leg.deeds``);
 ``docs/reference/decision-tables.md`` has it printed. What an event is, and what has to hold for it, is
-decided where it comes in. Which word a drive gets then is a table of its own (``bridge.command.leg.words``).
+decided where it comes in. Which word a drive gets then is a table of its own
+(``bridge.command.leg.word_table``).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from bridge.base.ratelimit import PerSecond
 from bridge.text import Said, render
 
 
-class Kind(StrEnum):
+class EventKind(StrEnum):
     WATCHDOG = "watchdog"
     EMERGENCY = "emergency"
     NODE_LOST = "node_lost"
@@ -32,7 +32,7 @@ class Event:
     empty where nothing known has."""
 
     time: float
-    kind: Kind
+    kind: EventKind
     source: str
     severity: int
     said: Said
@@ -70,7 +70,9 @@ class EventQueue:
         return taken
 
 
-REPEATING: Final = frozenset((Kind.REFUSED, Kind.EMERGENCY, Kind.CONFIGURATION, Kind.INTRUDER))
+REPEATING: Final = frozenset(
+    (EventKind.REFUSED, EventKind.EMERGENCY, EventKind.CONFIGURATION, EventKind.INTRUDER)
+)
 """Kinds that an outsider can trigger at will; rate-limited."""
 _MOST_A_SECOND: Final = 10
 
@@ -80,7 +82,7 @@ class EventGate:
     is left out is still counted where it happens."""
 
     def __init__(self) -> None:
-        self._limits: dict[tuple[str, Kind], PerSecond] = {}
+        self._limits: dict[tuple[str, EventKind], PerSecond] = {}
 
     def admits(self, event: Event) -> bool:
         """Whether this event is passed on: of kinds that repeat, at most ten a second of each source."""

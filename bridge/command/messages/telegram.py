@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from bridge.command.messages.request import Code
-from bridge.drive import ControlWords, Meanings, ParameterSet, ValueCodec, Written, codecs
+from bridge.drive import ControlWords, MaskedBits, Meanings, ParameterSet, ValueCodec, codecs
 from bridge.image import Value
 from bridge.image.limits import ValueNotTaken
 from bridge.mapping.model import Family, Slot
@@ -43,7 +43,7 @@ class _Setpoints:
         self._masks: dict[int, int] = {}
         self._bits: dict[int, int] = {}
 
-    def put(self, leaf: str, written: tuple[Written, ...]) -> None:
+    def put(self, leaf: str, written: tuple[MaskedBits, ...]) -> None:
         """All of it or, where the same bits have been written otherwise, nothing: that raises ``Refusal``."""
         for one in written:
             mask, bits = self._masks.get(one.place, 0), self._bits.get(one.place, 0)
@@ -126,11 +126,11 @@ class TelegramDecoder:
             after = self._in_other_set(before, after, setpoints.places, was, word)
         return Telegram(control_word, after)
 
-    def _written(self, leaf: str, value: Value, in_set: int) -> tuple[Written, ...]:
+    def _written(self, leaf: str, value: Value, in_set: int) -> tuple[MaskedBits, ...]:
         place, codec = self._setpoints.get(leaf), self._values.get(leaf)
         if place is not None:
             self._check_carried(leaf, (place,))
-            return (Written(place, _WORD_MASK, _as_word(leaf, value)),)
+            return (MaskedBits(place, _WORD_MASK, _as_word(leaf, value)),)
         if codec is None:
             known = ", ".join(["control_word", *self._setpoints, *self._values])
             said = Text.of("telegram.no_command", drive=self._name, leaf=leaf, known=known)
@@ -155,8 +155,8 @@ class TelegramDecoder:
                 raise _not_configured(leaf, why)
 
     def _as_reported(
-        self, leaf: str, value: Value, word: int, written: tuple[Written, ...]
-    ) -> tuple[Written, ...]:
+        self, leaf: str, value: Value, word: int, written: tuple[MaskedBits, ...]
+    ) -> tuple[MaskedBits, ...]:
         """A scaled value is taken as the parameter set that the control word asks for has it. Where the drive
         is in another one, it would take the same words for something else: a word that enables is refused,
         and with any other, which may be a stop, it gets zero. Raises ``Refusal``."""
@@ -214,7 +214,7 @@ def _not_configured(leaf: str, why: Said) -> Refusal:
     return Refusal(Code.NOT_CONFIGURED, said)
 
 
-def _from_value(codec: ValueCodec, value: Value) -> tuple[Written, ...]:
+def _from_value(codec: ValueCodec, value: Value) -> tuple[MaskedBits, ...]:
     model = codec.model
     is_bit = model.bit is not None and isinstance(value, bool)
     try:

@@ -44,29 +44,29 @@ class NodeRestarted(NamedTuple):
     """The node has started anew, and is not in operation."""
 
 
-class Pause(NamedTuple):
+class TelegramGap(NamedTuple):
     """A telegram of the drive has come ``at`` that time, after a pause longer than its deadline. What it says
     comes after this."""
 
     at: float
 
 
-class Report(NamedTuple):
+class StatusChange(NamedTuple):
     """The drive's status word has another meaning now, by a telegram received ``at``."""
 
     says: Says
     at: float
 
 
-class Telegram(NamedTuple):
-    """Any telegram, after the ``Report`` where it brings one. ``speed`` is in any unit, None where it tells
-    none."""
+class TelegramHeard(NamedTuple):
+    """Any telegram, after the ``StatusChange`` where it brings one. ``speed`` is in any unit, None where it
+    tells none."""
 
     at: float
     speed: float | None
 
 
-class Time(NamedTuple):
+class TimePassed(NamedTuple):
     """It is ``now``, and the bus has been drained. ``heard_at`` is when the drive's last telegram was
     received; ``pause_s`` is the longest regular pause between two, None where it sends changes alone: silence
     means that nothing has changed."""
@@ -83,8 +83,8 @@ Event = (
     | CutOff
     | NodeStopped
     | NodeRestarted
-    | Pause
-    | Report
-    | Telegram
-    | Time
+    | TelegramGap
+    | StatusChange
+    | TelegramHeard
+    | TimePassed
 )

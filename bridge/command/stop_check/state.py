@@ -9,7 +9,7 @@ from math import inf
 from typing import Final, NamedTuple
 
 from bridge.catalogue.codes import LastStop as LastStop
-from bridge.command.stop_check.sums import StopTime, Unfollowed
+from bridge.command.stop_check.sums import IgnoredTime, Unfollowed
 
 
 class Sent(Enum):
@@ -31,7 +31,7 @@ class Says(Enum):
     AT_REST = "not enabled"
 
 
-class Place(StrEnum):
+class StopPlace(StrEnum):
     """Place of the stop in force on its way to the drive."""
 
     ENABLED = "enabled"
@@ -43,17 +43,17 @@ class Place(StrEnum):
     __hash__ = str.__hash__  # as that of the leg's stages
 
 
-PLACES: Final[Mapping[Place, str]] = {
-    Place.ENABLED: "no stop is in force: the last word enables",
-    Place.AWAY: "a stop is in force, and the drive's node is not in operation",
-    Place.TO_SEND: "a stop is in force that has not been handed to the bus",
-    Place.ON_BUS: "the stop has been handed to the bus: the drive is judged",
-    Place.CHANGING: "it has, and another stop is to be sent: the drive is judged by the first",
+PLACES: Final[Mapping[StopPlace, str]] = {
+    StopPlace.ENABLED: "no stop is in force: the last word enables",
+    StopPlace.AWAY: "a stop is in force, and the drive's node is not in operation",
+    StopPlace.TO_SEND: "a stop is in force that has not been handed to the bus",
+    StopPlace.ON_BUS: "the stop has been handed to the bus: the drive is judged",
+    StopPlace.CHANGING: "it has, and another stop is to be sent: the drive is judged by the first",
 }
 
 
-_JUDGED: Final = (Place.ON_BUS, Place.CHANGING)
-_AWAITS_SENDING: Final = (Place.TO_SEND, Place.CHANGING)
+_JUDGED: Final = (StopPlace.ON_BUS, StopPlace.CHANGING)
+_AWAITS_SENDING: Final = (StopPlace.TO_SEND, StopPlace.CHANGING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class StopVerdict:
     """The last stop has ended in ``outcome``, after ``before``. ``since`` is when it was handed to the bus,
     ``at`` when the drive said what this is about; ``again``: since it ignored a stop it has followed none."""
 
@@ -87,14 +87,14 @@ class Verdict:
     again: bool = False
     is_cut_off: bool = False
     """The bridge had taken the drive's node out of operation, and it has said nothing else since."""
-    summed: StopTime | None = None
+    summed: IgnoredTime | None = None
     """Stops that it ignores together, each of them too short to be judged by itself."""
 
 
 class StopState(NamedTuple):
     """One drive. Times are monotonic seconds. Defaults are those of a bridge that starts."""
 
-    place: Place = Place.AWAY
+    place: StopPlace = StopPlace.AWAY
     last_stop: LastStop = LastStop.NONE
     follows: bool = True
     """The drive has not ignored a stop since it last followed one; kept while it is not heard."""
@@ -131,8 +131,8 @@ class StopState(NamedTuple):
     look_at: float = -inf
     """Before that a look would find nothing new."""
     sums: Unfollowed = Unfollowed()
-    untold: tuple[Verdict, ...] = ()
-    """Verdicts that the next ``Time`` gives, unless the stop is over by then."""
+    untold: tuple[StopVerdict, ...] = ()
+    """Verdicts that the next ``TimePassed`` gives, unless the stop is over by then."""
 
     @property
     def is_on_bus(self) -> bool:
@@ -182,4 +182,4 @@ class StopState(NamedTuple):
 
     def sent_for_s(self, now: float) -> float:
         """For how long the stop in force has been on the bus; 0 where it is not."""
-        return max(0.0, now - self.since) if self.place is Place.ON_BUS else 0.0
+        return max(0.0, now - self.since) if self.place is StopPlace.ON_BUS else 0.0

@@ -19,29 +19,29 @@ from bridge.command.stop_check.event import (
     NodeOperational,
     NodeRestarted,
     NodeStopped,
-    Pause,
-    Report,
     Sends,
-    Telegram,
-    Time,
+    StatusChange,
+    TelegramGap,
+    TelegramHeard,
+    TimePassed,
 )
-from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopState, Verdict
-from bridge.command.stop_check.sums import StopTime, Unfollowed
-from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Finding, News, OutcomeDeed, PlaceDeed
+from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopState, StopVerdict
+from bridge.command.stop_check.sums import IgnoredTime, Unfollowed
+from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Evidence, News, OutcomeDeed, PlaceDeed
 
 _LOOK_AGAIN_S: Final = 1.0
 """How often a drive that is no longer heard is looked at."""
 _SOON_S: Final = 0.001
 
 
-def step(state: StopState, event: Event) -> tuple[StopState, tuple[Verdict, ...]]:
-    """Let ``event`` happen. Only ``Time`` brings verdicts: the bus has been drained by then."""
+def step(state: StopState, event: Event) -> tuple[StopState, tuple[StopVerdict, ...]]:
+    """Let ``event`` happen. Only ``TimePassed`` brings verdicts: the bus has been drained by then."""
     match event:
-        case Telegram():
+        case TelegramHeard():
             state = _telegram(state, event)
-        case Report():
+        case StatusChange():
             state = _report(state, event)
-        case Time():
+        case TimePassed():
             state = _time(state, event)
             verdicts = state.untold
             return (state._replace(untold=()) if verdicts else state), verdicts
@@ -58,13 +58,13 @@ def step(state: StopState, event: Event) -> tuple[StopState, tuple[Verdict, ...]
         case NodeRestarted():
             if state.is_cut_off:
                 state = _happens(state._replace(is_there=False), News.RESTARTED)
-        case Pause():
+        case TelegramGap():
             state = _happens(state, News.PAUSE, event.at)
     return state, ()
 
 
 def next_deadline(state: StopState) -> float | None:
-    """When a ``Time`` is due; a time that is over where something waits to be told."""
+    """When a ``TimePassed`` is due; a time that is over where something waits to be told."""
     at = state.untold[0].at if state.untold else _next_look(state)
     return None if at == inf else at
 
@@ -113,7 +113,7 @@ def _happens(state: StopState, news: News, now: float = inf, bounds: Bounds | No
     place, deed = PLACE_TABLE[state.place, news]
     before, state = state, _PLACE_DEEDS[deed](state, now, bounds or state.bounds)._replace(place=place)
     begins = state.is_on_bus and not before.obeys(now) and state.obeys(now)
-    return _found(state, Finding.BEGINS_TO_FOLLOW, now) if begins else state
+    return _found(state, Evidence.BEGINS_TO_FOLLOW, now) if begins else state
 
 
 def _nothing(state: StopState, now: float, bounds: Bounds) -> StopState:
@@ -216,7 +216,7 @@ _PLACE_DEEDS: Final[Mapping[PlaceDeed, Callable[[StopState, float, Bounds], Stop
 # the drive
 
 
-def _telegram(state: StopState, event: Telegram) -> StopState:
+def _telegram(state: StopState, event: TelegramHeard) -> StopState:
     is_older = state.is_on_bus and event.at < state.since
     if is_older or state.says is not Says.ENABLED or state.sent is Sent.SILENT:
         return state
@@ -224,10 +224,10 @@ def _telegram(state: StopState, event: Telegram) -> StopState:
     sums, summed = state.sums.seen(event.at, event.speed, off_s=off_s, ramp_s=ramp_s)
     if sums is not state.sums:
         state = state._replace(sums=sums)
-    return state if summed is None else _found(state, Finding.SUMMED, event.at, summed)
+    return state if summed is None else _found(state, Evidence.SUMMED, event.at, summed)
 
 
-def _report(state: StopState, event: Report) -> StopState:
+def _report(state: StopState, event: StatusChange) -> StopState:
     says, at, before = event.says, event.at, state.says
     has_obeyed = state.is_informed and state.obeys(at)
     has_risen = state.has_risen or says not in (Says.AT_REST, Says.NOTHING)
@@ -241,61 +241,63 @@ def _report(state: StopState, event: Report) -> StopState:
         return state
     if not state.obeys(at):
         if state.on_bus is Sent.RAMP:
-            again = Finding.PUSHED if before is Says.HOLDING else Finding.ENABLED_AGAIN
+            again = Evidence.PUSHED if before is Says.HOLDING else Evidence.ENABLED_AGAIN
             state = _found(state, again, at)
         return _judged(state, at)
     if state.last_stop is not LastStop.IGNORED:
         return _judged(state, at)
-    return state if has_obeyed else _found(state, Finding.BEGINS_TO_FOLLOW, at)
+    return state if has_obeyed else _found(state, Evidence.BEGINS_TO_FOLLOW, at)
 
 
 def _judged(state: StopState, at: float) -> StopState:
     """By a telegram received ``at``, which says what is known of the drive."""
     if state.obeys(at):
-        return _found(state, Finding.FOLLOWS, at)
-    return _found(state, Finding.RUNS_ON_LATE if at >= state.until else Finding.RUNS_ON, at)
+        return _found(state, Evidence.FOLLOWS, at)
+    return _found(state, Evidence.RUNS_ON_LATE if at >= state.until else Evidence.RUNS_ON, at)
 
 
-def _found(state: StopState, finding: Finding, at: float, summed: StopTime | None = None) -> StopState:
+def _found(state: StopState, finding: Evidence, at: float, summed: IgnoredTime | None = None) -> StopState:
     outcome, deeds = OUTCOME_TABLE[state.last_stop, finding]
     for deed in deeds:
         state = _OUTCOME_DEEDS[deed](state, at, outcome, summed)
     return state
 
 
-def _count(state: StopState, at: float, outcome: LastStop, summed: StopTime | None) -> StopState:
+def _count(state: StopState, at: float, outcome: LastStop, summed: IgnoredTime | None) -> StopState:
     return state._replace(follows_since=at)
 
 
-def _count_no_more(state: StopState, at: float, outcome: LastStop, summed: StopTime | None) -> StopState:
+def _count_no_more(state: StopState, at: float, outcome: LastStop, summed: IgnoredTime | None) -> StopState:
     return state._replace(follows_since=inf)
 
 
-def _rest(state: StopState, at: float, outcome: LastStop, summed: StopTime | None) -> StopState:
+def _rest(state: StopState, at: float, outcome: LastStop, summed: IgnoredTime | None) -> StopState:
     """A drive that is not enabled has ended its ramp: enabled again, it has until the short bound."""
     if state.says is not Says.AT_REST or state.has_rested or state.may_rise:
         return state
     return state._replace(has_rested=True, until=min(state.until, state.since + state.bounds.off_s))
 
 
-def _grant_ramp(state: StopState, at: float, outcome: LastStop, summed: StopTime | None) -> StopState:
+def _grant_ramp(state: StopState, at: float, outcome: LastStop, summed: IgnoredTime | None) -> StopState:
     return state._replace(until=at + state.bounds.ramp_s)
 
 
-def _grant_short(state: StopState, at: float, outcome: LastStop, summed: StopTime | None) -> StopState:
+def _grant_short(state: StopState, at: float, outcome: LastStop, summed: IgnoredTime | None) -> StopState:
     if state.is_graced:
         return state
     return state._replace(is_graced=True, until=max(state.until, at + state.bounds.off_s))
 
 
-def _tell(state: StopState, at: float, outcome: LastStop, summed: StopTime | None) -> StopState:
-    verdict = Verdict(outcome, state.last_stop, state.since, at, not state.follows, state.is_cut_off, summed)
+def _tell(state: StopState, at: float, outcome: LastStop, summed: IgnoredTime | None) -> StopState:
+    verdict = StopVerdict(
+        outcome, state.last_stop, state.since, at, not state.follows, state.is_cut_off, summed
+    )
     follows = outcome is LastStop.FOLLOWED
     untold = (*state.untold, verdict)
     return state._replace(last_stop=outcome, follows=follows, follows_since=inf, untold=untold)
 
 
-_Change = Callable[[StopState, float, LastStop, StopTime | None], StopState]
+_Change = Callable[[StopState, float, LastStop, IgnoredTime | None], StopState]
 _OUTCOME_DEEDS: Final[Mapping[OutcomeDeed, _Change]] = {
     OutcomeDeed.COUNT: _count,
     OutcomeDeed.COUNT_NO_MORE: _count_no_more,
@@ -309,7 +311,7 @@ _OUTCOME_DEEDS: Final[Mapping[OutcomeDeed, _Change]] = {
 # time
 
 
-def _time(state: StopState, event: Time) -> StopState:
+def _time(state: StopState, event: TimePassed) -> StopState:
     now, heard_at, pause_s = event
     if not state.is_on_bus or not state.is_informed:
         return state
@@ -320,13 +322,13 @@ def _time(state: StopState, event: Time) -> StopState:
         state = _judged(state, at)
     if now >= state.follows_since + state.bounds.off_s and state.obeys(now):
         # Not at once: another master's words and ours may alternate.
-        state = _found(state, Finding.CALM, now)
+        state = _found(state, Evidence.CALM, now)
     if now >= _next_look(state):
         state = state._replace(look_at=_next_telegram(state, event))
     return state
 
 
-def _next_telegram(state: StopState, event: Time) -> float:
+def _next_telegram(state: StopState, event: TimePassed) -> float:
     """When more will be known: nothing that the drive has said so far decides it."""
     now, heard_at, pause_s = event
     if pause_s is None:

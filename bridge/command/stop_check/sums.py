@@ -27,7 +27,7 @@ _STEADY: Final = 1 / 64
 
 
 @dataclass(frozen=True, slots=True)
-class StopTime:
+class IgnoredTime:
     """Of ``stops`` stops since the drive last obeyed, ``time_s`` in which it was enabled and has ``lost`` so
     much of its speed (1 is all of it; 0 where no speed is known). Times are monotonic seconds."""
 
@@ -44,14 +44,14 @@ class StopTime:
     has_counted: bool = False
     """The stop in force is one of ``stops``."""
 
-    def begin(self, begins_at: float) -> StopTime:
+    def begin(self, begins_at: float) -> IgnoredTime:
         seen_at = self.seen_at if self.is_steady else None
         return replace(self, begins_at=begins_at, seen_at=seen_at, has_counted=False, is_steady=False)
 
-    def obeyed(self) -> StopTime:
-        return StopTime(begins_at=self.begins_at)
+    def obeyed(self) -> IgnoredTime:
+        return IgnoredTime(begins_at=self.begins_at)
 
-    def seen(self, at: float, speed: float | None) -> StopTime:
+    def seen(self, at: float, speed: float | None) -> IgnoredTime:
         """A telegram that says *enabled*; ``speed`` in any unit, None where it is of no interest. One that
         stands, or turns round, obeys."""
         now = speed or 0.0
@@ -78,8 +78,8 @@ class StopTime:
 class Unfollowed:
     """Both judgements: *enabled* after words that take the voltage, and no slower after any stop."""
 
-    on: StopTime = StopTime()
-    fast: StopTime = StopTime()
+    on: IgnoredTime = IgnoredTime()
+    fast: IgnoredTime = IgnoredTime()
 
     def begin(self, on_from: float, fast_from: float) -> Unfollowed:
         """A stop, another word of it, or a drive that was not heard for a while. ``on_from`` is infinite
@@ -95,7 +95,7 @@ class Unfollowed:
 
     def seen(
         self, at: float, speed: float | None, *, off_s: float, ramp_s: float
-    ) -> tuple[Unfollowed, StopTime | None]:
+    ) -> tuple[Unfollowed, IgnoredTime | None]:
         """A telegram that says *enabled*; and the time that makes the stop in force an ignored one.
         ``off_s`` and ``ramp_s`` are the bounds of a single stop, ``speed`` is None where none is known."""
         on = self.on.seen(at, None)

@@ -10,9 +10,9 @@ from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from typing import Final
 
-from bridge.command.stop_check.state import LastStop, Place
+from bridge.command.stop_check.state import LastStop, StopPlace
 
-_P, _L = Place, LastStop
+_P, _L = StopPlace, LastStop
 
 
 class News(StrEnum):
@@ -49,7 +49,7 @@ class PlaceDeed(StrEnum):
     BOUND_ANEW = "the bound begins anew"
 
 
-class Finding(StrEnum):
+class Evidence(StrEnum):
     """Meaning of a telegram, or of time without one, for a stop that is on the bus."""
 
     __hash__ = str.__hash__
@@ -77,13 +77,13 @@ class OutcomeDeed(StrEnum):
     TELL = "tell"
 
 
-PlaceCell = tuple[Place, PlaceDeed]
+PlaceCell = tuple[StopPlace, PlaceDeed]
 OutcomeCell = tuple[LastStop, tuple[OutcomeDeed, ...]]
 
 _STOPPED: Final = (_P.AWAY, _P.TO_SEND, _P.ON_BUS, _P.CHANGING)
 _JUDGED: Final = (_P.ON_BUS, _P.CHANGING)
 
-_PLACES: Final[Mapping[News, Mapping[Iterable[Place], tuple[Place | None, PlaceDeed]]]] = {
+_PLACES: Final[Mapping[News, Mapping[Iterable[StopPlace], tuple[StopPlace | None, PlaceDeed]]]] = {
     News.ENABLES: {_STOPPED: (_P.ENABLED, PlaceDeed.FORGIVE)},
     News.STOPS: {(_P.ENABLED,): (_P.TO_SEND, PlaceDeed.BEGIN)},
     News.STOPS_AWAY: {(_P.ENABLED,): (_P.AWAY, PlaceDeed.BEGIN)},
@@ -106,31 +106,31 @@ _PLACES: Final[Mapping[News, Mapping[Iterable[Place], tuple[Place | None, PlaceD
     News.PAUSE: {_JUDGED: (None, PlaceDeed.BOUND_ANEW)},
 }
 
-_OUTCOMES: Final[Mapping[Finding, Mapping[LastStop, OutcomeCell]]] = {
-    Finding.FOLLOWS: {
+_OUTCOMES: Final[Mapping[Evidence, Mapping[LastStop, OutcomeCell]]] = {
+    Evidence.FOLLOWS: {
         _L.FORWARDED: (_L.FOLLOWED, (OutcomeDeed.REST, OutcomeDeed.TELL)),
         _L.FOLLOWED: (_L.FOLLOWED, (OutcomeDeed.REST,)),
         _L.IGNORED: (_L.IGNORED, (OutcomeDeed.REST,)),
     },
-    Finding.BEGINS_TO_FOLLOW: {_L.IGNORED: (_L.IGNORED, (OutcomeDeed.COUNT,))},
-    Finding.PUSHED: {_L.FOLLOWED: (_L.FOLLOWED, (OutcomeDeed.GRANT_RAMP,))},
-    Finding.ENABLED_AGAIN: {_L.FOLLOWED: (_L.FOLLOWED, (OutcomeDeed.GRANT_SHORT,))},
-    Finding.RUNS_ON: {_L.IGNORED: (_L.IGNORED, (OutcomeDeed.COUNT_NO_MORE,))},
-    Finding.RUNS_ON_LATE: {
+    Evidence.BEGINS_TO_FOLLOW: {_L.IGNORED: (_L.IGNORED, (OutcomeDeed.COUNT,))},
+    Evidence.PUSHED: {_L.FOLLOWED: (_L.FOLLOWED, (OutcomeDeed.GRANT_RAMP,))},
+    Evidence.ENABLED_AGAIN: {_L.FOLLOWED: (_L.FOLLOWED, (OutcomeDeed.GRANT_SHORT,))},
+    Evidence.RUNS_ON: {_L.IGNORED: (_L.IGNORED, (OutcomeDeed.COUNT_NO_MORE,))},
+    Evidence.RUNS_ON_LATE: {
         _L.FORWARDED: (_L.IGNORED, (OutcomeDeed.TELL,)),
         _L.FOLLOWED: (_L.IGNORED, (OutcomeDeed.TELL,)),
         _L.IGNORED: (_L.IGNORED, (OutcomeDeed.COUNT_NO_MORE,)),
     },
-    Finding.SUMMED: {
+    Evidence.SUMMED: {
         _L.FORWARDED: (_L.IGNORED, (OutcomeDeed.TELL,)),
         _L.FOLLOWED: (_L.IGNORED, (OutcomeDeed.TELL,)),
     },
-    Finding.CALM: {_L.IGNORED: (_L.FOLLOWED, (OutcomeDeed.TELL,))},
+    Evidence.CALM: {_L.IGNORED: (_L.FOLLOWED, (OutcomeDeed.TELL,))},
 }
 
 
-def _places() -> dict[tuple[Place, News], PlaceCell]:
-    table = {(place, news): (place, PlaceDeed.NOTHING) for place in Place for news in News}
+def _places() -> dict[tuple[StopPlace, News], PlaceCell]:
+    table = {(place, news): (place, PlaceDeed.NOTHING) for place in StopPlace for news in News}
     for news, row in _PLACES.items():
         for places, (after, deed) in row.items():
             for place in places:
@@ -138,9 +138,9 @@ def _places() -> dict[tuple[Place, News], PlaceCell]:
     return table
 
 
-def _outcomes() -> dict[tuple[LastStop, Finding], OutcomeCell]:
-    table: dict[tuple[LastStop, Finding], OutcomeCell] = {
-        (outcome, finding): (outcome, ()) for outcome in LastStop for finding in Finding
+def _outcomes() -> dict[tuple[LastStop, Evidence], OutcomeCell]:
+    table: dict[tuple[LastStop, Evidence], OutcomeCell] = {
+        (outcome, finding): (outcome, ()) for outcome in LastStop for finding in Evidence
     }
     for finding, row in _OUTCOMES.items():
         for outcome, cell in row.items():

@@ -10,20 +10,20 @@ from typing import Final
 
 from bridge.base.sdo_texts import text_of
 from bridge.canopen import width
-from bridge.canopen.dialogue import Read, Write
+from bridge.canopen.dialogue import SdoRead, SdoWrite
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
 from bridge.drive import Key, OwnJudgement
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.entry_types import ObjectRef
+from bridge.node.boot.error_status import BootError
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_plan import PdoPlan
-from bridge.node.boot.status import BootError
 from bridge.text import Said, Text
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class BootStep:
     """What the boot-up is doing now, for ``boot_status``; ``letter`` is the error status if it fails.
 
     ``needed_by`` is the key in the site file, or in ``mapping``, that asks for it; empty: nothing does, and
@@ -42,7 +42,7 @@ class Step:
         return Text.of("boot_step.needed", step=self.what, rule=self.needed_by)
 
 
-class Signal(Enum):
+class BootSignal(Enum):
     """Steps that need no more words."""
 
     FOUND = "the node is there"
@@ -57,7 +57,7 @@ class Signal(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Nmt:
+class SendNmt:
     command: NmtCommand
 
 
@@ -99,7 +99,9 @@ class ResetCommunication:
     why: Text
 
 
-Action = Step | Signal | Read | Write | Nmt | Pause | DeviceErrors | ResetCommunication | Await
+Action = (
+    BootStep | BootSignal | SdoRead | SdoWrite | SendNmt | Pause | DeviceErrors | ResetCommunication | Await
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,12 +227,12 @@ def same(have: bytes | None, want: bytes) -> bool:
 
 def wish(
     result: BootResult, index: int, sub: int = 0, channel: int = 1, *, may_be_silent: bool = True
-) -> Generator[Read, bytes | None, bytes | None]:
+) -> Generator[SdoRead, bytes | None, bytes | None]:
     """An object that nothing needs: None where the node has none, and, with a note, where it answers wrongly
     or not at all. Raises SdoError where it is silent too often to be there, or, without ``may_be_silent``,
     at all."""
     try:
-        return (yield Read(index, sub, channel))
+        return (yield SdoRead(index, sub, channel))
     except SdoError as error:
         if not (error.was_answered or may_be_silent):
             raise
@@ -264,7 +266,7 @@ def write_number(
     refused: SdoError | None = None
     for form in width.forms(data, have, signed=signed, is_number=is_number):
         try:
-            yield Write(index, sub, form, channel)
+            yield SdoWrite(index, sub, form, channel)
         except SdoError as error:
             refused = error
             if not error.by_server or not width.may_mean_width(error.code):

@@ -16,14 +16,14 @@ from bridge.node.boot.actions import (
     U8,
     U32,
     BootResult,
+    BootStep,
     DeviceErrors,
     Do,
     Pause,
     ResetCommunication,
-    Step,
     wish,
 )
-from bridge.node.boot.status import BootError
+from bridge.node.boot.error_status import BootError
 from bridge.text import Said, Text
 
 _REGISTER: Final = 0x1001
@@ -37,7 +37,7 @@ _RESTARTS_S: Final = 2.0
 
 def read_errors(node: Node, result: BootResult) -> Do:
     """Note and show the error register, and the newest errors where there is one."""
-    yield Step(Text.of("boot_step.errors"), "J")
+    yield BootStep(Text.of("boot_step.errors"), "J")
     register = _number((yield from wish(result, _REGISTER)), U8)
     codes: list[int] = []
     count = _number((yield from wish(result, _HISTORY)), U8) if register else 0
@@ -60,7 +60,7 @@ def reset_once(node: Node, result: BootResult) -> Do:
     if not memory.may_reset_for(errors.cause):
         return
     memory.note_reset(errors.cause)
-    yield Step(Text.of("boot_step.reset"), "J", needed_by="on_failed_start")
+    yield BootStep(Text.of("boot_step.reset"), "J", needed_by="on_failed_start")
     yield ResetCommunication(Text.of("boot.did_not_start", errors=errors.said))
     # Its boot-up message ends this boot-up, and begins the next one.
     yield Pause(_RESTARTS_S)

@@ -9,21 +9,21 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.canopen.pdo import MappingError, PdoCodec
 from bridge.command.node import Node
-from bridge.mapping.device import Signal
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.device_signals import Signal
+from bridge.mapping.entry_types import ObjectRef
 from bridge.node.boot.actions import (
     U8,
     U16,
     Action,
     BootResult,
+    BootStep,
     DevicePlan,
     PdoPlan,
     SignalPlan,
-    Step,
     number,
     wish,
 )
-from bridge.node.boot.pdos import read_entries
+from bridge.node.boot.drive_pdos import read_entries
 from bridge.node.boot.unusable import why_unusable
 from bridge.text import Text
 
@@ -40,7 +40,7 @@ Plan = Generator[Action, bytes | None, SignalPlan]
 def plan_device(node: Node, result: BootResult) -> Generator[Action, bytes | None, DevicePlan]:
     """Every PDO that is switched on and carries one of the family's inputs or outputs."""
     family = node.family
-    yield Step(Text.of("boot_step.pdos"), "J")
+    yield BootStep(Text.of("boot_step.pdos"), "J")
     inputs = {one.object: one for one in family.input}
     outputs = {one.object: one for one in family.output}
     # A TPDO that carries an output tells whether a stop of it is followed.

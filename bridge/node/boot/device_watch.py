@@ -11,14 +11,14 @@ from collections.abc import Generator
 from dataclasses import replace
 from typing import Final
 
-from bridge.canopen.dialogue import Read, optional
+from bridge.canopen.dialogue import SdoRead, optional
 from bridge.command.node import Node
-from bridge.command.output_words import OutputWords, Place
+from bridge.command.output_words import OutputPlace, OutputWords
 from bridge.command.outputs import Outputs
-from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, judge
-from bridge.mapping.fields import ObjectRef
-from bridge.node.boot.actions import Action, BootResult, Step, number
-from bridge.node.boot.own_supervision import bring_node
+from bridge.drive.own_judgement import OwnJudgement, OwnVerdict, judge
+from bridge.mapping.entry_types import ObjectRef
+from bridge.node.boot.actions import Action, BootResult, BootStep, number
+from bridge.node.boot.own_supervision_setup import bring_node
 from bridge.text import Said, Text
 
 _DIGITAL: Final = range(0x6200, 0x6400)
@@ -41,7 +41,7 @@ def judge_outputs(node: Node, outputs: Outputs, result: BootResult) -> Generator
         result.bridge_stop = 0, Text.of("outputs.all_hold")
         return
     needed_by = "enforce" if node.table.enforce else ""
-    yield Step(Text.of("boot_step.node_supervision"), "J", needed_by=needed_by)
+    yield BootStep(Text.of("boot_step.node_supervision"), "J", needed_by=needed_by)
     raws = yield from bring_node(node, result)
     own = judge(node.family, raws, node.bus, node.table)
     why = "" if own.verdict is OwnVerdict.STOPS else own.because
@@ -56,14 +56,14 @@ def judge_outputs(node: Node, outputs: Outputs, result: BootResult) -> Generator
         result.notes.append(Text.of("boot.outputs_not_safe", why=why))
 
 
-def read_why_not_safe(place: Place, safe: int) -> Generator[Read, bytes | None, Said]:
+def read_why_not_safe(place: OutputPlace, safe: int) -> Generator[SdoRead, bytes | None, Said]:
     """As ``why_not_safe``, by what the node holds."""
     mode = yield from _number(place.output.error_mode)
     value = yield from _number(place.output.error_value)
     return why_not_safe(place, safe, mode, value)
 
 
-def why_not_safe(place: Place, safe: int, mode: int | None, value: int | None) -> Said:
+def why_not_safe(place: OutputPlace, safe: int, mode: int | None, value: int | None) -> Said:
     """Why this output does not take its safe value when the node leaves Operational; empty where it does.
     ``mode`` and ``value`` are what error mode and error value hold, None where that is not known."""
     output = place.output
@@ -95,7 +95,7 @@ def keeps_outputs(own: OwnJudgement, why: Said, *, is_known: bool = True) -> Own
     return replace(own, watches=tuple(watches))
 
 
-def _number(ref: ObjectRef | None) -> Generator[Read, bytes | None, int | None]:
+def _number(ref: ObjectRef | None) -> Generator[SdoRead, bytes | None, int | None]:
     if ref is None:
         return None
     data = yield from optional(ref.index, ref.sub)

@@ -7,12 +7,12 @@ from collections.abc import Generator
 from dataclasses import dataclass
 
 from bridge.canopen import datatypes
-from bridge.canopen.dialogue import Read, optional
+from bridge.canopen.dialogue import SdoRead, optional
 from bridge.canopen.sdo import SdoError
 from bridge.command import Identification
 from bridge.command.node import Node
-from bridge.node.boot.actions import Action, BootResult, Do, Signal, Step, number, wish
-from bridge.node.boot.status import BootError
+from bridge.node.boot.actions import Action, BootResult, BootSignal, BootStep, Do, number, wish
+from bridge.node.boot.error_status import BootError
 from bridge.text import Text
 
 _ALL = 0xFFFF_FFFF
@@ -20,7 +20,7 @@ _LONGEST_TEXT = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
+class IdentityCheck:
     """``read & mask`` must be ``expected & mask``; a rule without a value compares nothing. ``key`` is where
     it stands."""
 
@@ -46,9 +46,9 @@ class Rule:
         raise BootError(self.letter, what)
 
 
-def _rules(expected: object, where: Text, table: str) -> list[tuple[Rule, Text]]:
+def _rules(expected: object, where: Text, table: str) -> list[tuple[IdentityCheck, Text]]:
     """The rules of an identity table; the mapping's has fewer keys than the site file's."""
-    rules: list[tuple[Rule, Text]] = []
+    rules: list[tuple[IdentityCheck, Text]] = []
     for letter, index, sub, name in (
         ("C", 0x1000, 0, "device_type"),
         ("D", 0x1018, 1, "vendor_id"),
@@ -58,7 +58,7 @@ def _rules(expected: object, where: Text, table: str) -> list[tuple[Rule, Text]]
     ):
         value = getattr(expected, name, None)
         mask = getattr(expected, f"{name}_mask", None)
-        rules.append((Rule(f"{table}.{name}", letter, index, sub, value, mask), where))
+        rules.append((IdentityCheck(f"{table}.{name}", letter, index, sub, value, mask), where))
     return rules
 
 
@@ -79,7 +79,7 @@ def identify(node: Node, device_type: int | None, result: BootResult) -> Do:
     read: dict[tuple[int, int], int | None] = {(0x1000, 0): device_type}
     for sub, letter in ((1, "D"), (2, "M"), (3, "N"), (4, "O")):
         key = next((rule.key for rule, _ in rules if rule.letter == letter and rule.expected is not None), "")
-        yield Step(Text.of("boot_step.identity"), letter, needed_by=key)
+        yield BootStep(Text.of("boot_step.identity"), letter, needed_by=key)
         data = yield from (optional(0x1018, sub) if key else wish(result, 0x1018, sub))
         read[0x1018, sub] = None if data is None else number(data)
     for rule, where in rules:
@@ -95,18 +95,18 @@ def identify(node: Node, device_type: int | None, result: BootResult) -> Do:
 def look_for() -> Generator[Action, bytes | None, int | None]:
     """Device type of the node, None where it is there and does not say it; SdoError where nobody answers, and
     a second time after it was woken."""
-    yield Step(Text.of("boot_step.look"), "B")
+    yield BootStep(Text.of("boot_step.look"), "B")
     try:
         return (yield from _device_type())
     except SdoError:
-        yield Signal.WAKE
+        yield BootSignal.WAKE
     return (yield from _device_type())
 
 
-def _device_type() -> Generator[Read, bytes | None, int | None]:
+def _device_type() -> Generator[SdoRead, bytes | None, int | None]:
     """Raises SdoError where there is no answer at all."""
     try:
-        return number((yield Read(0x1000)))
+        return number((yield SdoRead(0x1000)))
     except SdoError as error:
         if not error.was_answered:
             raise
@@ -117,7 +117,7 @@ def _text(
     letter: str, index: int, wanted: str | None, key: str, result: BootResult
 ) -> Generator[Action, bytes | None, str]:
     """A text of the node, in which the regular expression ``wanted``, if there is one, has to be found."""
-    yield Step(Text.of("boot_step.name"), letter, needed_by="" if wanted is None else key)
+    yield BootStep(Text.of("boot_step.name"), letter, needed_by="" if wanted is None else key)
     data = yield from (wish(result, index) if wanted is None else optional(index))
     text = datatypes.readable((data or b"")[:_LONGEST_TEXT]).strip()
     if wanted is not None and not re.search(wanted, text, re.IGNORECASE):

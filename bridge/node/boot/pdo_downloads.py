@@ -12,9 +12,9 @@ from typing import Final
 from bridge.canopen.dialogue import optional
 from bridge.config.download import Download
 from bridge.node.boot.actions import U8, Action, number, same
+from bridge.node.boot.error_status import BootError
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_settings import FIXED_BITS, Change, NotTaken, PdoObjects, write_pdo
-from bridge.node.boot.status import BootError
 
 _PDOS: Final = (range(0x1400, 0x1800), range(0x1800, 0x1C00))
 _MAPPING: Final = 0x0200

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bridge.canopen.pdo import PdoCodec
-from bridge.node.places.words import Place
+from bridge.node.places.word_map import WordPlace
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,7 @@ class PdoPlan:
     transmission_type: int
     event_timer_ms: int
     codec: PdoCodec
-    places: tuple[Place | None, ...]
+    places: tuple[WordPlace | None, ...]
     remote_allowed: bool = True
     """Bit 30 of a TPDO's COB-ID is 0: it may be asked for by remote frame."""
     name: str = ""

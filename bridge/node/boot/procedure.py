@@ -14,26 +14,26 @@ from bridge.node.boot.actions import (
     Await,
     Boot,
     BootResult,
+    BootSignal,
+    BootStep,
     Do,
-    Nmt,
     Pause,
-    Signal,
-    Step,
+    SendNmt,
 )
-from bridge.node.boot.configuration import configure
+from bridge.node.boot.configuration_download import configure
 from bridge.node.boot.device_errors import read_errors, reset_once
 from bridge.node.boot.device_pdos import plan_device
 from bridge.node.boot.device_watch import judge_outputs, read_held
-from bridge.node.boot.emergency import read_emcy_id
-from bridge.node.boot.error_control import set_error_control
+from bridge.node.boot.drive_pdos import plan_drive, plan_node_tpdos, refuse_doubles
+from bridge.node.boot.emcy_id import read_emcy_id
+from bridge.node.boot.error_control_setup import set_error_control
+from bridge.node.boot.error_status import BootError
 from bridge.node.boot.identity import identify, look_for
-from bridge.node.boot.listening import find_rpdos
 from bridge.node.boot.memory import BootMemory
-from bridge.node.boot.own_supervision import set_own_supervision
-from bridge.node.boot.pdos import plan_drive, plan_node_tpdos, refuse_doubles
+from bridge.node.boot.own_supervision_setup import set_own_supervision
+from bridge.node.boot.rpdo_discovery import find_rpdos
 from bridge.node.boot.scales import read_words
 from bridge.node.boot.sdo_servers import open_sdo_servers
-from bridge.node.boot.status import BootError
 from bridge.text import Text
 
 _GOES_OPERATIONAL_S: Final = 2.0
@@ -50,16 +50,16 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
     """
     result = BootResult(memory=memory or BootMemory())
     # Outside Operational it takes no RPDO: so first stop its drives, then do what may fail.
-    yield Signal.SEND_STOPPED
+    yield BootSignal.SEND_STOPPED
     device_type = yield from look_for()
-    yield Signal.FOUND
+    yield BootSignal.FOUND
     if result.memory.may_run:
         yield from find_rpdos(node, result)
-        yield Signal.SEND_STOPPED
+        yield BootSignal.SEND_STOPPED
         if result.memory.waits_for_sync:
             needed_ms = [takeover_ms(node.bus, kind) for kind in result.memory.rpdo_types]
             yield Pause(max(_SYNCS * node.bus.sync_period_ms, *needed_ms) / 1000)
-    yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+    yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
     yield from identify(node, device_type, result)
     yield from read_errors(node, result)
     yield from reset_once(node, result)
@@ -78,7 +78,7 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
             yield from read_held(outputs.words, result)
             yield from judge_outputs(node, outputs, result)
     yield from set_own_supervision(node, result)
-    yield Step(Text.of("boot_step.words"), "J")
+    yield BootStep(Text.of("boot_step.words"), "J")
     for drive in node.drives:
         result.words[drive.name] = yield from read_words(node, drive, result)
     yield from _start(node.table, result)
@@ -91,14 +91,14 @@ def _start(table: NodeTable, result: BootResult) -> Do:
     not come."""
     not_heard = "F" if table.supervision == "guarding" else "K"
     what = Text.of("boot_step.wait", supervision=Text.word("supervision", table.supervision))
-    yield Step(what, not_heard, needed_by="supervision")
-    yield Signal.START_SUPERVISION
+    yield BootStep(what, not_heard, needed_by="supervision")
+    yield BootSignal.START_SUPERVISION
     # It says its state when it is asked, or every so often.
     limit_s = max(_GOES_OPERATIONAL_S, 3 * table.supervision_ms / 1000)
     yield Await(None, limit_s)
-    yield Signal.AWAIT_RELEASE
-    yield Step(Text.of("boot_step.start"), "J")
-    yield Nmt(NmtCommand.START)
+    yield BootSignal.AWAIT_RELEASE
+    yield BootStep(Text.of("boot_step.start"), "J")
+    yield SendNmt(NmtCommand.START)
     try:
         yield Await(NmtState.OPERATIONAL, limit_s)
     except BootError as error:

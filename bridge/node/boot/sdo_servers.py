@@ -8,14 +8,14 @@ from typing import Final
 
 from bridge.base.sdo_texts import text_of
 from bridge.canopen import cobid
-from bridge.canopen.dialogue import Read, Write, optional
+from bridge.canopen.dialogue import SdoRead, SdoWrite, optional
 from bridge.canopen.nmt import NmtCommand
 from bridge.canopen.sdo import SdoError
 from bridge.catalogue import NodeSpec
 from bridge.command.node import Node
 from bridge.mapping.model import SdoServer
-from bridge.node.boot.actions import Action, BootResult, Do, Nmt, Step, number, told_as
-from bridge.node.boot.status import BootError
+from bridge.node.boot.actions import Action, BootResult, BootStep, Do, SendNmt, number, told_as
+from bridge.node.boot.error_status import BootError
 from bridge.node.places.sdo_channels import opened_servers
 from bridge.text import Text
 
@@ -32,13 +32,13 @@ def open_sdo_servers(node: Node | NodeSpec, result: BootResult) -> Do:
     """
     must_stop = False
     for server in opened_servers(node):
-        yield Step(Text.of("boot_step.channel", channel=server.number), "J", needed_by="sdo_channels")
+        yield BootStep(Text.of("boot_step.channel", channel=server.number), "J", needed_by="sdo_channels")
         with told_as(partial(_not_opened, server.number)):
             changed = yield from _open(server, node.table.id, result)
         must_stop = must_stop or (changed and server.after_stop)
     if must_stop:
-        yield Nmt(NmtCommand.STOP)
-        yield Nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
+        yield SendNmt(NmtCommand.STOP)
+        yield SendNmt(NmtCommand.ENTER_PRE_OPERATIONAL)
 
 
 def _not_opened(channel: int, error: SdoError) -> BootError:
@@ -56,9 +56,9 @@ def _open(server: SdoServer, node_id: int, result: BootResult) -> Generator[Acti
             continue
         changed = True
         if not have & _OFF:  # a COB-ID that is in use does not change
-            yield Write(index, sub, _bytes(have | _OFF))
-        yield Write(index, sub, _bytes(want))
-        kept = number((yield Read(index, sub)))
+            yield SdoWrite(index, sub, _bytes(have | _OFF))
+        yield SdoWrite(index, sub, _bytes(want))
+        kept = number((yield SdoRead(index, sub)))
         if kept & _COMPARED != want:
             name = f"{index:04X}h:{sub:02X}"
             raise BootError("J", Text.of("boot.id_not_kept", object=name, read=kept, wanted=want))

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bridge.command import Drive, HasParameters
+from bridge.command import Drive, ParameterHolder
 from bridge.command.node import Node
 from bridge.image import Value
 from bridge.mapping.own_places import OwnPlace, ends_own_watch, places
-from bridge.parameter import Entry, ParameterError
+from bridge.parameter import ParameterEntry, ParameterError
 from bridge.parameter.codec import encode_value
 from bridge.text import Said, Text
 
@@ -22,7 +22,7 @@ class OwnWatch:
         self._protection = node.names.protection
         self._places = {drive.name: places(drive.family) for drive in node.drives}
 
-    def why_kept(self, drive: HasParameters, entry: Entry, value: Value) -> Said:
+    def why_kept(self, drive: ParameterHolder, entry: ParameterEntry, value: Value) -> Said:
         """Why this is not written: a drive of the site is stopped by silence, and would not stop."""
         key = entry.address.index, entry.address.sub
         silent: list[str] = []
@@ -35,7 +35,9 @@ class OwnWatch:
             return ""
         return Text.of("own.would_end", parameter=entry.name, drives=tuple(silent))
 
-    def forget(self, drive: HasParameters, entry: Entry, now: float, *, is_certain: bool = True) -> None:
+    def forget(
+        self, drive: ParameterHolder, entry: ParameterEntry, now: float, *, is_certain: bool = True
+    ) -> None:
         """What the boot-up has read of it is not true any more, or, where it is not ``is_certain`` that it
         was written, may not be; the next boot-up reads it again."""
         if not self._protection.tells_own_supervision(entry.address):
@@ -44,18 +46,18 @@ class OwnWatch:
         for one in self._owners(drive, entry) or self._node.commanded:
             one.on_own_supervision_changed(why, now)
 
-    def _owners(self, drive: HasParameters, entry: Entry) -> Sequence[Drive]:
+    def _owners(self, drive: ParameterHolder, entry: ParameterEntry) -> Sequence[Drive]:
         """Drives that have the object for themselves: ``drive``, or another axis; none where it is the
         node's."""
         having = [one for one in self._node.drives if self._is_own(one, entry)]
         return [one for one in having if one is drive] or having
 
-    def _is_own(self, drive: Drive, entry: Entry) -> bool:
+    def _is_own(self, drive: Drive, entry: ParameterEntry) -> bool:
         index = entry.address.index
         return any(one.per_drive and one.ref.index == index for one in self._places[drive.name])
 
 
-def _raw(place: OwnPlace, entry: Entry, value: Value) -> int | None:
+def _raw(place: OwnPlace, entry: ParameterEntry, value: Value) -> int | None:
     """What the object would hold; None for a value that it does not take."""
     try:
         return place.number.decode(encode_value(entry, value, None))

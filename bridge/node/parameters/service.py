@@ -18,33 +18,33 @@ from bridge.command import (
     BusSide,
     Code,
     Event,
-    HasParameters,
+    EventKind,
     Identity,
-    Kind,
     Outcome,
+    ParameterHolder,
     ReadParameter,
     Reply,
     Request,
     Role,
     WriteParameter,
 )
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import refused
 from bridge.command.node import Node
 from bridge.node.parameters.own_watch import OwnWatch
-from bridge.node.parameters.polling import Came, ParameterPolling
+from bridge.node.parameters.parameter_polling import Came, ParameterPolling
+from bridge.node.parameters.parameter_view import NO_CHANNEL, ParameterView
 from bridge.node.parameters.run import Procedure, run
-from bridge.node.parameters.view import NO_CHANNEL, ParameterView
 from bridge.node.places.sdo_channels import FIRST, SdoChannels
 from bridge.parameter import (
     DriveParameters,
-    Entry,
     ObjectRef,
+    ParameterEntry,
     ParameterError,
-    Reading,
+    ParameterReading,
+    ParameterWritten,
     Transfer,
     Why,
-    Written,
 )
 from bridge.parameter.codec import check_raw, decode, shown
 from bridge.parameter.protection import Gate
@@ -65,7 +65,7 @@ _CODES: Final = {
 _ANSWERS: Final = frozenset((NodeState.OPERATIONAL, NodeState.STOPPED, NodeState.CONFIG_ERROR))
 """Where a node can be asked: it is heard, and its boot-up does not need the channel. One in Pre-operational
 answers (CiA 301 §7.3.2.2.2), one in Stopped does not."""
-Waiting = list[Callable[[Reading | ParameterError], None]]
+Waiting = list[Callable[[ParameterReading | ParameterError], None]]
 
 
 class NodeParameters:
@@ -128,7 +128,7 @@ class NodeParameters:
 
     # requests
 
-    def submit(self, request: Request, drive: HasParameters, now: float, reply: Reply) -> None:
+    def submit(self, request: Request, drive: ParameterHolder, now: float, reply: Reply) -> None:
         """Carry out a request for a parameter; ``reply`` is called once, when the drive has answered."""
         self._now = max(now, self._now)
         refusal = self._refusal(request, drive)
@@ -140,7 +140,7 @@ class NodeParameters:
         except ParameterError as error:
             self._conclude(request, drive, reply, _failed(error))
 
-    def _refusal(self, request: Request, drive: HasParameters) -> Outcome | None:
+    def _refusal(self, request: Request, drive: ParameterHolder) -> Outcome | None:
         """Why this is not even asked of the drive."""
         why = None if request.action is Action.READ_PARAMETER else _why_not_set(request.identity, drive)
         if why:
@@ -153,7 +153,7 @@ class NodeParameters:
             return _no(Code.NOT_CONFIGURED, Text.of("parameter.of", owner=drive.name, what=NO_CHANNEL))
         return None
 
-    def _begin(self, request: Request, drive: HasParameters, now: float, reply: Reply) -> None:
+    def _begin(self, request: Request, drive: ParameterHolder, now: float, reply: Reply) -> None:
         """Raises ``ParameterError`` where the request itself is wrong."""
         access = self._access[drive.name]
         conclude = partial(self._conclude, request, drive, reply)
@@ -187,12 +187,12 @@ class NodeParameters:
             self._run(steps, drive, partial(self._on_written, request, drive, entry, conclude))
 
     def _save(
-        self, access: DriveParameters, identity: Identity, drive: HasParameters, now: float, conclude: Reply
+        self, access: DriveParameters, identity: Identity, drive: ParameterHolder, now: float, conclude: Reply
     ) -> None:
         gate = Gate(identity.role >= Role.ENGINEER, lambda: drive.is_enabled)
         self._run(access.save(now, gate), drive, partial(self._on_saved, conclude))
 
-    def _gate(self, identity: Identity, drive: HasParameters, entry: Entry) -> Gate:
+    def _gate(self, identity: Identity, drive: ParameterHolder, entry: ParameterEntry) -> Gate:
         """What is not of the drive's own axis may move every one that the same channel reaches."""
         channel = self._channels[drive.name]
         sharing = [one for one in self._node.members if one.spec.sdo_channel == channel]
@@ -201,10 +201,10 @@ class NodeParameters:
 
     def _read(
         self,
-        drive: HasParameters,
-        entry: Entry,
+        drive: ParameterHolder,
+        entry: ParameterEntry,
         max_age_s: float,
-        done: Callable[[Reading | ParameterError], None],
+        done: Callable[[ParameterReading | ParameterError], None],
         priority: Priority = Priority.COMMAND,
     ) -> None:
         key = (drive.name, entry.address)
@@ -215,7 +215,7 @@ class NodeParameters:
         if shares:
             self._reading[key] = [done]
 
-        def on_result(result: Reading | ParameterError) -> None:
+        def on_result(result: ParameterReading | ParameterError) -> None:
             self._show(drive, entry, result)
             for one in self._reading.pop(key) if shares else [done]:
                 one(result)
@@ -226,7 +226,7 @@ class NodeParameters:
     def _run(
         self,
         procedure: Procedure[object],
-        drive: HasParameters,
+        drive: ParameterHolder,
         done: Callable[..., None],
         priority: Priority = Priority.COMMAND,
     ) -> None:
@@ -239,7 +239,11 @@ class NodeParameters:
     # results
 
     def _on_read(
-        self, drive: HasParameters, raw: Entry | None, conclude: Reply, result: Reading | ParameterError
+        self,
+        drive: ParameterHolder,
+        raw: ParameterEntry | None,
+        conclude: Reply,
+        result: ParameterReading | ParameterError,
     ) -> None:
         """``raw`` is the object whose bytes are asked for."""
         if isinstance(result, ParameterError):
@@ -252,10 +256,10 @@ class NodeParameters:
     def _on_written(
         self,
         request: Request,
-        drive: HasParameters,
-        entry: Entry,
+        drive: ParameterHolder,
+        entry: ParameterEntry,
         conclude: Reply,
-        result: Written | ParameterError,
+        result: ParameterWritten | ParameterError,
     ) -> None:
         self._writing.discard((drive.name, entry.address))
         if isinstance(result, ParameterError):
@@ -277,7 +281,9 @@ class NodeParameters:
         already = "" if result.changed else Text.of("parameter.held_already")
         conclude(Outcome(Code.OK, already, value=reading.value, time=reading.time))
 
-    def _as_listed(self, drive: HasParameters, entry: Entry, reading: Reading) -> Reading | ParameterError:
+    def _as_listed(
+        self, drive: ParameterHolder, entry: ParameterEntry, reading: ParameterReading
+    ) -> ParameterReading | ParameterError:
         """What was written as bytes, as the value that it is of."""
         listed = drive.spec.names.resolve(str(entry.address))
         held = self._access[drive.name].held(entry)
@@ -296,18 +302,18 @@ class NodeParameters:
         self._warn(self._node.name, result)
         conclude(Outcome(Code.OK, Text.of("parameter.is_saved")))
 
-    def _conclude(self, request: Request, drive: HasParameters, reply: Reply, outcome: Outcome) -> None:
+    def _conclude(self, request: Request, drive: ParameterHolder, reply: Reply, outcome: Outcome) -> None:
         """Tell the outcome; a refusal of a write is an event, too."""
         if outcome.abort_code:
             drive.on_sdo_refused(outcome.abort_code, self._now)
         if not outcome.ok and request.action is not Action.READ_PARAMETER:
             drive.on_refused(self._now)
             said = refused(request.action, str(request.identity), outcome.said)
-            self._events.report(Event(self._now, Kind.REFUSED, drive.name, 300, said))
+            self._events.report(Event(self._now, EventKind.REFUSED, drive.name, 300, said))
         reply(outcome)
 
     def _tell(self, source: str, severity: int, said: Text) -> None:
-        self._events.report(Event(self._now, Kind.CONFIGURATION, source, severity, said))
+        self._events.report(Event(self._now, EventKind.CONFIGURATION, source, severity, said))
 
     def _warn(self, source: str, warning: Said) -> None:
         if warning:
@@ -315,10 +321,10 @@ class NodeParameters:
 
     # points
 
-    def _poll(self, drive: HasParameters, entry: Entry, done: Callable[[Came], None]) -> None:
+    def _poll(self, drive: ParameterHolder, entry: ParameterEntry, done: Callable[[Came], None]) -> None:
         """Read a point."""
 
-        def on_result(result: Reading | ParameterError) -> None:
+        def on_result(result: ParameterReading | ParameterError) -> None:
             if isinstance(result, ParameterError):
                 done(Came.NEVER if self._view.is_final(result) else Came.FAILED)
             else:
@@ -326,7 +332,9 @@ class NodeParameters:
 
         self._read(drive, entry, 0.0, on_result, Priority.POLL)
 
-    def _show(self, drive: HasParameters, entry: Entry, result: Reading | ParameterError) -> None:
+    def _show(
+        self, drive: ParameterHolder, entry: ParameterEntry, result: ParameterReading | ParameterError
+    ) -> None:
         if isinstance(result, ParameterError):
             self._view.failed(drive.name, entry, result, self._now)
             return
@@ -337,7 +345,7 @@ class NodeParameters:
             drive.on_parameter(name, float(result.value), self._now)
 
 
-def _why_not_set(identity: Identity, drive: HasParameters) -> Text | None:
+def _why_not_set(identity: Identity, drive: ParameterHolder) -> Text | None:
     """Why ``identity`` may not set parameters: an engineer may, and where its protocol knows no roles, who
     controls the drive or could."""
     if identity.role >= Role.ENGINEER:

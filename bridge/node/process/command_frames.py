@@ -10,8 +10,8 @@ from typing import Final
 from bridge.command.node import Node
 from bridge.drive import ControlWords
 from bridge.node.boot import rpdo_plan
-from bridge.node.process.outputs import OutputPdos, OutputRpdo
-from bridge.node.process.process_data import DrivePdos, Rpdo
+from bridge.node.process.output_rpdos import OutputPdos, OutputRpdo
+from bridge.node.process.process_data import DrivePdos, DriveRpdo
 from bridge.node.process.stop_words import StopWords
 from bridge.text import Text, Words
 
@@ -19,12 +19,12 @@ NO_OUTPUTS: Final[Mapping[str, OutputPdos]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class CommandFrame:
     """One RPDO."""
 
     label: Text
     words: ControlWords
-    rpdo: Rpdo | OutputRpdo
+    rpdo: DriveRpdo | OutputRpdo
 
     def said(self, data: bytes) -> Words:
         """The words for what ``data`` asks of the drive; bytes where that is nothing."""
@@ -47,13 +47,13 @@ def commands_of(
     connected: Mapping[str, DrivePdos],
     stop_words: StopWords,
     output_pdos: Mapping[str, OutputPdos] = NO_OUTPUTS,
-) -> dict[int, Command]:
+) -> dict[int, CommandFrame]:
     """By COB-ID: of drives that are ``connected`` the RPDOs that the node has; of the others those under
     which they may listen; of drives that the site leaves out those of the factory; and those of outputs."""
     family = node.family
     words, count = ControlWords(family.control_word), len(family.process.rpdo)
     drives = {drive.slot.name: drive for drive in node.drives}
-    found: dict[int, Command] = {}
+    found: dict[int, CommandFrame] = {}
     for slot in family.slot:
         drive = drives.get(slot.name)
         if drive is None:
@@ -62,17 +62,17 @@ def commands_of(
                 for pdo in slot.rpdo
                 if not pdo.optional
             ]
-            rpdos = [Rpdo(plan, count) for plan in plans]
+            rpdos = [DriveRpdo(plan, count) for plan in plans]
         elif drive.name in connected:
             rpdos = list(connected[drive.name].rpdos)
         else:
-            rpdos = [Rpdo(plan, count) for plan in stop_words.plans(drive).values()]
+            rpdos = [DriveRpdo(plan, count) for plan in stop_words.plans(drive).values()]
         label = Text.of("frame.rpdo_of_slot", node=node.name, slot=slot.name)
         if drive:
             label = Text.of("frame.rpdo", owner=drive.name)
         for rpdo in rpdos:
-            found.setdefault(rpdo.cob_id, Command(label, words, rpdo))
+            found.setdefault(rpdo.cob_id, CommandFrame(label, words, rpdo))
     for name, pdos in output_pdos.items():
         label = Text.of("frame.rpdo", owner=name)
-        found |= {rpdo.cob_id: Command(label, pdos.control_words, rpdo) for rpdo in pdos.rpdos}
+        found |= {rpdo.cob_id: CommandFrame(label, pdos.control_words, rpdo) for rpdo in pdos.rpdos}
     return found

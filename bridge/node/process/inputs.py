@@ -8,7 +8,7 @@ from functools import partial
 from bridge.canopen.frame import Frame
 from bridge.canopen.sync import tpdo_deadline_s
 from bridge.command.device import Device, InputPdo
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.entry_types import ObjectRef
 from bridge.node.boot import PdoPlan, SignalPlan
 from bridge.text import Text
 

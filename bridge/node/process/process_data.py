@@ -11,13 +11,13 @@ from bridge.canopen.frame import Frame
 from bridge.canopen.sync import LAST_SYNCHRONOUS, REMOTE_SYNCHRONOUS, REMOTE_TYPES, tpdo_deadline_s
 from bridge.command import Drive
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.leg.state import Output
-from bridge.command.link import FurtherTpdo
+from bridge.command.drive_link import FurtherTpdo
+from bridge.command.leg.state import RpdoWords
 from bridge.command.node import Node
 from bridge.config import BusTable
 from bridge.image import Quality
 from bridge.node.boot import BootResult, PdoPlan
-from bridge.node.places.words import WordMap
+from bridge.node.places.word_map import WordMap
 from bridge.node.process.held import held_s
 from bridge.text import Text
 
@@ -55,7 +55,7 @@ class RunningBurst(NamedTuple):
         return self.until == wanted.until or earliest >= self.ends
 
 
-class Tpdo:
+class DriveTpdo:
     """Unpacks one TPDO of a drive into the drive's words. ``further`` is None for the one with the status
     word, by which the drive's freshness is judged."""
 
@@ -125,7 +125,7 @@ class Tpdo:
         return self._codec.unpack(data)
 
 
-class Rpdo:
+class DriveRpdo:
     """Packs one RPDO of a drive from the channel's output."""
 
     def __init__(self, plan: PdoPlan, words: int) -> None:
@@ -150,7 +150,7 @@ class Rpdo:
             self._packed = (self.frame(words),)
         return self._packed
 
-    def last_frame(self, output: Output) -> Frame | None:
+    def last_frame(self, output: RpdoWords) -> Frame | None:
         """The frame in which a burst ends, kept as well; None where it ends in silence."""
         if output.silent:
             return None
@@ -184,7 +184,7 @@ class DrivePdos:
     ) -> None:
         self._drive = drive
         words = len(drive.family.process.rpdo)
-        self.rpdos = tuple(Rpdo(plan, words) for plan in reversed(rpdos))
+        self.rpdos = tuple(DriveRpdo(plan, words) for plan in reversed(rpdos))
         self._endings = {rpdo: partial(_last_frame, rpdo, drive.channel) for rpdo in self.rpdos}
         kind = rpdos[0].transmission_type
         self._held_s = held_s(drive.bus, kind)
@@ -192,8 +192,8 @@ class DrivePdos:
         """Whether a stop has to be taken over by SYNC."""
         main, *others = tpdos
         self.tpdos = (
-            Tpdo(drive, main, None, reject),
-            *(Tpdo(drive, plan, _further(drive, plan), reject) for plan in others),
+            DriveTpdo(drive, main, None, reject),
+            *(DriveTpdo(drive, plan, _further(drive, plan), reject) for plan in others),
         )
 
     @property
@@ -224,7 +224,7 @@ class DrivePdos:
         return [rpdo.frame(words) for rpdo in self.rpdos]
 
 
-def _last_frame(rpdo: Rpdo, channel: DriveChannel) -> Frame | None:
+def _last_frame(rpdo: DriveRpdo, channel: DriveChannel) -> Frame | None:
     return rpdo.last_frame(channel.output_then())
 
 

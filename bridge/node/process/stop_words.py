@@ -18,7 +18,7 @@ from bridge.config.download import Download
 from bridge.config.model import pdo_table
 from bridge.mapping.model import Pdo
 from bridge.node.boot import MOST_ENTRIES, BootMemory, PdoPlan, rpdo_plan
-from bridge.node.process.process_data import DrivePdos, Rpdo
+from bridge.node.process.process_data import DrivePdos, DriveRpdo
 
 _RPDO: Final = 0x1400
 _TPDO: Final = 0x1800
@@ -59,7 +59,7 @@ class StopWords:
                 words = channel.output.words
             # Nothing is sent into objects that nobody knows.
             plans = [plan for plan in self.plans(drive).values() if plan.words]
-            packed = {plan.cob_id: Rpdo(plan, count).frame(words) for plan in plans}
+            packed = {plan.cob_id: DriveRpdo(plan, count).frame(words) for plan in plans}
             for frame in pdos.frames_with(words) if pdos else []:
                 packed.pop(frame.can_id, None)
                 packed[frame.can_id] = frame

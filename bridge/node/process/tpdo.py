@@ -17,10 +17,10 @@ def node_tpdos(
     plans: Sequence[NodePdoPlan], sync_period_ms: int, show: Show, reject: Reject
 ) -> dict[int, Callable[[Frame], None]]:
     """Who takes these TPDOs, by COB-ID."""
-    return {plan.pdo.cob_id: NodeTpdo(plan, sync_period_ms, show, reject).on_frame for plan in plans}
+    return {plan.pdo.cob_id: NodeTpdoReader(plan, sync_period_ms, show, reject).on_frame for plan in plans}
 
 
-class NodeTpdo:
+class NodeTpdoReader:
     """One of them. ``show`` gets name, value and time, and until when nobody need ask by SDO."""
 
     def __init__(

@@ -9,7 +9,7 @@ from typing import Final
 from bridge import __version__
 from bridge.catalogue import FIRST_CHANNEL, NodeSpec
 from bridge.config import BusTable
-from bridge.northbound.gateway.session import Net
+from bridge.northbound.gateway.gateway_session import Net
 
 _VERSION: Final = "0 0 {version} 0 1 3.00 {version}"
 """Vendor id, product code, revision, serial number, gateway class, version of the protocol, version of the

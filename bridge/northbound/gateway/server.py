@@ -10,12 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Final, cast
 
-from bridge.base.admission import Admission, Limits, Stage, Visitor
+from bridge.base.admission import Admission, ConnectionStage, Limits, Visitor
 from bridge.base.errors import Unavailable
 from bridge.base.notices import teller
 from bridge.base.quietlog import log_source
 from bridge.command import Identity, Role, Source
-from bridge.northbound.gateway.session import Net, Session
+from bridge.northbound.gateway.gateway_session import GatewaySession, Net
 from bridge.northbound.listening import ListeningSocket, listen, until_deaf
 from bridge.northbound.view import View
 
@@ -121,14 +121,14 @@ class GatewayServer:
 
     # what clients ask
 
-    def admit(self, client: _Client, on_lines: Callable[[], None]) -> Session | None:
+    def admit(self, client: _Client, on_lines: Callable[[], None]) -> GatewaySession | None:
         """None where there are clients enough."""
         visitor = Visitor(client.identity.user, self._clock(), client.stage, client.abort)
         if not self._admission.admit(visitor, visitor.since):
             return None
         client.visitor = visitor
         self._clients.add(client)
-        return Session(self._net, client.identity, self._view.submit, on_lines)
+        return GatewaySession(self._net, client.identity, self._view.submit, on_lines)
 
     def leave(self, client: _Client) -> None:
         self._clients.discard(client)
@@ -150,7 +150,7 @@ class _Client(asyncio.BufferedProtocol):
         self._server = server
         self._buffer = bytearray(_READ_MOST)
         self._transport: asyncio.Transport | None = None
-        self._session: Session | None = None
+        self._session: GatewaySession | None = None
         self._timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -168,8 +168,8 @@ class _Client(asyncio.BufferedProtocol):
             self._session.close()
         self._session = self._transport = None
 
-    def stage(self) -> Stage:
-        return Stage.SESSION if self._has_spoken else Stage.CONNECTED
+    def stage(self) -> ConnectionStage:
+        return ConnectionStage.SESSION if self._has_spoken else ConnectionStage.CONNECTED
 
     def abort(self) -> None:
         if self._transport:

@@ -8,7 +8,7 @@ from enum import Enum, IntEnum
 from typing import Final
 
 from bridge.command import Action
-from bridge.northbound.gateway.datatypes import TYPES, BadText, encode
+from bridge.northbound.gateway.cia309_types import TYPES, BadText, encode
 
 LONGEST_LINE: Final = 64 * 1024
 """In bytes: room for a domain of about 48 kB in base64."""
@@ -33,7 +33,7 @@ class ErrorCode(IntEnum):
     OUT_OF_MEMORY = 600
 
 
-class Refused(Exception):
+class BadLine(Exception):
     """A line that is no command here."""
 
     def __init__(self, code: ErrorCode) -> None:
@@ -41,7 +41,7 @@ class Refused(Exception):
         self.code = code
 
 
-class Setting(Enum):
+class GatewaySetting(Enum):
     NETWORK = "network"
     NODE = "node"
     SDO_TIMEOUT = "sdo_timeout"
@@ -50,7 +50,7 @@ class Setting(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Read:
+class GatewayRead:
     """``kind`` is a data type of 309-3."""
 
     index: int
@@ -59,20 +59,20 @@ class Read:
 
 
 @dataclass(frozen=True, slots=True)
-class Write:
+class GatewayWrite:
     index: int
     sub: int
     data: bytes
 
 
 @dataclass(frozen=True, slots=True)
-class Nmt:
+class GatewayNmt:
     action: Action
 
 
 @dataclass(frozen=True, slots=True)
 class Set:
-    setting: Setting
+    setting: GatewaySetting
     value: int
 
 
@@ -86,7 +86,7 @@ class Frames:
     """``_frames``, a command of our own: where the frames of the bus can be heard."""
 
 
-Command = Read | Write | Nmt | Set | Version | Frames
+Command = GatewayRead | GatewayWrite | GatewayNmt | Set | Version | Frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,25 +112,25 @@ _OTHERS: Final = ("enable", "disable", "info", "set", "init", "help", "led", "lo
 
 
 def split_sequence(text: str) -> tuple[int, str]:
-    """The sequence number of a line and what follows it. Raises ``Refused``."""
+    """The sequence number of a line and what follows it. Raises ``BadLine``."""
     match = _SEQUENCE.match(text)
     if match is None or int(match[1]) > _MOST_SEQUENCE:
-        raise Refused(ErrorCode.SYNTAX)
+        raise BadLine(ErrorCode.SYNTAX)
     return int(match[1]), text[match.end() :]
 
 
 def parse(text: str) -> CommandLine:
-    """The command in what follows the sequence number. Raises ``Refused``, also where there is none."""
+    """The command in what follows the sequence number. Raises ``BadLine``, also where there is none."""
     words = _words(text)
     places: list[int] = []
     while words and len(places) < 2 and _NUMBER.fullmatch(words[0]):
         places.append(_number(words.pop(0)))
     if not words:
-        raise Refused(ErrorCode.SYNTAX)
+        raise BadLine(ErrorCode.SYNTAX)
     command = _command(words)
     if isinstance(command, Set) and places:
         if len(places) > 1:
-            raise Refused(ErrorCode.SYNTAX)
+            raise BadLine(ErrorCode.SYNTAX)
         return CommandLine(command, net=places[0])
     node = places.pop() if places else None
     return CommandLine(command, places.pop() if places else None, node)
@@ -145,7 +145,7 @@ def _words(text: str) -> list[str]:
             break
         match = _WORD.match(text, place)
         if match is None or len(found) >= _MOST_WORDS:
-            raise Refused(ErrorCode.SYNTAX)
+            raise BadLine(ErrorCode.SYNTAX)
         found.append(match[2] if match[1] is None else match[1].replace('""', '"'))
         place = match.end()
     return found
@@ -155,47 +155,47 @@ def _command(words: list[str]) -> Command:
     first, rest = words[0].lower(), words[1:]
     nmt = _NMT.get(" ".join(words).lower())
     if nmt is not None:
-        return Nmt(nmt)
+        return GatewayNmt(nmt)
     if first in ("r", "read"):
         if len(rest) not in (2, 3):
-            raise Refused(ErrorCode.SYNTAX)
+            raise BadLine(ErrorCode.SYNTAX)
         index, sub = _object(rest)
-        return Read(index, sub, _kind(rest[2]) if len(rest) == 3 else "hex")
+        return GatewayRead(index, sub, _kind(rest[2]) if len(rest) == 3 else "hex")
     if first in ("w", "write"):
         if len(rest) < 4:
-            raise Refused(ErrorCode.SYNTAX)
+            raise BadLine(ErrorCode.SYNTAX)
         index, sub = _object(rest)
         try:
-            return Write(index, sub, encode(_kind(rest[2]), rest[3:]))
+            return GatewayWrite(index, sub, encode(_kind(rest[2]), rest[3:]))
         except BadText:
-            raise Refused(ErrorCode.SYNTAX) from None
+            raise BadLine(ErrorCode.SYNTAX) from None
     if first == "set" and len(rest) == 2:
         try:
-            return Set(Setting(rest[0].lower()), _number(rest[1]))
+            return Set(GatewaySetting(rest[0].lower()), _number(rest[1]))
         except ValueError:
-            raise Refused(ErrorCode.NOT_SUPPORTED) from None
+            raise BadLine(ErrorCode.NOT_SUPPORTED) from None
     if [first, *(word.lower() for word in rest)] == ["info", "version"]:
         return Version()
     if words == ["_frames"]:
         return Frames()
     is_known = first in _OTHERS or first.startswith(("lss_", "_"))
-    raise Refused(ErrorCode.NOT_SUPPORTED if is_known else ErrorCode.SYNTAX)
+    raise BadLine(ErrorCode.NOT_SUPPORTED if is_known else ErrorCode.SYNTAX)
 
 
 def _object(words: list[str]) -> tuple[int, int]:
     index, sub = _number(words[0]), _number(words[1])
     if index > 0xFFFF or sub > 0xFF:
-        raise Refused(ErrorCode.SYNTAX)
+        raise BadLine(ErrorCode.SYNTAX)
     return index, sub
 
 
 def _kind(word: str) -> str:
     if word.lower() not in TYPES:
-        raise Refused(ErrorCode.SYNTAX)
+        raise BadLine(ErrorCode.SYNTAX)
     return word.lower()
 
 
 def _number(word: str) -> int:
     if not _NUMBER.fullmatch(word):
-        raise Refused(ErrorCode.SYNTAX)
+        raise BadLine(ErrorCode.SYNTAX)
     return int(word, 16 if word[:2].lower() == "0x" else 10)

@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.catalogue import DeviceSpec
 from bridge.image import DataType, Point, Quality
-from bridge.mapping.device import Signal
+from bridge.mapping.device_signals import Signal
 from bridge.northbound.modbus.registers import (
     ABORT_CODE,
     ACKNOWLEDGE,
@@ -20,8 +20,8 @@ from bridge.northbound.modbus.registers import (
     VALUES,
     VALUES_NOT_GOOD,
     Allows,
+    RegisterTable,
     Row,
-    Table,
     row_maker,
     value_rows,
 )
@@ -76,16 +76,16 @@ class DeviceMap:
             if leaf.startswith("parameter/") and point.writable and point.data_type is not DataType.STRING
         ]
         shown = writable[:MOST_PARAMETERS]
-        self.parameters = value_rows(Table.HOLDING_REGISTER, shown, own, allows, PARAMETERS)
+        self.parameters = value_rows(RegisterTable.HOLDING_REGISTER, shown, own, allows, PARAMETERS)
 
-    def end(self, table: Table) -> int:
+    def end(self, table: RegisterTable) -> int:
         """First address behind its inputs or outputs."""
-        rows = self.input_registers if table is Table.INPUT_REGISTER else self.holding_registers
+        rows = self.input_registers if table is RegisterTable.INPUT_REGISTER else self.holding_registers
         return rows[-1].address + rows[-1].size if rows else VALUES
 
     @property
     def rows(self) -> Iterator[Row]:
-        row = row_maker(Table.INPUT_REGISTER, "r")
+        row = row_maker(RegisterTable.INPUT_REGISTER, "r")
         qualities = ", ".join(f"{quality.value} {quality.label}" for quality in Quality)
         yield row(QUALITY, "quality", "uint16", "", qualities)
         if self.has_outputs:
@@ -109,15 +109,17 @@ class DeviceMap:
         yield from self.holding_registers
         yield from self.parameters
         for address, bit in enumerate(self.discrete_inputs):
-            yield Row(Table.DISCRETE_INPUT, address, bit.name, "bool", "r")
+            yield Row(RegisterTable.DISCRETE_INPUT, address, bit.name, "bool", "r")
         for address, bit in enumerate(self.coils):
-            yield Row(Table.COIL, address, bit.name, "bool", "rw" if self._allows.may_command else "r")
+            yield Row(
+                RegisterTable.COIL, address, bit.name, "bool", "rw" if self._allows.may_command else "r"
+            )
 
     def _command_rows(self) -> Iterator[Row]:
         if not self.has_outputs:
             return
-        row = row_maker(Table.HOLDING_REGISTER, "rw" if self._allows.may_command else "r")
-        stop = row_maker(Table.HOLDING_REGISTER, "rw" if self._allows.may_stop else "r")
+        row = row_maker(RegisterTable.HOLDING_REGISTER, "rw" if self._allows.may_command else "r")
+        stop = row_maker(RegisterTable.HOLDING_REGISTER, "rw" if self._allows.may_stop else "r")
         alive = "not 0: a telegram; 0: release; reads 1 for the owner"
         yield row(KEEP_ALIVE, "keep_alive", "uint16", "", alive)
         yield row(ACKNOWLEDGE, "acknowledge", "uint16", "", "write 1 to acknowledge a trip; reads 0")
@@ -128,7 +130,7 @@ def _signals(
     group: str, signals: Iterable[Signal], points: Mapping[str, Point], access: str
 ) -> tuple[list[SignalBit], list[Row]]:
     """The bits and the registers of inputs or outputs, in the order of the mapping."""
-    table = Table.INPUT_REGISTER if group == "input" else Table.HOLDING_REGISTER
+    table = RegisterTable.INPUT_REGISTER if group == "input" else RegisterTable.HOLDING_REGISTER
     bits: list[SignalBit] = []
     rows: list[Row] = []
     address = VALUES

@@ -30,7 +30,7 @@ from bridge.northbound.modbus.device_registers import (
     DeviceMap,
     SignalBit,
 )
-from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused
+from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, ModbusException
 from bridge.northbound.modbus.registers import (
     ABORT_CODE,
     ACKNOWLEDGE,
@@ -43,8 +43,8 @@ from bridge.northbound.modbus.registers import (
     VALUE_FLAGS,
     VALUES,
     VALUES_NOT_GOOD,
+    RegisterTable,
     Row,
-    Table,
     Words32,
 )
 from bridge.northbound.modbus.unit import Unit, refuse_all_absent
@@ -82,12 +82,12 @@ class DeviceUnit(Unit):
         leaves = _SUPERVISION if device_map.has_outputs else ()
         self._supervision: Final = [place(f"supervision/{leaf}") for leaf in leaves]
         self._bits: Final = {
-            Table.DISCRETE_INPUT: bits(device_map.discrete_inputs),
-            Table.COIL: bits(device_map.coils),
+            RegisterTable.DISCRETE_INPUT: bits(device_map.discrete_inputs),
+            RegisterTable.COIL: bits(device_map.coils),
         }
         self._rows: Final = {
-            Table.INPUT_REGISTER: rows(device_map.input_registers),
-            Table.HOLDING_REGISTER: rows(device_map.holding_registers),
+            RegisterTable.INPUT_REGISTER: rows(device_map.input_registers),
+            RegisterTable.HOLDING_REGISTER: rows(device_map.holding_registers),
         }
         self._parameters: Final = Values32(device_map.parameters, name, view.image, words32, PARAMETERS)
         self._all: Final = sorted(
@@ -97,15 +97,15 @@ class DeviceUnit(Unit):
 
     # reading
 
-    def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]:
+    def read_bits(self, table: RegisterTable, start: int, count: int) -> Sequence[bool]:
         bits = self._bits[table]
-        if table is Table.COIL and not self._map.has_outputs:
-            raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        if table is RegisterTable.COIL and not self._map.has_outputs:
+            raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
         self._view.look(self._name)
-        if table is Table.DISCRETE_INPUT and start >= VALUE_FLAGS:
+        if table is RegisterTable.DISCRETE_INPUT and start >= VALUE_FLAGS:
             return self._flags(start, count)
         if start + count > len(bits):
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         readings = [(signal, self._image[index]) for signal, index in bits[start : start + count]]
         refuse_all_absent([reading.quality for _, reading in readings])
         return [
@@ -116,31 +116,33 @@ class DeviceUnit(Unit):
     def _flags(self, start: int, count: int) -> Sequence[bool]:
         """Flags of the values that are not good: those of the input registers and then the parameters, or the
         discrete inputs."""
-        first, indices = INPUT_FLAGS, [index for _, index in self._bits[Table.DISCRETE_INPUT]]
+        first, indices = INPUT_FLAGS, [index for _, index in self._bits[RegisterTable.DISCRETE_INPUT]]
         if start < INPUT_FLAGS:
-            of_rows = [index for _, index in self._rows[Table.INPUT_REGISTER]]
+            of_rows = [index for _, index in self._rows[RegisterTable.INPUT_REGISTER]]
             first, indices = VALUE_FLAGS, of_rows + self._parameters.indices
         if start - first + count > len(indices):
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         qualities = self._image.qualities(indices[start - first : start - first + count])
         return [quality is not Quality.GOOD for quality in qualities]
 
-    def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
+    def read_words(self, table: RegisterTable, start: int, count: int, caller: Identity) -> Sequence[int]:
         end = start + count
-        if table is Table.HOLDING_REGISTER and start >= PARAMETERS:
+        if table is RegisterTable.HOLDING_REGISTER and start >= PARAMETERS:
             self._check_parameters(start, end)
             return self._parameters.read(start, end)
-        if table is Table.HOLDING_REGISTER and not (self._map.has_outputs or self._map.parameters):
-            raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        if table is RegisterTable.HOLDING_REGISTER and not (self._map.has_outputs or self._map.parameters):
+            raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
         self._check_range(table, start, end)
         self._view.look(self._name)
         words: list[int] = []
         if start < VALUES:
-            known = self._diagnostics() if table is Table.INPUT_REGISTER else self._command_words(caller)
+            known = (
+                self._diagnostics() if table is RegisterTable.INPUT_REGISTER else self._command_words(caller)
+            )
             words = known[start - DIAGNOSTICS : end - DIAGNOSTICS]
         return words + self._value_words(table, start, end)
 
-    def _value_words(self, table: Table, start: int, end: int) -> list[int]:
+    def _value_words(self, table: RegisterTable, start: int, end: int) -> list[int]:
         """Registers from 32 on that are in the range."""
         touched = [
             (row, self._image[index]) for row, index in self._rows[table] if start <= row.address < end
@@ -151,15 +153,15 @@ class DeviceUnit(Unit):
             refuse_all_absent([reading.quality for _, reading in touched])
         return [word for row, reading in touched for word in words_read(row, reading, self._words32)]
 
-    def _check_range(self, table: Table, start: int, end: int) -> None:
+    def _check_range(self, table: RegisterTable, start: int, end: int) -> None:
         last = self._map.end(table)
         starts = {row.address for row, _ in self._rows[table]} | {last, VALUES}
         if end > last or start < DIAGNOSTICS or not {max(start, VALUES), max(end, VALUES)} <= starts:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
 
     def _check_parameters(self, start: int, end: int) -> None:
         if end > PARAMETERS + 2 * len(self._map.parameters) or (start - PARAMETERS) % 2 or (end - start) % 2:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
 
     def _diagnostics(self) -> list[int]:
         """Input registers 10 … 31."""
@@ -173,7 +175,9 @@ class DeviceUnit(Unit):
         put(QUALITY, worst_of(self._image.qualities(self._all)))
         put(AGE, *from_int(int(self._image[self._age].value)))
         put(ABORT, *from_int(int(self._image[self._abort].value)))
-        flagged = self._image.qualities(index for _, index in self._rows[Table.INPUT_REGISTER][:_FLAGS])
+        flagged = self._image.qualities(
+            index for _, index in self._rows[RegisterTable.INPUT_REGISTER][:_FLAGS]
+        )
         not_good = sum(1 << bit for bit, one in enumerate(flagged) if one is not Quality.GOOD)
         put(VALUES_NOT_GOOD, *from_int(not_good))
         if self._supervision:
@@ -205,8 +209,8 @@ class DeviceUnit(Unit):
         registers = self._map.holding_registers
         row = next((row for row in registers if row.address == write.address and row.size == 1), None)
         if row is None:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
-        (now_there,) = self.read_words(Table.HOLDING_REGISTER, write.address, 1, caller)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
+        (now_there,) = self.read_words(RegisterTable.HOLDING_REGISTER, write.address, 1, caller)
         word = now_there & write.and_mask | write.or_mask & ~write.and_mask
         return self.plan_words(write.address, (word,), caller)
 
@@ -217,10 +221,10 @@ class DeviceUnit(Unit):
         if start >= PARAMETERS:
             return [self._parameter(start, words, caller)]
         if not self._map.has_outputs:
-            raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+            raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
         if start < VALUES:
             return self._commands(start, words, caller)
-        self._check_range(Table.HOLDING_REGISTER, start, end)
+        self._check_range(RegisterTable.HOLDING_REGISTER, start, end)
         values: dict[str, Value] = {}
         for row in self._map.holding_registers:
             if start <= row.address < end:
@@ -230,21 +234,21 @@ class DeviceUnit(Unit):
 
     def _coils(self, start: int, count: int) -> Sequence[SignalBit]:
         if not self._map.has_outputs:
-            raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+            raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
         if start + count > len(self._map.coils):
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         return self._map.coils[start : start + count]
 
     def _commands(self, start: int, words: Sequence[int], caller: Identity) -> list[Request]:
         block = dict(enumerate(words, start))
         if not (start in _COMMANDS and start + len(words) - 1 in _COMMANDS):
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         if STOP in block and (block[STOP] or start == STOP):
             if block[STOP] not in _STOPS:
-                raise Refused(ExceptionCode.ILLEGAL_VALUE)
+                raise ModbusException(ExceptionCode.ILLEGAL_VALUE)
             return [self._request(Do(Action.STOP), caller)]
         if block.get(ACKNOWLEDGE, 0) > 1:
-            raise Refused(ExceptionCode.ILLEGAL_VALUE)
+            raise ModbusException(ExceptionCode.ILLEGAL_VALUE)
         requests: list[Request] = []
         if block.get(ACKNOWLEDGE):
             requests.append(replace(self._request(Do(Action.RESET_FAULT), caller), pressed=True))
@@ -258,7 +262,7 @@ class DeviceUnit(Unit):
         """One parameter only: a write of several could be carried out in part."""
         self._check_parameters(start, start + len(words))
         if len(words) != 2:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         ((row, value),) = self._parameters.written(start, words)
         return self._request(WriteParameter(row.name.removeprefix("parameter/"), value), caller)
 

@@ -22,9 +22,9 @@ from bridge.northbound.modbus.pdu import (
     Identify,
     Loopback,
     MaskWrite,
-    Read,
+    ModbusException,
+    ModbusRead,
     ReadWrite,
-    Refused,
     WriteBits,
     WriteWords,
     bits_answer,
@@ -33,7 +33,7 @@ from bridge.northbound.modbus.pdu import (
     refusal,
     words_answer,
 )
-from bridge.northbound.modbus.registers import BRIDGE_UNITS, MIRROR, Table, Words32
+from bridge.northbound.modbus.registers import BRIDGE_UNITS, MIRROR, RegisterTable, Words32
 from bridge.northbound.modbus.unit import BridgeUnit, Unit
 from bridge.northbound.modbus.units import Units
 from bridge.northbound.view import View
@@ -44,10 +44,10 @@ _log = logging.getLogger(__name__)
 Answer = Callable[[bytes], None]
 
 _TABLES: Final = {
-    Function.READ_COILS: Table.COIL,
-    Function.READ_DISCRETE_INPUTS: Table.DISCRETE_INPUT,
-    Function.READ_HOLDING_REGISTERS: Table.HOLDING_REGISTER,
-    Function.READ_INPUT_REGISTERS: Table.INPUT_REGISTER,
+    Function.READ_COILS: RegisterTable.COIL,
+    Function.READ_DISCRETE_INPUTS: RegisterTable.DISCRETE_INPUT,
+    Function.READ_HOLDING_REGISTERS: RegisterTable.HOLDING_REGISTER,
+    Function.READ_INPUT_REGISTERS: RegisterTable.INPUT_REGISTER,
 }
 
 EXCEPTIONS: Final = {
@@ -125,13 +125,13 @@ class Dispatcher:
             if unit is None:
                 if pdu[0] not in WRITES:  # a refused write is an event
                     self._note_unknown(unit_id, caller)
-                raise Refused(ExceptionCode.PATH_UNAVAILABLE)
+                raise ModbusException(ExceptionCode.PATH_UNAVAILABLE)
             request = parse(pdu)
             if isinstance(request, _Write):
                 self._write(unit, request, pdu[0], caller, answer, received_at)
                 return
             given = self._read(unit, request, caller)
-        except Refused as error:
+        except ModbusException as error:
             given = refusal(pdu[0], error.code)
             if pdu[0] in WRITES:
                 self._note_refusal(unit_id, pdu[0], caller, error.code)
@@ -159,11 +159,11 @@ class Dispatcher:
             return Text.of("modbus.unit_is_bridge", unit=unit_id, served=self._served)
         return Text.of("modbus.no_unit", unit=unit_id, served=self._served)
 
-    def _read(self, unit: Unit, request: Read | Identify | Loopback, caller: Identity) -> bytes:
+    def _read(self, unit: Unit, request: ModbusRead | Identify | Loopback, caller: Identity) -> bytes:
         match request:
-            case Read(function, start, count):
+            case ModbusRead(function, start, count):
                 table = _TABLES[function]
-                if table in (Table.COIL, Table.DISCRETE_INPUT):
+                if table in (RegisterTable.COIL, RegisterTable.DISCRETE_INPUT):
                     return bits_answer(function, unit.read_bits(table, start, count))
                 return words_answer(function, _words(unit, table, start, count, caller))
             case Identify():
@@ -181,7 +181,7 @@ class Dispatcher:
         answer: Answer,
         received_at: float,
     ) -> None:
-        """Plan the whole write, then submit it. Raises ``Refused`` before anything is submitted."""
+        """Plan the whole write, then submit it. Raises ``ModbusException`` before anything is submitted."""
         match request:
             case WriteWords(start, words):
                 plan = unit.plan_words(start, words, caller)
@@ -201,7 +201,7 @@ class Dispatcher:
             else:
                 try:
                     given = self._read_back(unit, request, caller)
-                except Refused as error:
+                except ModbusException as error:
                     given = refusal(function, error.code)
                 answer(given)
 
@@ -211,7 +211,7 @@ class Dispatcher:
 
     def _read_back(self, unit: Unit, request: ReadWrite, caller: Identity) -> bytes:
         start, count = request.read_start, request.read_count
-        words = _words(unit, Table.HOLDING_REGISTER, start, count, caller)
+        words = _words(unit, RegisterTable.HOLDING_REGISTER, start, count, caller)
         return words_answer(Function.READ_WRITE, words)
 
     def _submit(self, plan: Sequence[Request], conclude: Callable[[Outcome], None]) -> None:
@@ -228,10 +228,10 @@ class Dispatcher:
         self._view.submit(first, on_outcome)
 
 
-def _words(unit: Unit, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
+def _words(unit: Unit, table: RegisterTable, start: int, count: int, caller: Identity) -> Sequence[int]:
     """Registers of a unit; holding registers from ``MIRROR`` on are its input registers."""
-    if table is Table.HOLDING_REGISTER and start >= MIRROR:
-        return unit.read_words(Table.INPUT_REGISTER, start - MIRROR, count, caller)
+    if table is RegisterTable.HOLDING_REGISTER and start >= MIRROR:
+        return unit.read_words(RegisterTable.INPUT_REGISTER, start - MIRROR, count, caller)
     return unit.read_words(table, start, count, caller)
 
 

@@ -26,7 +26,7 @@ from typing import Final
 
 from bridge.command import Action, Do, Identity, Request, SetTimeout, Source, Write, WriteParameter
 from bridge.image import Quality, Value
-from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused
+from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, ModbusException
 from bridge.northbound.modbus.registers import (
     ABORT_CODE,
     ACKNOWLEDGE,
@@ -43,8 +43,8 @@ from bridge.northbound.modbus.registers import (
     VALUES,
     WORDS_NOT_GOOD,
     DriveMap,
+    RegisterTable,
     Row,
-    Table,
     Words32,
 )
 from bridge.northbound.modbus.unit import Unit, refuse_quality, state_code
@@ -92,11 +92,14 @@ class DriveUnit(Unit):
         }
         self._data: Final = {
             0: self._status,
-            **self._words[Table.INPUT_REGISTER],
+            **self._words[RegisterTable.INPUT_REGISTER],
             _RESERVED: place("status/drive_status_word"),
         }
         self._diagnostics: Final = [place(leaf) for leaf in _DIAGNOSTICS]
-        self._commands: Final = {0: place("command/control_word"), **self._words[Table.HOLDING_REGISTER]}
+        self._commands: Final = {
+            0: place("command/control_word"),
+            **self._words[RegisterTable.HOLDING_REGISTER],
+        }
         self._token = place("supervision/life_sign") if drive_map.has_life_sign else None
         self._brought = place("command/life_sign") if drive_map.has_life_sign else None
         self._last_command: Final = LIFE_SIGN if drive_map.has_life_sign else STOP
@@ -107,7 +110,7 @@ class DriveUnit(Unit):
         self._flagged: Final = self._inputs.indices[:_FLAGS]
         self._setpoints: Final = values(drive_map.setpoints)
         self._parameters: Final = values(drive_map.parameters, PARAMETERS)
-        self._halves: Final = {table: drive_map.second_halves(table) for table in Table}
+        self._halves: Final = {table: drive_map.second_halves(table) for table in RegisterTable}
 
     # reading
 
@@ -116,9 +119,9 @@ class DriveUnit(Unit):
         self._view.look(self._map.drive_name)
         return self._image[self._status].quality
 
-    def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]:
+    def read_bits(self, table: RegisterTable, start: int, count: int) -> Sequence[bool]:
         first = 0
-        if table is Table.COIL:
+        if table is RegisterTable.COIL:
             bits, quality = _bits(self._control_word), Quality.GOOD
         elif start >= VALUE_FLAGS:
             self._look()
@@ -127,13 +130,13 @@ class DriveUnit(Unit):
             quality = self._look()
             bits = _bits(int(self._image[self._status].value)) + [quality is each for each in Quality]
         if start - first + count > len(bits):
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         if start < QUALITY_BITS:
             refuse_quality(quality)
         return bits[start - first : start - first + count]
 
-    def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
-        is_input = table is Table.INPUT_REGISTER
+    def read_words(self, table: RegisterTable, start: int, count: int, caller: Identity) -> Sequence[int]:
+        is_input = table is RegisterTable.INPUT_REGISTER
         end = start + count
         self._check_range(table, start, end)
         if start >= PARAMETERS and not is_input:
@@ -152,19 +155,19 @@ class DriveUnit(Unit):
             words += self._setpoints.read(start, end, beside=start < VALUES)
         return words
 
-    def _check_range(self, table: Table, start: int, end: int) -> None:
+    def _check_range(self, table: RegisterTable, start: int, end: int) -> None:
         halves = self._halves[table]
         if end > self._map.end(table, start) or start in halves or end in halves:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
 
-    def _check_words(self, table: Table, start: int, end: int) -> None:
+    def _check_words(self, table: RegisterTable, start: int, end: int) -> None:
         """Refuse a range in which no word is available: not in the drive, not mapped, or not received yet."""
         if not start or end > PROCESS_WORDS + 1:
             return
         words = self._words[table]
         qualities = self._image.qualities(words[address] for address in range(start, end) if address in words)
         if not qualities:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         if not any(quality.has_value for quality in qualities):
             refuse_quality(qualities[0])
 
@@ -206,7 +209,7 @@ class DriveUnit(Unit):
         ]
         if end > WORDS_NOT_GOOD:
             # A word that the drive does not have is no bad one.
-            places = self._words[Table.INPUT_REGISTER]
+            places = self._words[RegisterTable.INPUT_REGISTER]
             words.append(self._not_good((place - 1 for place in places), places.values()))
             words += from_int(self._not_good(range(_FLAGS), self._flagged))
             words.append(int(telegrams))
@@ -239,7 +242,7 @@ class DriveUnit(Unit):
 
     def plan_bits(self, start: int, bits: Sequence[bool], caller: Identity) -> list[Request]:
         if start + len(bits) > _WORD_BITS:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         word = self._control_word
         for position, bit in enumerate(bits, start):
             word = word | 1 << position if bit else word & ~(1 << position)
@@ -247,7 +250,7 @@ class DriveUnit(Unit):
 
     def plan_mask(self, write: MaskWrite, caller: Identity) -> list[Request]:
         if write.address > PROCESS_WORDS:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         now_there = self._holding_words(caller)[write.address]
         word = now_there & write.and_mask | write.or_mask & ~write.and_mask
         return self.plan_words(write.address, (word,), caller)
@@ -262,8 +265,8 @@ class DriveUnit(Unit):
         open to everybody, and nothing else in its write is carried out.
         """
         end = start + len(words)
-        self._check_range(Table.HOLDING_REGISTER, start, end)
-        self._check_words(Table.HOLDING_REGISTER, start, end)
+        self._check_range(RegisterTable.HOLDING_REGISTER, start, end)
+        self._check_words(RegisterTable.HOLDING_REGISTER, start, end)
         if start >= PARAMETERS:
             return [self._parameter(start, words, caller)]
         self._check_writable(start, end)
@@ -271,7 +274,7 @@ class DriveUnit(Unit):
         if STOP in block and (block[STOP] or start == STOP):
             return [self._stop(block[STOP], caller)]
         if block.get(_RESERVED) or block.get(ACKNOWLEDGE, 0) > 1:
-            raise Refused(ExceptionCode.ILLEGAL_VALUE)
+            raise ModbusException(ExceptionCode.ILLEGAL_VALUE)
         values = self._values_of(start, words, block)
         if LIFE_SIGN in block:
             values = {**(values or {}), "life_sign": block[LIFE_SIGN]}
@@ -310,22 +313,22 @@ class DriveUnit(Unit):
     def _stop(self, code: int, caller: Identity) -> Request:
         action = _STOPS.get(code)
         if action is None:
-            raise Refused(ExceptionCode.ILLEGAL_VALUE)
+            raise ModbusException(ExceptionCode.ILLEGAL_VALUE)
         return Request(caller, self._map.drive_name, Do(action))
 
     def _check_writable(self, start: int, end: int) -> None:
         only_reserved = start == _RESERVED and end == KEEP_ALIVE
         if only_reserved or (start < VALUES and end > self._last_command + 1):
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
 
     def _process_values(self, block: dict[int, int]) -> dict[str, Value]:
         """Registers 0 … 8 of a write as values of the command group."""
-        words = self._words[Table.HOLDING_REGISTER]
+        words = self._words[RegisterTable.HOLDING_REGISTER]
         values: dict[str, Value] = {"control_word": block[0]} if 0 in block else {}
         for address in range(1, PROCESS_WORDS + 1):
             index, word = words.get(address), block.get(address, 0)
             if index is None and word:
-                raise Refused(ExceptionCode.ILLEGAL_VALUE)
+                raise ModbusException(ExceptionCode.ILLEGAL_VALUE)
             if index is None or address not in block:
                 continue
             if word or self._image[index].quality is Quality.GOOD:
@@ -339,7 +342,7 @@ class DriveUnit(Unit):
     def _parameter(self, start: int, words: Sequence[int], caller: Identity) -> Request:
         """One parameter only: a write of several could be carried out in part."""
         if len(words) != 2:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         ((row, value),) = self._parameters.written(start, words)
         name = row.name.removeprefix("parameter/")
         return Request(caller, self._map.drive_name, WriteParameter(name, value))

@@ -47,7 +47,7 @@ class ExceptionCode(IntEnum):
     NOT_RESPONDING = 0x0B
 
 
-class Refused(Exception):
+class ModbusException(Exception):
     """The request is answered with this exception code."""
 
     def __init__(self, code: ExceptionCode) -> None:
@@ -56,7 +56,7 @@ class Refused(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Read:
+class ModbusRead:
     """FC1 … FC4."""
 
     function: Function
@@ -117,7 +117,7 @@ class Identify:
     object_id: int
 
 
-PduRequest = Read | WriteBits | WriteWords | MaskWrite | ReadWrite | Loopback | Identify
+PduRequest = ModbusRead | WriteBits | WriteWords | MaskWrite | ReadWrite | Loopback | Identify
 
 _TWO: Final = struct.Struct(">HH")
 _THREE: Final = struct.Struct(">HHH")
@@ -131,27 +131,27 @@ _IDENTIFY_EVERYTHING: Final = 0x83  # conformity level: extended, as streams and
 def parse(pdu: bytes) -> PduRequest:
     """The request in ``pdu``, which has at least one byte.
 
-    Raises ``Refused``: ILLEGAL_FUNCTION for a function that is not served, ILLEGAL_VALUE for a count, length
-    or value that the function does not allow. Nothing else is raised, whatever the bytes are.
+    Raises ``ModbusException``: ILLEGAL_FUNCTION for a function that is not served, ILLEGAL_VALUE for a count,
+    length or value that the function does not allow. Nothing else is raised, whatever the bytes are.
     """
     parser = _PARSERS.get(pdu[0])
     if parser is None:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
     try:
         return parser(pdu)
     except struct.error:
-        raise Refused(ExceptionCode.ILLEGAL_VALUE) from None
+        raise ModbusException(ExceptionCode.ILLEGAL_VALUE) from None
 
 
 def _demand(condition: bool) -> None:
     if not condition:
-        raise Refused(ExceptionCode.ILLEGAL_VALUE)
+        raise ModbusException(ExceptionCode.ILLEGAL_VALUE)
 
 
-def _read(most: int, pdu: bytes) -> Read:
+def _read(most: int, pdu: bytes) -> ModbusRead:
     start, count = _TWO.unpack(pdu[1:])
     _demand(1 <= count <= most)
-    return Read(Function(pdu[0]), start, count)
+    return ModbusRead(Function(pdu[0]), start, count)
 
 
 def _write_coil(pdu: bytes) -> WriteBits:
@@ -192,7 +192,7 @@ def _read_write(pdu: bytes) -> ReadWrite:
 def _diagnostics(pdu: bytes) -> Loopback:
     _demand(len(pdu) >= 3)
     if pdu[1:3] != b"\0\0":
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
     _demand(len(pdu) >= 5)
     return Loopback(pdu)
 
@@ -200,7 +200,7 @@ def _diagnostics(pdu: bytes) -> Loopback:
 def _encapsulated(pdu: bytes) -> Identify:
     _demand(len(pdu) >= 2)
     if pdu[1] != _MEI_IDENTIFICATION:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
     _demand(len(pdu) == 4 and 1 <= pdu[2] <= 4)
     return Identify(pdu[2], pdu[3])
 
@@ -241,12 +241,12 @@ def identification_answer(request: Identify, objects: Mapping[int, bytes]) -> by
     """The answer to FC43/14 from ``objects`` by object id, in rising order.
 
     A stream begins at ``object_id`` and, if it is too long, names the object to continue with. Raises
-    ``Refused`` (ILLEGAL_ADDRESS) if a single object is asked for that does not exist.
+    ``ModbusException`` (ILLEGAL_ADDRESS) if a single object is asked for that does not exist.
     """
     if request.code == 4:
         value = objects.get(request.object_id)
         if value is None:
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         chosen = [(request.object_id, value)]
     else:
         last = {1: 0x02, 2: 0x7F, 3: 0xFF}[request.code]

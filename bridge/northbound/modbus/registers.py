@@ -58,7 +58,7 @@ ABORT_CODE: Final = "supervision/sdo_abort_code"
 _REGISTERS: Final = struct.Struct(">HH")
 
 
-class Table(StrEnum):
+class RegisterTable(StrEnum):
     COIL = "coil"
     DISCRETE_INPUT = "discrete input"
     INPUT_REGISTER = "input register"
@@ -66,10 +66,10 @@ class Table(StrEnum):
 
 
 _REFERENCE: Final = {
-    Table.COIL: 0,
-    Table.DISCRETE_INPUT: 1,
-    Table.INPUT_REGISTER: 3,
-    Table.HOLDING_REGISTER: 4,
+    RegisterTable.COIL: 0,
+    RegisterTable.DISCRETE_INPUT: 1,
+    RegisterTable.INPUT_REGISTER: 3,
+    RegisterTable.HOLDING_REGISTER: 4,
 }
 
 
@@ -81,7 +81,7 @@ class Row:
     its drive if it is a point.
     """
 
-    table: Table
+    table: RegisterTable
     address: int
     name: str
     type: str
@@ -131,14 +131,14 @@ class DriveMap:
         self.has_life_sign = drive.table.life_sign
         is_writable = drive.table.fieldbus_timeout_writable
         self.timeout_range_ms = drive.table.timeout_range_ms if is_writable else None
-        self.words: dict[Table, dict[int, str]] = {
-            Table.INPUT_REGISTER: _words("actual", family.process.tpdo, family.carried(slot)[1]),
-            Table.HOLDING_REGISTER: _words("command", family.process.rpdo, family.carried(slot)[0]),
+        self.words: dict[RegisterTable, dict[int, str]] = {
+            RegisterTable.INPUT_REGISTER: _words("actual", family.process.tpdo, family.carried(slot)[1]),
+            RegisterTable.HOLDING_REGISTER: _words("command", family.process.rpdo, family.carried(slot)[0]),
         }
         points = {point.name[len(drive.name) + 1 :]: point for point in drive.points}
         fixed = (
-            *_input_rows(self.words[Table.INPUT_REGISTER]),
-            *_holding_rows(self.words[Table.HOLDING_REGISTER], allows, may_set=is_writable),
+            *_input_rows(self.words[RegisterTable.INPUT_REGISTER]),
+            *_holding_rows(self.words[RegisterTable.HOLDING_REGISTER], allows, may_set=is_writable),
             *(_life_rows(allows) if self.has_life_sign else ()),
         )
         # What has to be set in the drive first goes behind all others, whose addresses do not depend on it.
@@ -156,32 +156,32 @@ class DriveMap:
         first = [leaf for name in scaled if (leaf := f"actual/{name}") not in unusual]
         last = [leaf for leaf in unusual if leaf.startswith("actual/")]
         chosen = first + [leaf for leaf in more if leaf not in first and leaf not in last] + last
-        self.inputs = value_rows(Table.INPUT_REGISTER, chosen, points, _NOTHING)
+        self.inputs = value_rows(RegisterTable.INPUT_REGISTER, chosen, points, _NOTHING)
         commands = [value.leaf for value in values if value.group == "command"]
-        self.setpoints = value_rows(Table.HOLDING_REGISTER, commands, points, allows)
+        self.setpoints = value_rows(RegisterTable.HOLDING_REGISTER, commands, points, allows)
         writable = [
             leaf
             for leaf, point in points.items()
             if leaf.startswith("parameter/") and point.writable and point.data_type is not DataType.STRING
         ]
         shown = writable[:MOST_PARAMETERS]
-        self.parameters = value_rows(Table.HOLDING_REGISTER, shown, points, allows, PARAMETERS)
+        self.parameters = value_rows(RegisterTable.HOLDING_REGISTER, shown, points, allows, PARAMETERS)
         self.rows: tuple[Row, ...] = (
-            *(row for row in fixed if row.table is Table.INPUT_REGISTER),
+            *(row for row in fixed if row.table is RegisterTable.INPUT_REGISTER),
             *self.inputs,
-            *(row for row in fixed if row.table is Table.HOLDING_REGISTER),
+            *(row for row in fixed if row.table is RegisterTable.HOLDING_REGISTER),
             *self.setpoints,
             *self.parameters,
             *_bit_rows(family, allows),
         )
 
-    def end(self, table: Table, start: int) -> int:
+    def end(self, table: RegisterTable, start: int) -> int:
         """First address behind the block of registers that contains ``start``."""
-        if table is not Table.INPUT_REGISTER and start >= PARAMETERS:
+        if table is not RegisterTable.INPUT_REGISTER and start >= PARAMETERS:
             return PARAMETERS + 2 * len(self.parameters)
-        return VALUES + 2 * len(self.inputs if table is Table.INPUT_REGISTER else self.setpoints)
+        return VALUES + 2 * len(self.inputs if table is RegisterTable.INPUT_REGISTER else self.setpoints)
 
-    def second_halves(self, table: Table) -> frozenset[int]:
+    def second_halves(self, table: RegisterTable) -> frozenset[int]:
         """Addresses at which no read or write may begin or end, because it would split a value."""
         return frozenset(row.address + 1 for row in self.rows if row.table is table and row.size == 2)
 
@@ -189,7 +189,7 @@ class DriveMap:
 _VALUES_NOT_GOOD: Final = f"bit 0: the first value from {VALUES} on is not good, and so on, up to the 32nd"
 
 
-def row_maker(table: Table, access: str) -> Callable[[int, str, str, str, str], Row]:
+def row_maker(table: RegisterTable, access: str) -> Callable[[int, str, str, str, str], Row]:
     def make(address: int, name: str, kind: str, unit: str, description: str) -> Row:
         return Row(table, address, name, kind, access, unit, description)
 
@@ -203,7 +203,7 @@ def _words(group: str, process: list[str], carried: list[str]) -> dict[int, str]
 
 
 def _input_rows(actual: Mapping[int, str]) -> list[Row]:
-    row = row_maker(Table.INPUT_REGISTER, "r")
+    row = row_maker(RegisterTable.INPUT_REGISTER, "r")
     qualities = ", ".join(f"{quality.value} {quality.label}" for quality in Quality)
     states = "0 not ready, 1 switch-on inhibited, 2 ready, 3 switched on, 4 operation enabled, \
 5 quick stop active, 6 fault reaction active, 7 fault, 255 unknown"
@@ -233,9 +233,9 @@ def _input_rows(actual: Mapping[int, str]) -> list[Row]:
 
 
 def _holding_rows(setpoints: Mapping[int, str], allows: Allows, *, may_set: bool) -> list[Row]:
-    row = row_maker(Table.HOLDING_REGISTER, _access(allows.may_command))
-    stop = row_maker(Table.HOLDING_REGISTER, _access(allows.may_stop))
-    timeout = row_maker(Table.HOLDING_REGISTER, _access(may_set and allows.may_command))
+    row = row_maker(RegisterTable.HOLDING_REGISTER, _access(allows.may_command))
+    stop = row_maker(RegisterTable.HOLDING_REGISTER, _access(allows.may_stop))
+    timeout = row_maker(RegisterTable.HOLDING_REGISTER, _access(may_set and allows.may_command))
     name, text = "supervision/fieldbus_timeout_ms", "how long the controller may be silent; 0: off (as P151)"
     return [
         row(0, "command/control_word", "uint16", "", "control word"),
@@ -252,13 +252,13 @@ def _life_rows(allows: Allows) -> list[Row]:
     brought = f"what input register {TOKEN} had, not longer ago than register {TIMEOUT}"
     access = _access(allows.may_command)
     return [
-        Row(Table.INPUT_REGISTER, TOKEN, "supervision/life_sign", "uint16", "r", "", offered),
-        Row(Table.HOLDING_REGISTER, LIFE_SIGN, "command/life_sign", "uint16", access, "", brought),
+        Row(RegisterTable.INPUT_REGISTER, TOKEN, "supervision/life_sign", "uint16", "r", "", offered),
+        Row(RegisterTable.HOLDING_REGISTER, LIFE_SIGN, "command/life_sign", "uint16", access, "", brought),
     ]
 
 
 def value_rows(
-    table: Table, leaves: Iterable[str], points: dict[str, Point], allows: Allows, first: int = VALUES
+    table: RegisterTable, leaves: Iterable[str], points: dict[str, Point], allows: Allows, first: int = VALUES
 ) -> tuple[Row, ...]:
     """Two registers for each of ``leaves``; integers are not turned into floats, so that no digit is lost."""
     rows: list[Row] = []
@@ -275,8 +275,8 @@ def value_rows(
 
 
 def _bit_rows(family: Family, allows: Allows) -> list[Row]:
-    status = row_maker(Table.DISCRETE_INPUT, "r")
-    coil = row_maker(Table.COIL, _access(allows.may_command))
+    status = row_maker(RegisterTable.DISCRETE_INPUT, "r")
+    coil = row_maker(RegisterTable.COIL, _access(allows.may_command))
     return [
         *(
             status(i, f"status/{name or i}", "bool", "", _bit_text(i, "status word as served", name))

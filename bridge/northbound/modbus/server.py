@@ -10,16 +10,16 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
-from bridge.base.admission import Admission, Limits, Stage, Visitor
+from bridge.base.admission import Admission, ConnectionStage, Limits, Visitor
 from bridge.base.notices import teller
 from bridge.base.quietlog import log_source
 from bridge.base.sources import source_of
 from bridge.command import Identity, Role, Source
 from bridge.config import ModbusTable
 from bridge.northbound.listening import listen, until_deaf
+from bridge.northbound.modbus.connection import READ_MOST, ModbusConnection
 from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.rounds import Rounds
-from bridge.northbound.modbus.session import READ_MOST, Session
 from bridge.northbound.modbus.units import Units
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -46,14 +46,14 @@ class ModbusServer:
         self._allowed = [ipaddress.ip_network(network) for network in settings.allow]
         self._clock = clock
         self._pulse = Pulse(clock)
-        self._sessions: set[Session] = set()
+        self._sessions: set[ModbusConnection] = set()
         self._admission = Admission(
             _limits(settings.max_connections), teller("Modbus"), self._count_refused, self._count_broken
         )
         self._owner_names: frozenset[str] = frozenset()
         self.rounds = Rounds(lambda go_on: asyncio.get_running_loop().call_soon(go_on))
         """Turns in which requests are handled."""
-        self._writers: dict[str, set[Session]] = {}
+        self._writers: dict[str, set[ModbusConnection]] = {}
         """Sessions of each address that have written."""
         self._server: asyncio.Server | None = None
         self._socket: socket.socket | None = None
@@ -78,7 +78,7 @@ class ModbusServer:
         if is_first:
             self._pulse.start()
         self._server = await loop.create_server(
-            lambda: Session(self._dispatcher, self, self._clock, self._pulse), sock=sock
+            lambda: ModbusConnection(self._dispatcher, self, self._clock, self._pulse), sock=sock
         )
         _log.info("Modbus TCP on %s", self._settings.listen)
 
@@ -100,7 +100,7 @@ class ModbusServer:
 
     # what sessions ask and tell
 
-    def admit(self, session: Session, host: str, port: int) -> Identity | None:
+    def admit(self, session: ModbusConnection, host: str, port: int) -> Identity | None:
         """The identity of a client, or None if its address may not connect."""
         address = _normalised(host)
         if not any(address in network for network in self._allowed):
@@ -127,7 +127,7 @@ class ModbusServer:
         self._view.on_connection(identity, is_there=True, has_others=self._has_others(identity, session))
         return identity
 
-    def leave(self, session: Session) -> None:
+    def leave(self, session: ModbusConnection) -> None:
         """Forget a session: its client has closed the connection, or it is closed for another reason."""
         self._forget(session)
         identity = session.identity
@@ -140,7 +140,7 @@ class ModbusServer:
         has_others = self._has_others(identity, session)
         self._view.on_connection(identity, is_there=False, has_others=has_others)
 
-    def on_write(self, session: Session, identity: Identity) -> None:
+    def on_write(self, session: ModbusConnection, identity: Identity) -> None:
         """``session`` is about to write. A client that has closed one connection before it goes on over the
         next must not depend on which of the two the loop reads first: those that the kernel knows to be
         closed end now, and nothing that still waits on them comes after what it has said since."""
@@ -151,10 +151,10 @@ class ModbusServer:
                 self.leave(other)
                 other.close()
 
-    def _has_others(self, identity: Identity, session: Session) -> bool:
+    def _has_others(self, identity: Identity, session: ModbusConnection) -> bool:
         return any(one is not session and identity.is_same(one.identity) for one in self._sessions)
 
-    def on_fault(self, session: Session, fault: str) -> None:
+    def on_fault(self, session: ModbusConnection, fault: str) -> None:
         """The session is closed for this reason."""
         self._count_broken()
         _log.warning("connection of %s closed: %s", session.address, fault, extra=log_source(session.source))
@@ -165,7 +165,7 @@ class ModbusServer:
     def _count_broken(self) -> None:
         self._view.count("modbus_broken_connections")
 
-    def _stage(self, session: Session) -> Stage:
+    def _stage(self, session: ModbusConnection) -> ConnectionStage:
         """Connections of addresses that own a drive stay, as long as the address has no more than half of
         all."""
         identity, visitor = session.identity, session.visitor
@@ -173,15 +173,15 @@ class ModbusServer:
             1, self._settings.max_connections // 2
         )
         if has_share and identity is not None and str(identity) in self._owner_names:
-            return Stage.SESSION
-        return Stage.GREETED if session.has_spoken else Stage.CONNECTED
+            return ConnectionStage.SESSION
+        return ConnectionStage.GREETED if session.has_spoken else ConnectionStage.CONNECTED
 
-    def _end(self, session: Session) -> None:
+    def _end(self, session: ModbusConnection) -> None:
         """Close a session to make room for another one."""
         self._forget(session)
         session.close()
 
-    def _forget(self, session: Session) -> None:
+    def _forget(self, session: ModbusConnection) -> None:
         self._sessions.discard(session)
         self.rounds.leave(session)
         if session.visitor is not None:

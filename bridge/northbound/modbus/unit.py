@@ -9,8 +9,8 @@ from bridge.catalogue.codes import NODE_CODES, NodeState, WatchdogState
 from bridge.command import Identity, Request
 from bridge.drive import DriveState
 from bridge.image import Quality, Value
-from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused
-from bridge.northbound.modbus.registers import Table
+from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, ModbusException
+from bridge.northbound.modbus.registers import RegisterTable
 from bridge.northbound.modbus.units import BRIDGE_DRIVES, Units
 from bridge.northbound.view import View
 
@@ -24,42 +24,42 @@ _STARTING: Final = tuple(
 
 
 class Unit:
-    """One unit id. Every method may raise ``Refused`` and then has changed nothing; here all do, for what a
-    unit does not have.
+    """One unit id. Every method may raise ``ModbusException`` and then has changed nothing; here all do, for
+    what a unit does not have.
 
     The ``plan`` methods return the requests that a write stands for, in the order in which they have to be
     submitted; the others can fail only if the first one does.
     """
 
-    def read_bits(self, table: Table, start: int, count: int) -> Sequence[bool]:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+    def read_bits(self, table: RegisterTable, start: int, count: int) -> Sequence[bool]:
+        raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
 
-    def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+    def read_words(self, table: RegisterTable, start: int, count: int, caller: Identity) -> Sequence[int]:
+        raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
 
     def plan_bits(self, start: int, bits: Sequence[bool], caller: Identity) -> list[Request]:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
 
     def plan_words(self, start: int, words: Sequence[int], caller: Identity) -> list[Request]:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
 
     def plan_mask(self, write: MaskWrite, caller: Identity) -> list[Request]:
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
 
     def identify(self) -> Mapping[int, str]:
         """Texts for device identification by object id, in ascending order."""
-        raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+        raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
 
 
 def refuse_quality(quality: Quality) -> None:
-    """Raise ``Refused`` if a value of this quality is not served."""
+    """Raise ``ModbusException`` if a value of this quality is not served."""
     if not quality.has_value:
         configured = quality is not Quality.CONFIG_ERROR
-        raise Refused(ExceptionCode.NOT_RESPONDING if configured else ExceptionCode.PATH_UNAVAILABLE)
+        raise ModbusException(ExceptionCode.NOT_RESPONDING if configured else ExceptionCode.PATH_UNAVAILABLE)
 
 
 def refuse_all_absent(qualities: Sequence[Quality]) -> None:
-    """Raise ``Refused`` if none of these values is served: one that is not must not cost a client its
+    """Raise ``ModbusException`` if none of these values is served: one that is not must not cost a client its
     neighbours, which tools read with it in one request."""
     if qualities and not any(quality.has_value for quality in qualities):
         refuse_quality(qualities[0])
@@ -90,11 +90,11 @@ class BridgeUnit(Unit):
         self._condition: Final = index["bridge/condition"]
         self._unproven: Final = index["bridge/stops_unproven"]
 
-    def read_words(self, table: Table, start: int, count: int, caller: Identity) -> Sequence[int]:
-        if table is not Table.INPUT_REGISTER:
-            raise Refused(ExceptionCode.ILLEGAL_FUNCTION)
+    def read_words(self, table: RegisterTable, start: int, count: int, caller: Identity) -> Sequence[int]:
+        if table is not RegisterTable.INPUT_REGISTER:
+            raise ModbusException(ExceptionCode.ILLEGAL_FUNCTION)
         if start + count > BRIDGE_DRIVES + len(self._drives):
-            raise Refused(ExceptionCode.ILLEGAL_ADDRESS)
+            raise ModbusException(ExceptionCode.ILLEGAL_ADDRESS)
         for name in self._drives:
             self._view.look(name)
         image, places = self._image, self._drives.values()

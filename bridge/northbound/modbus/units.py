@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.catalogue import Catalogue, MemberSpec, Source, rights_of
 from bridge.northbound.modbus.device_registers import DeviceMap
-from bridge.northbound.modbus.registers import Allows, DriveMap, Row, Table, row_maker
+from bridge.northbound.modbus.registers import Allows, DriveMap, RegisterTable, Row, row_maker
 
 BRIDGE_DRIVES: Final = 5
 """First input register of the bridge's one word per drive."""
@@ -51,7 +51,7 @@ class Units:
     @property
     def bridge_rows(self) -> tuple[Row, ...]:
         """The map of the bridge's own unit."""
-        row = row_maker(Table.INPUT_REGISTER, "r")
+        row = row_maker(RegisterTable.INPUT_REGISTER, "r")
         return (
             row(0, "module_state", "uint16", "", _MODULE_STATE),
             row(1, "load", "uint16", "0.1 %", "bus load of the first bus"),

@@ -21,8 +21,8 @@ class Values32:
         self._first = first
 
     def read(self, start: int, end: int, *, beside: bool = False) -> list[int]:
-        """Registers from ``start`` up to ``end``: a value that is not there reads as 0. Raises ``Refused``
-        where none is, unless the request reads other registers ``beside`` them."""
+        """Registers from ``start`` up to ``end``: a value that is not there reads as 0. Raises
+        ``ModbusException`` where none is, unless the request reads other registers ``beside`` them."""
         places = slice(max(start - self._first, 0) // 2, max(end - self._first, 0) // 2)
         readings = [self._image[index] for index in self.indices[places]]
         if not beside:

@@ -11,8 +11,8 @@ from bridge.command.messages.request import Identity, Role, Source
 from bridge.config import OpcUaTable
 from bridge.northbound.logins import PasswordChecks
 from bridge.northbound.passwords import ANONYMOUS, check_users
+from bridge.uaserver.client_notices import tell
 from bridge.uaserver.library import ObjectIds, ServiceError, StatusCodes, get, node_id, ua
-from bridge.uaserver.notices import tell
 from bridge.uaserver.security import read_password
 
 _LONGEST_NAME: Final = 64
@@ -35,7 +35,7 @@ def security_policies(settings: OpcUaTable) -> list[ua.SecurityPolicyType]:
 _ROLES: Final = {"observer": Role.OBSERVER, "operator": Role.OPERATOR, "engineer": Role.ENGINEER}
 
 
-class Users:
+class Accounts:
     """The users of the site file. Nobody is an administrator: the address space is the site's."""
 
     def __init__(self, settings: OpcUaTable) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
 from bridge.command.messages.request import Identity, Role
-from bridge.northbound.opcua.accounts import Users
+from bridge.northbound.opcua.accounts import Accounts
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.passwords import ANONYMOUS
@@ -54,7 +54,7 @@ class ConnectionArrivals:
 class Backend(ServedApplication[SessionUser]):
     """Users, writes and calls of the server's sessions. ``pulse`` is that of the event loop."""
 
-    def __init__(self, users: Users, writer: Writer, caller: Caller, view: View, pulse: Pulse) -> None:
+    def __init__(self, users: Accounts, writer: Writer, caller: Caller, view: View, pulse: Pulse) -> None:
         self._users = users
         self._writer = writer
         self._caller = caller

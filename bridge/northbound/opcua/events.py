@@ -11,9 +11,9 @@ from typing import Final
 
 from bridge.base.guard import Guard
 from bridge.base.ratelimit import RateLimit
-from bridge.command import Event, Kind
+from bridge.command import Event, EventKind
+from bridge.northbound.opcua.data_values import source_time
 from bridge.northbound.opcua.nodes import pascal_case
-from bridge.northbound.opcua.values import source_time
 from bridge.uaserver.eventfilter import Occurrence
 from bridge.uaserver.library import ObjectIds, node_id, text, ua, variant
 from bridge.uaserver.subscriptions import Subscriptions
@@ -26,7 +26,7 @@ own, so that writes that are refused all day hide no watchdog trip."""
 _WAITING: Final = 200
 
 
-def type_name(kind: Kind) -> str:
+def type_name(kind: EventKind) -> str:
     return f"{pascal_case(kind.value)}EventType"
 
 
@@ -38,15 +38,15 @@ class EventSender:
         epoch_ns: Callable[[float], int],
         subscriptions: Subscriptions,
         objects: Mapping[str, ua.NodeId],
-        types: Mapping[Kind, ua.NodeId],
+        types: Mapping[EventKind, ua.NodeId],
     ) -> None:
         self._epoch_ns = epoch_ns
         self._subscriptions = subscriptions
         self._objects = objects
         self._types = types
         self._guard = Guard("OPC UA events")
-        self._limits: dict[Kind, RateLimit] = {}
-        self._held_back = Counter[Kind]()
+        self._limits: dict[EventKind, RateLimit] = {}
+        self._held_back = Counter[EventKind]()
         self._queue: deque[tuple[Event, int]] = deque(maxlen=_WAITING)
 
     def on_event(self, event: Event) -> None:

@@ -46,7 +46,7 @@ _TYPE_DEFINITION: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class NodeKind:
     """One kind of node. ``to_type`` is the reference to the type ``type_id``; a method has none."""
 
     attributes: Mapping[AttributeIds, AttributeValue]
@@ -70,19 +70,19 @@ class Kinds:
 
     def __init__(self, space: AddressSpace) -> None:
         self._space = space
-        self._known: dict[Hashable, Kind] = {}
+        self._known: dict[Hashable, NodeKind] = {}
         self._built_at = datetime.now(UTC)
         self.name = cache(_name)
         self.description = cache(_description)
 
-    def of(self, node: Node) -> Kind:
+    def of(self, node: Node) -> NodeKind:
         key = _key(node)
         found = self._known.get(key)
         if found is None:
             found = self._known[key] = self._make(node)
         return found
 
-    def _make(self, node: Node) -> Kind:
+    def _make(self, node: Node) -> NodeKind:
         match node:
             case ObjectNode():
                 node_class = ua.NodeClass.Object
@@ -104,7 +104,7 @@ class Kinds:
         to_type = ()
         if type_id != ObjectIds.Null:
             to_type = (reference_to(self._space, type_id, ObjectIds.HasTypeDefinition, forward=True),)
-        return Kind(attributes, node_class, node_id(type_id), to_type)
+        return NodeKind(attributes, node_class, node_id(type_id), to_type)
 
 
 def constant(value: object, kind: ua.VariantType) -> AttributeValue:

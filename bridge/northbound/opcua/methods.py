@@ -19,14 +19,14 @@ from bridge.command.messages.request import (
     command_of,
 )
 from bridge.image import Value
-from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode
-from bridge.northbound.opcua.values import (
+from bridge.northbound.opcua.data_values import (
     INTEGER_TYPES,
     outcome_status,
     plain_value,
     plain_variant,
     rejection,
 )
+from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode
 from bridge.northbound.opcua.writes import ask
 from bridge.northbound.view import View
 from bridge.uaserver.library import AttributeIds, ServiceError, StatusCodes, get, make, status, ua

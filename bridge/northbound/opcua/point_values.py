@@ -9,9 +9,9 @@ from typing import Final
 from asyncua.server.address_space import AttributeValue
 
 from bridge.image import Image
+from bridge.northbound.opcua.data_values import EpochNs, present_value
 from bridge.northbound.opcua.nodes import VariableNode
 from bridge.northbound.opcua.structures import value_type
-from bridge.northbound.opcua.values import EpochNs, present_value
 from bridge.uaserver.address_space import Callbacks
 from bridge.uaserver.library import ua
 
@@ -19,14 +19,14 @@ _WHOLE_POINT: Final = -1
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
+class WatchedVariable:
     """A variable that is watched, or was once, and how to read it."""
 
     callbacks: Callbacks
     read: Callable[[], ua.DataValue]
 
 
-AllWatched = dict[int, dict[int, Watched]]
+AllWatched = dict[int, dict[int, WatchedVariable]]
 """Watched variables by index of the point, then by bit, -1 for the whole point."""
 
 
@@ -54,4 +54,4 @@ class PointValue(AttributeValue):
         node = self._node
         place = _WHOLE_POINT if node.bit is None else node.bit
         of_point = self._watched.setdefault(node.index, {})
-        return of_point.setdefault(place, Watched({}, self.read)).callbacks
+        return of_point.setdefault(place, WatchedVariable({}, self.read)).callbacks

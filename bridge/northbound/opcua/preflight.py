@@ -11,7 +11,7 @@ from bridge.base.errors import FileFaults
 from bridge.config import OpcUaTable
 from bridge.northbound.certificatefiles import check_validity, placed
 from bridge.northbound.opcua.certificates import TrustedCertificates
-from bridge.northbound.opcua.identity import server_identity
+from bridge.northbound.opcua.server_identity import server_identity
 from bridge.northbound.passwords import check_users
 
 

@@ -13,27 +13,27 @@ from typing import Final
 import bridge
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
-from bridge.command import Kind
+from bridge.command import EventKind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
-from bridge.northbound.opcua.accounts import Users, security_policies
+from bridge.northbound.opcua.accounts import Accounts, security_policies
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
+from bridge.northbound.opcua.change_publisher import Publisher
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
-from bridge.northbound.opcua.identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
-from bridge.northbound.opcua.publisher import Publisher
+from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver import decoding
+from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
 from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
 from bridge.uaserver.librarylog import quieten
-from bridge.uaserver.listener import WINDOW
-from bridge.uaserver.session import Server
+from bridge.uaserver.session import InnerServer
 
 NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
@@ -60,7 +60,7 @@ class OpcUaServer:
         self._settings = settings
         self._folder = state_dir / "opcua"
         self._site_name = site_name
-        self._users: Users | None = None
+        self._users: Accounts | None = None
         self._server: BoundServer | None = None
         self._socket = bound
         self._pulse = Pulse(clock.now)
@@ -83,7 +83,7 @@ class OpcUaServer:
         Raises ``FileFaults`` for a user, certificate or key that cannot be used, and ``Unavailable``
         where the port cannot be opened or the folder not be written.
         """
-        self._users = Users(self._settings)
+        self._users = Accounts(self._settings)
         own = await asyncio.to_thread(server_identity, self._settings, self._folder)
         trusted_dir = self._settings.trusted_dir
         trusted = TrustedCertificates(Path(trusted_dir)) if trusted_dir else None
@@ -133,11 +133,11 @@ class OpcUaServer:
     # steps of start
 
     async def _serve(
-        self, bound: socket.socket, own: ServerIdentity, trusted: TrustedCertificates | None, users: Users
+        self, bound: socket.socket, own: ServerIdentity, trusted: TrustedCertificates | None, users: Accounts
     ) -> None:
         quieten()
         decoding.install()
-        inner = Server(no_security=self._settings.no_security)
+        inner = InnerServer(no_security=self._settings.no_security)
         inner.certificate, inner.private_key = own.certificate, own.private_key
         server = BoundServer(inner, bound, trusted)
         await self._describe(server, own.application_uri, users)
@@ -160,7 +160,7 @@ class OpcUaServer:
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
 
-    async def _describe(self, server: BoundServer, application_uri: str, users: Users) -> None:
+    async def _describe(self, server: BoundServer, application_uri: str, users: Accounts) -> None:
         server.set_endpoint(self.endpoint_url)
         server.name = f"drivebridge {self._site_name}"
         server.application_type = ua.ApplicationType.Server
@@ -174,9 +174,11 @@ class OpcUaServer:
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
 
-    def _events(self, inner: Server, tree: Tree) -> EventSender:
+    def _events(self, inner: InnerServer, tree: Tree) -> EventSender:
         base = _event_type(inner, node_id(BASE_TYPE, tree.namespace), node_id(ObjectIds.BaseEventType))
-        types = {kind: _event_type(inner, node_id(type_name(kind), tree.namespace), base) for kind in Kind}
+        types = {
+            kind: _event_type(inner, node_id(type_name(kind), tree.namespace), base) for kind in EventKind
+        }
         events = EventSender(self._view.epoch_ns, inner.subscriptions, tree.notifiers, types)
         self._view.on_event(events.on_event)
         return events
@@ -194,7 +196,7 @@ class OpcUaServer:
             _log.warning('OPC UA: nobody can log in: no [[opcua.user]] and anonymous = "none"')
 
 
-def _event_type(inner: Server, where: ua.NodeId, parent: ua.NodeId) -> ua.NodeId:
+def _event_type(inner: InnerServer, where: ua.NodeId, parent: ua.NodeId) -> ua.NodeId:
     """A new type below ``parent``. Raises UaError where there is one already."""
     name = str(where.Identifier)
     item = make(

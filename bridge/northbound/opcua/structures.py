@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
+from bridge.northbound.opcua.data_values import VARIANT_TYPE
+from bridge.northbound.opcua.engineering_units import UNIT_NAMESPACE, unit_description, unit_id
 from bridge.northbound.opcua.nodes import (
     Argument,
     ArgumentType,
@@ -15,8 +17,6 @@ from bridge.northbound.opcua.nodes import (
     VariableNode,
     enum_strings,
 )
-from bridge.northbound.opcua.units import UNIT_NAMESPACE, unit_description, unit_id
-from bridge.northbound.opcua.values import VARIANT_TYPE
 from bridge.uaserver.library import ObjectIds, make, node_id, text, ua, variant
 
 READ: Final = 1

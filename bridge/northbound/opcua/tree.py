@@ -13,11 +13,11 @@ from typing import Final, cast
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.image import Image
+from bridge.northbound.opcua.data_values import EpochNs
 from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node, constant, reference_to
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
 from bridge.northbound.opcua.point_values import AllWatched, PointValue
 from bridge.northbound.opcua.structures import PropertyNode, property_nodes
-from bridge.northbound.opcua.values import EpochNs
 from bridge.uaserver.address_space import Attributes, Callbacks, Nodes
 from bridge.uaserver.library import AttributeIds, ObjectIds, get, node_id, ua
 

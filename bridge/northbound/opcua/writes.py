@@ -30,8 +30,8 @@ from bridge.command.messages.request import (
     WriteParameter,
 )
 from bridge.image import Value
+from bridge.northbound.opcua.data_values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.opcua.nodes import VariableNode
-from bridge.northbound.opcua.values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.view import View
 from bridge.text import Text
 from bridge.uaserver.arrivals import received_at

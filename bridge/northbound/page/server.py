@@ -33,7 +33,7 @@ _CLOSING_S: Final = 12.0
 s for the client's part of closing it."""
 
 
-class _Protocol(H11Protocol):
+class _HttpProtocol(H11Protocol):
     """HTTP/1.1 with limits: uvicorn waits for ever for the head of a request, begun or not, and serves
     connections first come, first served."""
 
@@ -124,7 +124,7 @@ class _LiveProtocol(WebSocketsSansIOProtocol):
             deadline.cancel()
 
 
-class _Server(uvicorn.Server):
+class _HttpServer(uvicorn.Server):
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None]:
         """Leave signals alone: they are our process's own."""
@@ -145,7 +145,7 @@ class PageServer:
         }
         config = uvicorn.Config(
             page.app,
-            http=type("_Shared", (_Protocol,), shares),
+            http=type("_Shared", (_HttpProtocol,), shares),
             ws=type("_SharedLive", (_LiveProtocol,), shares),
             ws_max_size=MOST_BYTES,
             ws_ping_interval=20.0,
@@ -166,7 +166,7 @@ class PageServer:
             ssl_keyfile=private_key,
             ssl_version=ssl.PROTOCOL_TLS_SERVER,
         )
-        self._server = _Server(config)
+        self._server = _HttpServer(config)
         self._serving: asyncio.Task[None] | None = None
 
     @property

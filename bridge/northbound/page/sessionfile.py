@@ -16,13 +16,13 @@ from typing import Final
 import msgspec
 
 from bridge.command import Role
-from bridge.northbound.page.sessions import Session
+from bridge.northbound.page.sessions import PageSession
 
 _log = logging.getLogger(__name__)
 _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 
 
-class _Kept(msgspec.Struct, forbid_unknown_fields=True):
+class _StoredSession(msgspec.Struct, forbid_unknown_fields=True):
     key: str
     user: str
     role: int
@@ -32,9 +32,9 @@ class _Kept(msgspec.Struct, forbid_unknown_fields=True):
     credential: str
 
 
-class _File(msgspec.Struct, forbid_unknown_fields=True):
+class _SessionFile(msgspec.Struct, forbid_unknown_fields=True):
     boot: str
-    sessions: list[_Kept]
+    sessions: list[_StoredSession]
 
 
 def credential_of(role: str, password_hash: str) -> str:
@@ -50,11 +50,11 @@ class SessionFile:
         self._path = path
         self._credentials = credentials
 
-    def load(self, now: float) -> list[Session]:
+    def load(self, now: float) -> list[PageSession]:
         """Sessions that are still valid. A file that cannot be read counts as none: everybody logs in
         again."""
         try:
-            kept = msgspec.json.decode(self._path.read_bytes(), type=_File)
+            kept = msgspec.json.decode(self._path.read_bytes(), type=_SessionFile)
         except FileNotFoundError:
             return []
         except (OSError, msgspec.DecodeError) as error:
@@ -63,15 +63,15 @@ class SessionFile:
         if kept.boot != _boot():
             return []
         return [
-            Session(one.key, one.user, Role(one.role), one.began, one.used, one.address)
+            PageSession(one.key, one.user, Role(one.role), one.began, one.used, one.address)
             for one in kept.sessions
             if self._credentials.get(one.user) == one.credential and one.began <= one.used <= now
         ]
 
-    def save(self, sessions: list[Session]) -> None:
+    def save(self, sessions: list[PageSession]) -> None:
         """Replace the file, whole or not at all."""
         kept = [
-            _Kept(one.key, one.user, int(one.role), one.began, one.used, one.address, credential)
+            _StoredSession(one.key, one.user, int(one.role), one.began, one.used, one.address, credential)
             for one in sessions
             if (credential := self._credentials.get(one.user)) is not None
         ]
@@ -79,7 +79,7 @@ class SessionFile:
         try:
             file = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o600)
             with os.fdopen(file, "wb") as opened:
-                opened.write(msgspec.json.encode(_File(_boot(), kept)))
+                opened.write(msgspec.json.encode(_SessionFile(_boot(), kept)))
             new.replace(self._path)
         except OSError as error:
             _log.warning("page: its sessions are not kept: %s", error.strerror)

@@ -30,7 +30,7 @@ _BYTES: Final = 32
 
 
 @dataclass(slots=True, eq=False)
-class Session:
+class PageSession:
     """``key`` is the hash of its id. ``user`` is empty for who reads without a login, from ``address``;
     ``tabs`` are those that are open. ``id`` and ``token`` are empty until its browser has brought the id."""
 
@@ -54,19 +54,19 @@ class Session:
         )
 
 
-class Sessions:
+class PageSessions:
     """All sessions of one front."""
 
     def __init__(self) -> None:
-        self._sessions: dict[str, Session] = {}
+        self._sessions: dict[str, PageSession] = {}
         self._is_changed = False
         self._kept_at = 0.0
 
-    def restore(self, sessions: Iterable[Session]) -> None:
+    def restore(self, sessions: Iterable[PageSession]) -> None:
         """Take over the sessions of the front before this one."""
         self._sessions.update((one.key, one) for one in sessions)
 
-    def take_changed(self, now: float) -> list[Session] | None:
+    def take_changed(self, now: float) -> list[PageSession] | None:
         """All sessions, to be kept, if any has begun or ended since the last call or a minute has passed;
         else None."""
         if not self._is_changed and now < self._kept_at + KEEP_EVERY_S:
@@ -78,7 +78,7 @@ class Sessions:
     def __len__(self) -> int:
         return len(self._sessions)
 
-    def begin(self, user: str, role: Role, now: float, address: str = "") -> Session:
+    def begin(self, user: str, role: Role, now: float, address: str = "") -> PageSession:
         """Begin a session. Where there are too many, the one that has been idle longest ends, of the same
         user or visitor's address first. One with an open tab never ends: it may control a drive."""
         self._drop_old(now)
@@ -88,13 +88,13 @@ class Sessions:
         for sessions, most in ((own, MOST_OF_ONE), (visitors, MOST_VISITORS), (everybody, MOST)):
             if len(sessions) >= most and self._drop_idle(sessions):
                 break
-        session = Session("", user, role, now, now, address)
+        session = PageSession("", user, role, now, now, address)
         _known_by(session, secrets.token_urlsafe(_BYTES))
         self._sessions[session.key] = session
         self._is_changed = True
         return session
 
-    def find(self, session_id: str, now: float) -> Session | None:
+    def find(self, session_id: str, now: float) -> PageSession | None:
         """The session with this id, which has been used now; None where there is none any more."""
         session = self._sessions.get(_key_of(session_id))
         if session is None:
@@ -106,7 +106,7 @@ class Sessions:
         session.used = max(now, session.used)
         return session
 
-    def end(self, session: Session) -> None:
+    def end(self, session: PageSession) -> None:
         """End the session. May be called again."""
         if self._sessions.pop(session.key, None):
             self._is_changed = True
@@ -115,7 +115,7 @@ class Sessions:
         for session in [one for one in self._sessions.values() if one.is_over(now)]:
             self.end(session)
 
-    def _drop_idle(self, sessions: list[Session]) -> bool:
+    def _drop_idle(self, sessions: list[PageSession]) -> bool:
         """End the one that has been idle longest; False where each of them has an open tab."""
         idle = [one for one in sessions if not one.tabs]
         if idle:
@@ -127,7 +127,7 @@ def _key_of(session_id: str) -> str:
     return hashlib.sha256(session_id.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-def _known_by(session: Session, session_id: str) -> None:
+def _known_by(session: PageSession, session_id: str) -> None:
     """The session with its id and token: the token cannot be made from what is kept, but needs the id, which
     only the browser has."""
     if session.id != session_id:

@@ -10,7 +10,7 @@ from enum import IntEnum
 from math import inf
 from typing import Final, Generic, TypeVar
 
-from bridge.base.admission import Admission, Limits, Stage, Tell, Visitor
+from bridge.base.admission import Admission, ConnectionStage, Limits, Tell, Visitor
 from bridge.command import Role
 
 MOST_TABS: Final = 64
@@ -81,7 +81,11 @@ class Doing(IntEnum):
 
 
 _Id = TypeVar("_Id")
-_STAGES: Final = {Doing.SILENT: Stage.CONNECTED, Doing.KEPT: Stage.GREETED, Doing.BUSY: Stage.SESSION}
+_STAGES: Final = {
+    Doing.SILENT: ConnectionStage.CONNECTED,
+    Doing.KEPT: ConnectionStage.GREETED,
+    Doing.BUSY: ConnectionStage.SESSION,
+}
 _LIMITS: Final = Limits(
     MOST_CONNECTIONS, MOST_CONNECTIONS // 2, MOST_WAITING_OF_ADDRESS, slow_s=inf
 )  # the place for who has rights is among the tabs: who has none of those is soon answered
@@ -96,12 +100,14 @@ class _Doing:
         self._clock = clock
         self.doing, self.since = Doing.SILENT, clock()
 
-    def stage(self) -> Stage:
+    def stage(self) -> ConnectionStage:
         """Stage of the connection: a tab younger than ``UNPROVED_S`` may have no session yet, and gives way
         before those that have."""
         if self.doing is not Doing.UNPROVED:
             return _STAGES[self.doing]
-        return Stage.SESSION if self._clock() >= self.since + UNPROVED_S else Stage.CHANNEL
+        return (
+            ConnectionStage.SESSION if self._clock() >= self.since + UNPROVED_S else ConnectionStage.CHANNEL
+        )
 
 
 class Connections(Generic[_Id]):

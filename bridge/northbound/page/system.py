@@ -14,7 +14,7 @@ from starlette.routing import Route
 
 from bridge.base.guard import Guard
 from bridge.command import Role
-from bridge.northbound.page.sessions import Session
+from bridge.northbound.page.sessions import PageSession
 
 MOST_LINES = 500
 """Most lines of the audit log in one answer."""
@@ -34,7 +34,7 @@ class CertificateFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class Unreadable:
+class UnreadablePart:
     """A part that could not be read. ``of`` as in ``CertificateFacts``, or the name of a part of the system;
     ``text`` is the reason."""
 
@@ -51,7 +51,7 @@ class SystemFacts(Protocol):
         """Addresses of the clients that are connected, by protocol."""
         ...
 
-    def certificates(self) -> list[CertificateFacts | Unreadable]: ...
+    def certificates(self) -> list[CertificateFacts | UnreadablePart]: ...
 
     def site_file(self) -> dict[str, str]:
         """``path`` and ``text``, without anything secret; ``changed`` where it is not what is run."""
@@ -74,7 +74,7 @@ class System:
         self,
         facts: SystemFacts,
         tabs: Callable[[], list[dict[str, Any]]],
-        session_of: Callable[[Request], Session | None],
+        session_of: Callable[[Request], PageSession | None],
     ) -> None:
         self._facts = facts
         self._tabs = tabs
@@ -93,13 +93,13 @@ class System:
         session = self._session_of(request)
         if session is None:
             return JSONResponse({"error": "login"}, 401)
-        facts, faults = self._facts, list[Unreadable]()
+        facts, faults = self._facts, list[UnreadablePart]()
         versions, certificates, connections = await asyncio.gather(
             self._asked(facts.versions, {}, faults),
             self._asked(facts.certificates, [], faults),
             self._asked(facts.connections, {}, faults),
         )
-        faults += [one for one in certificates if isinstance(one, Unreadable)]
+        faults += [one for one in certificates if isinstance(one, UnreadablePart)]
         readable = [one for one in certificates if isinstance(one, CertificateFacts)]
         told: dict[str, Any] = {"versions": versions, "certificates": readable, "faults": faults}
         told["clients"] = {protocol: len(addresses) for protocol, addresses in connections.items()}
@@ -110,7 +110,7 @@ class System:
     async def _site(self, request: Request) -> Response:
         if refusal := self._for_engineers(request):
             return refusal
-        faults = list[Unreadable]()
+        faults = list[UnreadablePart]()
         async with self._checking:
             file = await self._asked(self._facts.site_file, {"path": "", "text": ""}, faults)
             findings = await self._asked(self._facts.check, [], faults)
@@ -125,12 +125,12 @@ class System:
     def _latest(self) -> list[dict[str, Any]]:
         return self._facts.audit(MOST_LINES)
 
-    async def _asked(self, ask: Callable[[], _Told], nothing: _Told, faults: list[Unreadable]) -> _Told:
+    async def _asked(self, ask: Callable[[], _Told], nothing: _Told, faults: list[UnreadablePart]) -> _Told:
         """Answer of ``ask``; where it fails ``nothing`` and one more entry in ``faults``, so that the rest is
         still shown."""
         with self._guard:
             return await asyncio.to_thread(ask)
-        faults.append(Unreadable(ask.__name__, "this failed: the log of the service has more"))
+        faults.append(UnreadablePart(ask.__name__, "this failed: the log of the service has more"))
         return nothing
 
     def _for_engineers(self, request: Request) -> Response | None:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from bridge.northbound.page.sessions import Session
+from bridge.northbound.page.sessions import PageSession
 from bridge.northbound.page.viewer import Viewer
 from bridge.northbound.view import View
 
@@ -38,7 +38,7 @@ async def close(socket: WebSocket, code: int, reason: str = "") -> None:
 class Tab:
     """One open tab. ``since_ms`` is when it was opened, in ms since 1970."""
 
-    def __init__(self, socket: WebSocket, session: Session, view: View, since_ms: float) -> None:
+    def __init__(self, socket: WebSocket, session: PageSession, view: View, since_ms: float) -> None:
         self.since_ms = round(since_ms)
         self.session = session
         address = socket.client.host if socket.client else ""

@@ -16,14 +16,14 @@ from starlette.websockets import WebSocket
 from bridge.base.guard import Guard
 from bridge.base.sources import source_of
 from bridge.command import Event
-from bridge.condition.layout import Layout
+from bridge.condition.plant_layout import PlantLayout
 from bridge.image import Image
-from bridge.northbound.page.sessions import Session, Sessions
+from bridge.northbound.page.sessions import PageSession, PageSessions
 from bridge.northbound.page.shares import Seat, admit
 from bridge.northbound.page.tab import BAD_MESSAGE, GONE, NO_TOKEN, SESSION_OVER, TOO_MANY, Tab, close
 from bridge.northbound.page.topics import Topics
 from bridge.northbound.page.traffic import TrafficViews
-from bridge.northbound.page.troubles import Troubles
+from bridge.northbound.page.trouble_reader import TroubleReader
 from bridge.northbound.page.viewer import BadMessage
 from bridge.northbound.view import View
 from bridge.text import as_json
@@ -47,19 +47,19 @@ class Tabs:
     def __init__(
         self,
         view: View,
-        layout: Layout,
-        sessions: Sessions,
+        layout: PlantLayout,
+        sessions: PageSessions,
         traffic: TrafficViews,
         clock: Callable[[], float],
     ) -> None:
-        self.keep: Callable[[list[Session]], None] = lambda sessions: None
+        self.keep: Callable[[list[PageSession]], None] = lambda sessions: None
         """Keeps the sessions for the front after this one."""
         self._view = view
         self._sessions = sessions
         self._traffic = traffic
         self._clock = clock
         self._topics = Topics(view, layout)
-        self._troubles = Troubles(view.image, self._epoch_ms)
+        self._troubles = TroubleReader(view.image, self._epoch_ms)
         self._events = deque[dict[str, Any]](maxlen=_EVENTS_KEPT)
         self._tabs: list[Tab] = []
         self._guard = Guard("page")
@@ -81,7 +81,7 @@ class Tabs:
             self._traffic.close()
             self._topics.close()
 
-    async def serve(self, socket: WebSocket, session: Session | None) -> None:
+    async def serve(self, socket: WebSocket, session: PageSession | None) -> None:
         """Serve one tab until it is closed; ``session`` is that of its cookie. A tab to be refused is
         accepted first: a browser passes no closing code to its page otherwise."""
         with suppress(*GONE):
@@ -100,7 +100,7 @@ class Tabs:
             self._tabs.remove(tab)
             tab.session.tabs -= 1
 
-    async def _refusal(self, socket: WebSocket, session: Session | None) -> int:
+    async def _refusal(self, socket: WebSocket, session: PageSession | None) -> int:
         """The code with which a tab is closed at once; 0 where it is served."""
         if session is None:
             return SESSION_OVER
@@ -110,7 +110,7 @@ class Tabs:
             return SESSION_OVER  # while its token was awaited
         return 0 if self._finds_room(session, socket) else TOO_MANY
 
-    def _finds_room(self, session: Session, socket: WebSocket) -> bool:
+    def _finds_room(self, session: PageSession, socket: WebSocket) -> bool:
         """True where there is a tab left for this session, or one gives way to it."""
         seated = [tab for tab in self._tabs if not tab.is_closing]
         taken = [
@@ -129,7 +129,7 @@ class Tabs:
             seated[admission.gives_way].close(TOO_MANY, "gave way")
         return admission.is_in
 
-    def end(self, session: Session) -> None:
+    def end(self, session: PageSession) -> None:
         """Close the tabs of this session, which is over."""
         for tab in self._tabs:
             if tab.session is session:

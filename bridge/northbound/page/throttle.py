@@ -18,7 +18,7 @@ _Key = TypeVar("_Key")
 
 
 @dataclass(slots=True)
-class _Count:
+class _FailureCount:
     failures: int = 0
     last: float = 0.0
     until: float = 0.0
@@ -42,8 +42,8 @@ class Throttle:
     """
 
     def __init__(self) -> None:
-        self._users: dict[tuple[str, str], _Count] = {}
-        self._addresses: dict[str, _Count] = {}
+        self._users: dict[tuple[str, str], _FailureCount] = {}
+        self._addresses: dict[str, _FailureCount] = {}
 
     def __len__(self) -> int:
         return max(len(self._users), len(self._addresses))
@@ -56,8 +56,8 @@ class Throttle:
         pause_s = max((one.until - now for one in known if one), default=0.0)
         if pause_s > 0:
             return pause_s
-        self._users.setdefault(key, _Count()).add(FREE, now)
-        self._addresses.setdefault(address, _Count()).add(FREE_OF_ADDRESS, now)
+        self._users.setdefault(key, _FailureCount()).add(FREE, now)
+        self._addresses.setdefault(address, _FailureCount()).add(FREE_OF_ADDRESS, now)
         _make_room(self._users)
         _make_room(self._addresses)
         return 0.0
@@ -80,6 +80,6 @@ class Throttle:
             of_all.until = 0.0
 
 
-def _make_room(counts: dict[_Key, _Count]) -> None:
+def _make_room(counts: dict[_Key, _FailureCount]) -> None:
     while len(counts) > _MOST:
         counts.pop(min(counts, key=lambda one: counts[one].last))

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import msgspec
 
-from bridge.condition.layout import Layout
+from bridge.condition.plant_layout import PlantLayout
 from bridge.image import Image, Point, Quality
 from bridge.northbound.view import View
 from bridge.text import Said, Text, as_json, in_english
@@ -36,7 +36,7 @@ _IN_TILES: Final = (
 """Points of each drive on the plant's page, beside its setpoints and actual values."""
 
 
-def topics_of(points: Sequence[Point], layout: Layout) -> dict[str, list[int]]:
+def topics_of(points: Sequence[Point], layout: PlantLayout) -> dict[str, list[int]]:
     """The points of each topic, by their places in the image."""
     topics: dict[str, list[int]] = {"plant": []}
     for index, point in enumerate(points):
@@ -45,7 +45,7 @@ def topics_of(points: Sequence[Point], layout: Layout) -> dict[str, list[int]]:
     return topics
 
 
-def _topics_of(point: Point, layout: Layout) -> Iterator[str]:
+def _topics_of(point: Point, layout: PlantLayout) -> Iterator[str]:
     top, *rest = point.path
     if top == "bridge":
         yield "plant"
@@ -67,7 +67,7 @@ def _topics_of(point: Point, layout: Layout) -> Iterator[str]:
 class Topics:
     """Turns the image into messages. ``beat`` is called at a steady rate."""
 
-    def __init__(self, view: View, layout: Layout) -> None:
+    def __init__(self, view: View, layout: PlantLayout) -> None:
         self._view = view
         self._image: Image = view.image
         self.places = topics_of(self._image.points, layout)

@@ -72,7 +72,7 @@ class TrafficFilter(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 @dataclass(slots=True)
-class _Count:
+class _TrafficCount:
     last: ShownFrame
     frames: int = 0
     frames_before: int = 0
@@ -93,7 +93,7 @@ class TrafficView:
         self._is_open = False
         self._failure = ""
         self._retry_at = float("-inf")
-        self._counts: dict[str, _Count] = {}
+        self._counts: dict[str, _TrafficCount] = {}
         self._measured = 0.0
         self._new: list[ShownFrame] = []
 
@@ -171,7 +171,7 @@ class TrafficView:
         if one is None:
             if len(self._counts) >= _MOST_IDENTIFIERS:
                 return
-            one = self._counts[frame.identifier] = _Count(frame)
+            one = self._counts[frame.identifier] = _TrafficCount(frame)
         else:
             gap_ms = frame.at_ms - one.last.at_ms
             one.shortest_ms = min(one.shortest_ms, gap_ms) if one.frames > 1 else gap_ms

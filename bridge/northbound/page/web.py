@@ -24,16 +24,16 @@ from starlette.websockets import WebSocket
 from bridge.base.sources import source_of
 from bridge.catalogue import Catalogue
 from bridge.command import Role
-from bridge.condition.layout import layout_of
+from bridge.condition.plant_layout import layout_of
 from bridge.config import PageTable, UserTable
 from bridge.northbound.logins import PasswordChecks, TooManyChecks
-from bridge.northbound.page.bus import Bus, Capture
-from bridge.northbound.page.describe import described
+from bridge.northbound.page.bus_page import BusPage, Capture
 from bridge.northbound.page.guards import MOST_BODY, Guards
 from bridge.northbound.page.integration import Export, Integration
-from bridge.northbound.page.parameters import Counts, Parameters, holders_of
+from bridge.northbound.page.parameter_page import Counts, ParameterPage, holders_of
 from bridge.northbound.page.sessionfile import SessionFile, credential_of
-from bridge.northbound.page.sessions import Session, Sessions
+from bridge.northbound.page.sessions import PageSession, PageSessions
+from bridge.northbound.page.site_description import described
 from bridge.northbound.page.system import System, SystemFacts
 from bridge.northbound.page.tabs import Tabs
 from bridge.northbound.page.throttle import FIRST_PAUSE_S, Throttle
@@ -117,7 +117,7 @@ class Page:
         self._site_name = site.site.name
         self._users = {user.name: user for user in settings.user} if settings else {}
         self._anonymous = _ROLES.get(settings.anonymous) if settings else None
-        self._sessions = Sessions()
+        self._sessions = PageSessions()
         self._throttle = Throttle()
         self._checks = PasswordChecks(most=_MOST_CHECKS)
         layout = layout_of(view.image.points, catalogue)
@@ -146,7 +146,7 @@ class Page:
             Route("/api/login", self._login, methods=["POST"]),
             Route("/api/logout", self._logout, methods=["POST"]),
             *Integration(site, sources.exports, self._has_session).routes,
-            *Parameters(
+            *ParameterPage(
                 holders_of(catalogue),
                 sources.counts,
                 sources.dictionaries,
@@ -154,7 +154,7 @@ class Page:
                 self._has_session,
                 self._has_token,
             ).routes,
-            *Bus(site.site.name, sources.layouts, sources.capture, self._session_of).routes,
+            *BusPage(site.site.name, sources.layouts, sources.capture, self._session_of).routes,
             *System(sources.system, lambda: self.shown, self._session_of).routes,
             WebSocketRoute("/live", self._live),
             Mount("/static", _Files(directory=STATIC)),
@@ -187,7 +187,7 @@ class Page:
             credentials[""] = credential_of(self._anonymous.name, "")
         return credentials
 
-    def _session_of(self, connection: HTTPConnection) -> Session | None:
+    def _session_of(self, connection: HTTPConnection) -> PageSession | None:
         session_id = connection.cookies.get(self._cookie)
         return self._sessions.find(session_id, self._clock()) if session_id else None
 
@@ -204,7 +204,7 @@ class Page:
         session = self._sessions.begin(user, role, self._clock(), _address_of(request))
         return self._with_cookie(self._shown(session), session)
 
-    def _shown(self, session: Session) -> dict[str, Any]:
+    def _shown(self, session: PageSession) -> dict[str, Any]:
         return {
             "user": session.user,
             "role": session.role.name.lower(),
@@ -212,7 +212,7 @@ class Page:
             "has_users": bool(self._users),
         }
 
-    def _with_cookie(self, body: Mapping[str, Any], session: Session) -> Response:
+    def _with_cookie(self, body: Mapping[str, Any], session: PageSession) -> Response:
         response = Response(_encode(body), media_type="application/json")
         response.set_cookie(self._cookie, session.id, **self._of_cookie)
         response.headers["cache-control"] = "no-store"

@@ -1,5 +1,5 @@
 """The plant under zenoh keys, for everybody."""
 
-from bridge.northbound.zenoh.session import ZenohServer
+from bridge.northbound.zenoh.server import ZenohServer
 
 __all__ = ["ZenohServer"]

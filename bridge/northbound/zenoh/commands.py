@@ -80,7 +80,7 @@ class _One(msgspec.Struct, forbid_unknown_fields=True):
     v: Value
 
 
-class _Options(msgspec.Struct, forbid_unknown_fields=True):
+class _CommandOptions(msgspec.Struct, forbid_unknown_fields=True):
     ttl_ms: int | msgspec.UnsetType = msgspec.UNSET
     direction: int | msgspec.UnsetType = msgspec.UNSET
 
@@ -92,7 +92,7 @@ class _Controller(msgspec.Struct):
 
 _one_or_bare = msgspec.json.Decoder(_One | bool | int | float | str)
 _telegram = msgspec.json.Decoder(dict[str, Value])
-_options = msgspec.json.Decoder(_Options)
+_options = msgspec.json.Decoder(_CommandOptions)
 _controller = msgspec.json.Decoder(_Controller)
 
 _Model = TypeVar("_Model")
@@ -305,7 +305,7 @@ def _call(identity: Identity, target: str, action: Action, payload: bytes) -> Re
     has_payload, named = bool(payload.strip()), Text.word("action", action)
     if not has_payload and action not in _WITHOUT_PAYLOAD:
         raise BadCommand(MALFORMED, Text.of("zenoh.needs_payload", action=named, enough="{}"))
-    options = _Options()
+    options = _CommandOptions()
     if has_payload:
         options = _decoded(_options, payload, Text.of("zenoh.options", action=named))
     ttl_ms, direction = options.ttl_ms, options.direction

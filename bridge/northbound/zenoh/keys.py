@@ -56,7 +56,7 @@ class _Done(msgspec.Struct, omit_defaults=True):
     v: Value | None = None
 
 
-class _Refused(msgspec.Struct, omit_defaults=True):
+class _Rejection(msgspec.Struct, omit_defaults=True):
     ok: bool
     code: str
     message: str
@@ -201,7 +201,7 @@ def outcome_json(outcome: Outcome) -> bytes:
 
 
 def refusal_json(code: str, message: str, abort_code: int = 0) -> bytes:
-    return _encode(_Refused(False, code, message, f"{abort_code:08X}" if abort_code else ""))
+    return _encode(_Rejection(False, code, message, f"{abort_code:08X}" if abort_code else ""))
 
 
 def _value(reading: Reading) -> Value | None:

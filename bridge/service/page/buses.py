@@ -19,7 +19,7 @@ from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.config import BusTable
 from bridge.lint import family_dictionaries
 from bridge.mirror.endpoint import tap_path
-from bridge.northbound.page.bus import Captured, IsGone
+from bridge.northbound.page.bus_page import Captured, IsGone
 from bridge.northbound.page.traffic import BusTap, ShownFrame
 from bridge.project import Project
 from bridge.service.page.capture import CaptureFile

@@ -18,8 +18,8 @@ from bridge.sim.cia402.cia402_modes import (
     Velocity,
     slope,
 )
-from bridge.sim.cia402.cia402_settings import INCREMENTS, Cia402Settings, Mode
-from bridge.sim.cia402.cia402_states import ENABLE_VOLTAGE, QUICK_STOP, Automaton, Ramp, State
+from bridge.sim.cia402.cia402_settings import INCREMENTS, Cia402Mode, Cia402Settings
+from bridge.sim.cia402.cia402_states import ENABLE_VOLTAGE, QUICK_STOP, Automaton, Cia402State, StopRamp
 from bridge.sim.core.motor import Motor
 from bridge.sim.core.ticks import next_tick
 
@@ -49,28 +49,28 @@ class Cia402Axis:
         self.profile_position = ProfilePosition(*parts)
         self.cyclic_position = CyclicPosition(*parts)
         self._modes: dict[int, OperationMode] = {
-            Mode.VELOCITY: Velocity(*parts),
-            Mode.PROFILE_VELOCITY: ProfileVelocity(*parts),
-            Mode.PROFILE_POSITION: self.profile_position,
-            Mode.HOMING: self.homing,
-            Mode.CYCLIC_POSITION: self.cyclic_position,
-            Mode.CYCLIC_VELOCITY: CyclicVelocity(*parts),
-            Mode.NONE: NoMode(*parts),
+            Cia402Mode.VELOCITY: Velocity(*parts),
+            Cia402Mode.PROFILE_VELOCITY: ProfileVelocity(*parts),
+            Cia402Mode.PROFILE_POSITION: self.profile_position,
+            Cia402Mode.HOMING: self.homing,
+            Cia402Mode.CYCLIC_POSITION: self.cyclic_position,
+            Cia402Mode.CYCLIC_VELOCITY: CyclicVelocity(*parts),
+            Cia402Mode.NONE: NoMode(*parts),
         }
-        self._mode = self._modes[Mode.NONE]
+        self._mode = self._modes[Cia402Mode.NONE]
         self._commanded: int | None = None
         self._was_enabled = False
         self._time = 0.0
         self._ready_at = 0.0
 
     @property
-    def state(self) -> State:
+    def state(self) -> Cia402State:
         return self.automaton.state
 
     @property
     def demand_velocity(self) -> int:
         """The demanded speed in increments per second."""
-        follows = self.state is State.ENABLED and self.automaton.ramp is None
+        follows = self.state is Cia402State.ENABLED and self.automaton.ramp is None
         return round(self._mode.demand) if follows else 0
 
     @property
@@ -84,7 +84,7 @@ class Cia402Axis:
     @property
     def status_word(self) -> int:
         word = self.state | _VOLTAGE | _REMOTE
-        if self.state is State.ENABLED:
+        if self.state is Cia402State.ENABLED:
             word |= self._mode.bits
             if self.automaton.ramp is not None:  # halted or being stopped: bit 10 means standstill
                 word = word & ~0x0400 | (0x0400 if self.motor.stands_still else 0)
@@ -132,7 +132,7 @@ class Cia402Axis:
             self.error_code = 0
             self._report(0)
         self._note_state()
-        if self.state is State.ENABLED:
+        if self.state is Cia402State.ENABLED:
             self._mode.on_control_word(word, rising)
 
     def on_target_position(self) -> None:
@@ -159,7 +159,7 @@ class Cia402Axis:
     def advance(self, now: float) -> bool:
         """Let the time until ``now`` pass. True if any has."""
         dt_s, self._time = max(0.0, now - self._time), now
-        if self.state is State.NOT_READY and now >= self._ready_at:
+        if self.state is Cia402State.NOT_READY and now >= self._ready_at:
             self.automaton.initialised()
             self._settle()
         if not self._is_busy:
@@ -172,7 +172,7 @@ class Cia402Axis:
         return steps > 0
 
     def next_deadline(self) -> float | None:
-        if self.state is State.NOT_READY:
+        if self.state is Cia402State.NOT_READY:
             return self._ready_at
         return next_tick(self._time) if self._is_busy else None
 
@@ -181,9 +181,9 @@ class Cia402Axis:
         """Whether anything changes with time."""
         if not self.motor.stands_still or self.automaton.leaving:
             return True
-        if self.state in (State.FAULT_REACTION, State.QUICK_STOP_ACTIVE):
+        if self.state in (Cia402State.FAULT_REACTION, Cia402State.QUICK_STOP_ACTIVE):
             return not self.motor.stands_still
-        follows = self.state is State.ENABLED and self.automaton.ramp is None
+        follows = self.state is Cia402State.ENABLED and self.automaton.ramp is None
         return follows and not (self._mode.bits & 0x0400 and abs(self._mode.demand) < 1)
 
     def _move(self, dt_s: float) -> None:
@@ -193,14 +193,14 @@ class Cia402Axis:
             self._mode.advance(dt_s)
             if self._mode is self.cyclic_position and self.cyclic_position.following_error:
                 self.fail(FOLLOWING_ERROR)
-        elif ramp is Ramp.COAST:
+        elif ramp is StopRamp.COAST:
             self.motor.coast(dt_s)
         else:
             self.motor.ramp_to(0.0, 0.0, self._braking(settings, ramp), dt_s)
 
-    def _braking(self, settings: Cia402Settings, ramp: Ramp) -> float:
-        is_quick = ramp is Ramp.QUICK
-        if settings.mode == Mode.VELOCITY:
+    def _braking(self, settings: Cia402Settings, ramp: StopRamp) -> float:
+        is_quick = ramp is StopRamp.QUICK
+        if settings.mode == Cia402Mode.VELOCITY:
             return slope(settings.vl_quick_stop if is_quick else settings.vl_deceleration)
         return float(settings.quick_stop_deceleration if is_quick else settings.deceleration)
 
@@ -210,7 +210,7 @@ class Cia402Axis:
 
     def _note_state(self) -> None:
         """A mode's action ends when the drive leaves "operation enabled"."""
-        is_enabled = self.state is State.ENABLED
+        is_enabled = self.state is Cia402State.ENABLED
         if self._was_enabled and not is_enabled:
             self._mode.leave()
         elif is_enabled and not self._was_enabled:

@@ -8,16 +8,16 @@ from bridge.canopen.frame import Frame
 from bridge.sim.cia402.cia402_axis import Cia402Axis
 from bridge.sim.cia402.cia402_objects import Cia402Objects
 from bridge.sim.cia402.cia402_settings import RULES, Cia402Settings, factory_communication
-from bridge.sim.cia402.cia402_states import State
+from bridge.sim.cia402.cia402_states import Cia402State
 from bridge.sim.core.canopen_slave import CanopenSlave
-from bridge.sim.core.device import SimulatedDevice
 from bridge.sim.core.dictionary import Dictionary
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtCommand, NmtState
-from bridge.sim.core.pdo_objects import PdoObjects
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.nmt_slave import CommandSpecifier, SlaveState
+from bridge.sim.core.pdo_objects import PdoConfigurator
+from bridge.sim.core.sdo_server import SimulatedSdoServer
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.core.store import Store
-from bridge.sim.core.supervision import HeartbeatConsumer
+from bridge.sim.core.supervision import HeartbeatWatch
 
 _HEARTBEAT: Final = 0x700
 _MASTER_LOST: Final = 0x8130
@@ -37,17 +37,17 @@ class Cia402Drive(SimulatedDevice):
         self._communication = Store(lambda: factory_communication(node_id))
         self._emcy = EmcyProducer(self._communication, RULES)
         self.axis = Cia402Axis(lambda: self._settings.current, self._report)
-        self._consumer = HeartbeatConsumer(
+        self._consumer = HeartbeatWatch(
             lambda: self._settings.current.heartbeat_consumer >> 16,
             lambda: self._settings.current.heartbeat_consumer & 0xFFFF,
         )
         self.objects = Dictionary()
-        pdos = PdoObjects(
-            self.objects, self._communication, RULES, lambda: self.slave.state is NmtState.PRE_OPERATIONAL
+        pdos = PdoConfigurator(
+            self.objects, self._communication, RULES, lambda: self.slave.state is SlaveState.PRE_OPERATIONAL
         )
         objects = Cia402Objects(self.axis, self._settings, self._communication)
         objects.add_to(self.objects, self._emcy, pdos)
-        servers = [SdoServer(self.objects, RULES.sdo_block_segments)]
+        servers = [SimulatedSdoServer(self.objects, RULES.sdo_block_segments)]
         self.slave = CanopenSlave(node_id, self._communication, self.objects, servers, self._emcy, self)
         self.heard = self._hears()
 
@@ -74,17 +74,17 @@ class Cia402Drive(SimulatedDevice):
 
     # The application of the CANopen slave.
 
-    def nmt_changed(self, state: NmtState) -> None:
+    def nmt_changed(self, state: SlaveState) -> None:
         # 6007h is for "NMT stopped state entered" too.
-        if state is NmtState.STOPPED and self.axis.state is State.ENABLED:
+        if state is SlaveState.STOPPED and self.axis.state is Cia402State.ENABLED:
             self.axis.abort_connection(_MASTER_LOST)
 
-    def restarted(self, command: NmtCommand) -> None:
-        if command is NmtCommand.RESET_NODE:
+    def restarted(self, command: CommandSpecifier) -> None:
+        if command is CommandSpecifier.RESET_NODE:
             self._restart()
             return
         self._consumer.stop()
-        if self.axis.state is State.ENABLED:
+        if self.axis.state is Cia402State.ENABLED:
             self.axis.abort_connection(_MASTER_LOST)
 
     def rpdo_applied(self, number: int) -> None:
@@ -97,13 +97,13 @@ class Cia402Drive(SimulatedDevice):
         402)."""
         if not self.axis.abort_connection(_MASTER_LOST):
             self._emcy.report(_MASTER_LOST, _register(_MASTER_LOST))
-        if self.slave.state is NmtState.OPERATIONAL:
-            command = bytes([NmtCommand.ENTER_PRE_OPERATIONAL, self.node_id])
+        if self.slave.state is SlaveState.OPERATIONAL:
+            command = bytes([CommandSpecifier.ENTER_PRE_OPERATIONAL, self.node_id])
             self.slave.on_frame(Frame(0, command), self._now)
 
     def master_back(self) -> None:
         """If it was no fault, there is nothing to reset: the error is gone."""
-        if self.axis.state not in (State.FAULT, State.FAULT_REACTION):
+        if self.axis.state not in (Cia402State.FAULT, Cia402State.FAULT_REACTION):
             self._emcy.report(0, 0)
 
     # How it works inside.

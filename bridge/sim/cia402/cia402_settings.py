@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
-from bridge.sim.core.settings import (
+from bridge.sim.core.communication_settings import (
     RPDO_BASES,
     TPDO_BASES,
     CobId,
@@ -22,7 +22,7 @@ INCREMENTS: Final = 10_000
 """608Fh: of the encoder for one revolution."""
 
 
-class Mode(IntEnum):
+class Cia402Mode(IntEnum):
     """6060h and 6061h."""
 
     NONE = 0
@@ -34,7 +34,7 @@ class Mode(IntEnum):
     CYCLIC_VELOCITY = 9
 
 
-SUPPORTED_MODES: Final = sum(1 << mode - 1 for mode in Mode if mode)
+SUPPORTED_MODES: Final = sum(1 << mode - 1 for mode in Cia402Mode if mode)
 """6502h."""
 
 
@@ -48,7 +48,7 @@ class Cia402Settings:
     options: dict[int, int] = field(
         default_factory=lambda: {0x605A: 2, 0x605B: 0, 0x605C: 1, 0x605D: 1, 0x605E: 2}
     )
-    mode: int = Mode.NONE
+    mode: int = Cia402Mode.NONE
     vl_dimension: list[int] = field(default_factory=lambda: [1, 1])
     """604Ch: numerator and denominator, by which the numbers of the vl mode become 1/min."""
     vl_limits: list[int] = field(default_factory=lambda: [0, 3000])

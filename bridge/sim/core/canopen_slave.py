@@ -11,12 +11,18 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, STANDARD_MASK, Frame
+from bridge.sim.core.communication_settings import CommunicationSettings, SdoSettings
 from bridge.sim.core.dictionary import Dictionary
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import COMMANDED_STATE, ErrorControl, NmtCommand, NmtState, nmt_command_for
-from bridge.sim.core.pdo import CYCLIC_MAX, MappedRpdo, Rpdo, Tpdo, unpack
-from bridge.sim.core.sdo_server import SdoServer
-from bridge.sim.core.settings import CommunicationSettings, SdoSettings
+from bridge.sim.core.nmt_slave import (
+    COMMANDED_STATE,
+    CommandSpecifier,
+    SlaveErrorControl,
+    SlaveState,
+    nmt_command_for,
+)
+from bridge.sim.core.pdo_timing import CYCLIC_MAX, MappedRpdo, Rpdo, Tpdo, unpack
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 from bridge.sim.core.slave_plan import SlavePlan
 from bridge.sim.core.store import Store
 from bridge.sim.core.ticks import earliest
@@ -30,11 +36,11 @@ class Application(ABC):
     """Reactions of the device to its communication."""
 
     @abstractmethod
-    def nmt_changed(self, state: NmtState) -> None:
+    def nmt_changed(self, state: SlaveState) -> None:
         """The NMT state has changed."""
 
     @abstractmethod
-    def restarted(self, command: NmtCommand) -> None:
+    def restarted(self, command: CommandSpecifier) -> None:
         """Reset node or reset communication, before the boot-up message; settings are as at power-on."""
 
     def accepts_rpdo(self, number: int, length: int, mapped_bits: int) -> bool:
@@ -64,20 +70,20 @@ class CanopenSlave:
         node_id: int,
         store: Store[CommunicationSettings],
         dictionary: Dictionary,
-        servers: Sequence[SdoServer],
+        servers: Sequence[SimulatedSdoServer],
         emcy: EmcyProducer,
         application: Application,
     ) -> None:
         self.node_id = node_id
         self.emcy = emcy
-        self.state = NmtState.INITIALISING
+        self.state = SlaveState.INITIALISING
         self.silent = False
         self.rpdos_ignored = 0
         self._store = store
         self._dictionary = dictionary
         self._servers = tuple(servers)
         self._application = application
-        self._error_control = ErrorControl(store)
+        self._error_control = SlaveErrorControl(store)
         self._tpdos = tuple(Tpdo() for _ in store.current.tpdo)
         self._rpdos = tuple(Rpdo() for _ in store.current.rpdo)
         self._outbox: deque[Frame] = deque()
@@ -115,19 +121,19 @@ class CanopenSlave:
             rpdo.reset()
         self.emcy.reset()
         self._error_control.boot()
-        self.state = NmtState.INITIALISING
+        self.state = SlaveState.INITIALISING
         self._send(_ERROR_CONTROL + self.node_id, b"\0")
-        self._enter(NmtState.PRE_OPERATIONAL)
+        self._enter(SlaveState.PRE_OPERATIONAL)
         self.touch()
 
     def power_off(self) -> None:
-        self.state = NmtState.INITIALISING
+        self.state = SlaveState.INITIALISING
         self.touch()
         self._outbox.clear()
 
     def on_frame(self, frame: Frame, now: float) -> None:
         """Take one frame from the bus; frames for other nodes are ignored."""
-        if self.state is NmtState.INITIALISING or frame.can_id & (EXTENDED | ERROR):
+        if self.state is SlaveState.INITIALISING or frame.can_id & (EXTENDED | ERROR):
             return
         cob_id = frame.can_id & STANDARD_MASK
         if frame.can_id & REMOTE:
@@ -137,34 +143,34 @@ class CanopenSlave:
         elif cob_id == 0:
             self._on_nmt(frame.data)
             self.touch()
-        elif self.state is not NmtState.STOPPED:
+        elif self.state is not SlaveState.STOPPED:
             self._on_object(cob_id, frame.data, now)
 
     def poll(self, now: float) -> None:
         """Do what is due: life guarding, heartbeat, EMCY, event-driven TPDOs."""
-        if self.state is NmtState.INITIALISING:
+        if self.state is SlaveState.INITIALISING:
             return
         if self._error_control.life.expired(now):
             self._application.master_lost()
             # CiA 301 §7.5.2.32: a heartbeat or guarding event leads from Operational to Pre-Operational.
-            if self.state is NmtState.OPERATIONAL:
-                self._enter(NmtState.PRE_OPERATIONAL)
+            if self.state is SlaveState.OPERATIONAL:
+                self._enter(SlaveState.PRE_OPERATIONAL)
         if self._error_control.heartbeat_due(now):
             self._send(_ERROR_CONTROL + self.node_id, bytes([self.state]))
-        if self.state is not NmtState.STOPPED:
+        if self.state is not SlaveState.STOPPED:
             for data in self.emcy.due(now):
                 self._send(self._store.current.emcy.cob_id, data)
-        if self.state is NmtState.OPERATIONAL:
+        if self.state is SlaveState.OPERATIONAL:
             self._send_due_tpdos(now)
 
     def next_deadline(self) -> float | None:
         """Time at which ``poll`` has to be called next if nothing else happens."""
-        if self.state is NmtState.INITIALISING:
+        if self.state is SlaveState.INITIALISING:
             return None
         deadlines = [self._error_control.next_deadline()]
-        if self.state is not NmtState.STOPPED:
+        if self.state is not SlaveState.STOPPED:
             deadlines.append(self.emcy.next_deadline())
-        if self.state is NmtState.OPERATIONAL:
+        if self.state is SlaveState.OPERATIONAL:
             deadlines += [active.tpdo.next_deadline(active.settings) for active in self._plan.tpdos]
         return earliest(*deadlines)
 
@@ -217,7 +223,7 @@ class CanopenSlave:
                 self._send(channel.send.cob_id, answer)
             self.touch()
             return
-        if self.state is not NmtState.OPERATIONAL:
+        if self.state is not SlaveState.OPERATIONAL:
             return
         if settings.sync_on and cob_id == settings.sync_cob_id:
             self._on_sync(now)
@@ -256,7 +262,7 @@ class CanopenSlave:
         self.rpdos_ignored += unpack(rpdo.places, data)
         self._application.rpdo_applied(rpdo.number)
 
-    def _enter(self, state: NmtState) -> None:
+    def _enter(self, state: SlaveState) -> None:
         if state is self.state:
             return
         self.state = state

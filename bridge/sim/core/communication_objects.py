@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
-from bridge.sim.core.dictionary import DataType, Dictionary, Number, Text, constant, variable
+from bridge.sim.core.communication_settings import COB_ID_MASK, CommunicationSettings
+from bridge.sim.core.dictionary import Dictionary, IntegerType, Number, VisibleString, constant, variable
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.settings import COB_ID_MASK, CommunicationSettings
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.store import Store
 
 SAVE: Final = int.from_bytes(b"save", "little")
@@ -58,13 +58,13 @@ def add_communication(
 
 def add_identity(dictionary: Dictionary, identity: DeviceIdentity, status: Callable[[], int]) -> None:
     """1000h, 1002h, 1008h…100Ah and 1018h."""
-    dictionary.add(0x1000, 0, constant(DataType.UNSIGNED32, identity.device_type))
-    dictionary.add(0x1002, 0, Number(DataType.UNSIGNED32, status))
-    dictionary.add(0x1008, 0, Text(identity.device_name))
-    dictionary.add(0x1009, 0, Text(identity.hardware_version))
-    dictionary.add(0x100A, 0, Text(identity.software_version))
+    dictionary.add(0x1000, 0, constant(IntegerType.UNSIGNED32, identity.device_type))
+    dictionary.add(0x1002, 0, Number(IntegerType.UNSIGNED32, status))
+    dictionary.add(0x1008, 0, VisibleString(identity.device_name))
+    dictionary.add(0x1009, 0, VisibleString(identity.hardware_version))
+    dictionary.add(0x100A, 0, VisibleString(identity.software_version))
     numbers = (identity.vendor_id, identity.product_code, identity.revision, identity.serial)
-    dictionary.add_array(0x1018, [constant(DataType.UNSIGNED32, number) for number in numbers])
+    dictionary.add_array(0x1018, [constant(IntegerType.UNSIGNED32, number) for number in numbers])
 
 
 def add_errors(dictionary: Dictionary, emcy: EmcyProducer) -> None:
@@ -82,10 +82,10 @@ def add_errors(dictionary: Dictionary, emcy: EmcyProducer) -> None:
                 raise SdoAbort(AbortCode.SUBINDEX_MISSING)
             return history[place]
 
-        return Number(DataType.UNSIGNED32, read)
+        return Number(IntegerType.UNSIGNED32, read)
 
-    dictionary.add(0x1001, 0, Number(DataType.UNSIGNED8, lambda: emcy.error_register, in_tpdo=True))
-    dictionary.add(0x1003, 0, Number(DataType.UNSIGNED8, lambda: len(emcy.history), clear))
+    dictionary.add(0x1001, 0, Number(IntegerType.UNSIGNED8, lambda: emcy.error_register, in_tpdo=True))
+    dictionary.add(0x1003, 0, Number(IntegerType.UNSIGNED8, lambda: len(emcy.history), clear))
     for place in range(emcy.history_size):
         dictionary.add(0x1003, place + 1, error(place))
 
@@ -98,7 +98,7 @@ def by_signature(signature: int, action: Callable[[], None]) -> Number:
             raise SdoAbort(AbortCode.CANNOT_STORE)
         action()
 
-    return Number(DataType.UNSIGNED32, lambda: 1, write)
+    return Number(IntegerType.UNSIGNED32, lambda: 1, write)
 
 
 def add_protocols(dictionary: Dictionary, store: Store[CommunicationSettings]) -> None:
@@ -110,7 +110,7 @@ def add_protocols(dictionary: Dictionary, store: Store[CommunicationSettings]) -
     def set_sync(value: int) -> None:
         store.current.sync_cob_id = value & COB_ID_MASK
 
-    u8, u16, u32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
+    u8, u16, u32 = IntegerType.UNSIGNED8, IntegerType.UNSIGNED16, IntegerType.UNSIGNED32
     dictionary.add(0x1005, 0, Number(u32, lambda: store.current.sync_cob_id, set_sync))
     dictionary.add(0x100C, 0, variable(u16, settings, "guard_time_ms"))
     dictionary.add(0x100D, 0, variable(u8, settings, "life_time_factor"))
@@ -126,7 +126,7 @@ def add_sdo_servers(dictionary: Dictionary, store: Store[CommunicationSettings])
         def cob_id() -> object:
             return getattr(store.current.sdo[number], name)
 
-        entry = variable(DataType.UNSIGNED32, cob_id, "word")
+        entry = variable(IntegerType.UNSIGNED32, cob_id, "word")
         return entry if number else replace(entry, write=None)
 
     for number in range(len(store.current.sdo)):

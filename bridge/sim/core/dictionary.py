@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final, Protocol
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 
 DUMMY_BITS: Final = {2: 8, 3: 16, 4: 32, 5: 8, 6: 16, 7: 32}
 """Objects 0002h…0007h may fill a gap in an RPDO; value: their length in bits (CiA 301 §7.4.7)."""
 
 
-class DataType(Enum):
+class IntegerType(Enum):
     """Integer types with their length in bytes and sign. Simulated reals are their bit patterns."""
 
     UNSIGNED8 = (1, False)
@@ -69,7 +69,7 @@ class Number:
     ``write`` raises ``SdoAbort`` to refuse a value, and must have changed nothing then.
     """
 
-    data_type: DataType
+    data_type: IntegerType
     read: Callable[[], int] | None
     write: Callable[[int], None] | None = None
     low: int | None = None
@@ -111,7 +111,7 @@ class Number:
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
+class VisibleString:
     """A VISIBLE_STRING, read-only. It maps into no PDO."""
 
     text: str
@@ -155,7 +155,7 @@ class Domain:
         self.write(data)
 
 
-Entry = Number | Text | Domain
+Entry = Number | VisibleString | Domain
 
 
 class ServedObject(Protocol):
@@ -200,7 +200,7 @@ class Dictionary:
         for sub, entry in enumerate(entries, start=1):
             self.add(index, sub, entry)
             count = sub
-        self.add(index, 0, constant(DataType.UNSIGNED8, count))
+        self.add(index, 0, constant(IntegerType.UNSIGNED8, count))
 
     def has_object(self, index: int) -> bool:
         return index in self._objects
@@ -217,7 +217,7 @@ class Dictionary:
 
 
 def variable(
-    data_type: DataType,
+    data_type: IntegerType,
     holder: Callable[[], object],
     name: str,
     low: int | None = None,
@@ -238,7 +238,7 @@ def variable(
 
 
 def item(
-    data_type: DataType,
+    data_type: IntegerType,
     values: Callable[[], list[int] | dict[int, int]],
     place: int,
     low: int | None = None,
@@ -252,6 +252,6 @@ def item(
     return Number(data_type, lambda: values()[place], write, low, high)
 
 
-def constant(data_type: DataType, value: int) -> Number:
+def constant(data_type: IntegerType, value: int) -> Number:
     """A read-only number that never changes."""
     return Number(data_type, lambda: value)

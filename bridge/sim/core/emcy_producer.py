@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from typing import Final
 
+from bridge.sim.core.communication_settings import CommunicationSettings, SlaveRules
 from bridge.sim.core.dirty_flag import DirtyFlag
-from bridge.sim.core.settings import CommunicationSettings, SlaveRules
 from bridge.sim.core.store import Store
 
 _WAITING_MAX: Final = 16

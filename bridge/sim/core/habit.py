@@ -13,7 +13,7 @@ from typing import Final, Literal
 from pydantic import Field, field_validator, model_validator
 
 from bridge.base.errors import OperationFailed
-from bridge.config.fields import RegularExpression
+from bridge.config.field_types import RegularExpression
 from bridge.config.model import Table
 from bridge.tomlfile import TomlFile
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from bridge.sim.core.settings import CommunicationSettings
+from bridge.sim.core.communication_settings import CommunicationSettings
 from bridge.sim.core.store import Store
-from bridge.sim.core.supervision import Cycle, Watch
+from bridge.sim.core.supervision import Cycle, SignWatch
 from bridge.sim.core.ticks import earliest
 
 
-class NmtState(IntEnum):
+class SlaveState(IntEnum):
     """State of a node as in its heartbeat."""
 
     INITIALISING = 0
@@ -19,7 +19,7 @@ class NmtState(IntEnum):
     PRE_OPERATIONAL = 127
 
 
-class NmtCommand(IntEnum):
+class CommandSpecifier(IntEnum):
     """Command specifier, byte 0 of an NMT frame."""
 
     START = 0x01
@@ -30,23 +30,23 @@ class NmtCommand(IntEnum):
 
 
 COMMANDED_STATE = {
-    NmtCommand.START: NmtState.OPERATIONAL,
-    NmtCommand.STOP: NmtState.STOPPED,
-    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+    CommandSpecifier.START: SlaveState.OPERATIONAL,
+    CommandSpecifier.STOP: SlaveState.STOPPED,
+    CommandSpecifier.ENTER_PRE_OPERATIONAL: SlaveState.PRE_OPERATIONAL,
 }
 
 
-def nmt_command_for(node_id: int, data: bytes) -> NmtCommand | None:
+def nmt_command_for(node_id: int, data: bytes) -> CommandSpecifier | None:
     """The command in an NMT frame if it is known and for this node (its address, or 0 for all)."""
     if len(data) != 2 or data[1] not in (0, node_id):
         return None
     try:
-        return NmtCommand(data[0])
+        return CommandSpecifier(data[0])
     except ValueError:
         return None
 
 
-class ErrorControl:
+class SlaveErrorControl:
     """Heartbeat producer (1017h), guarding answers and life guarding (100Ch × 100Dh)."""
 
     def __init__(self, store: Store[CommunicationSettings]) -> None:
@@ -54,7 +54,7 @@ class ErrorControl:
         self._toggle = 0
         self._heartbeat = Cycle(lambda: store.current.heartbeat_ms / 1000)
         # BU 2500 §7.1.2 says of P167 = 0 both "off" and "watchdog time = guard time"; CiA 301 says off.
-        self.life = Watch(lambda: store.current.guard_time_ms * store.current.life_time_factor / 1000)
+        self.life = SignWatch(lambda: store.current.guard_time_ms * store.current.life_time_factor / 1000)
         """The master's guard requests, from the first one on."""
 
     def boot(self) -> None:
@@ -63,7 +63,7 @@ class ErrorControl:
         self._heartbeat.reset()
         self.life.stop()
 
-    def on_guard_request(self, state: NmtState, now: float) -> bytes | None:
+    def on_guard_request(self, state: SlaveState, now: float) -> bytes | None:
         """The answer to a remote frame on 700h + id: state, with bit 7 toggling from 0.
 
         With a heartbeat time set the node does not answer: only one of the two may be in use

@@ -5,10 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
-from bridge.sim.core.dictionary import DUMMY_BITS, DataType, Dictionary, Number, constant, variable
-from bridge.sim.core.pdo import CYCLIC_MAX, EVENT_MIN
-from bridge.sim.core.settings import COB_ID_MASK, DISABLED, CommunicationSettings, PdoSettings, SlaveRules
+from bridge.sim.core.communication_settings import (
+    COB_ID_MASK,
+    DISABLED,
+    CommunicationSettings,
+    PdoSettings,
+    SlaveRules,
+)
+from bridge.sim.core.dictionary import DUMMY_BITS, Dictionary, IntegerType, Number, constant, variable
+from bridge.sim.core.pdo_timing import CYCLIC_MAX, EVENT_MIN
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.store import Store
 
 _UNCHANGEABLE: Final = 0x3FFF_F800
@@ -36,7 +42,7 @@ def check_cob_id(cob_id: int, enabled: bool) -> None:
         raise SdoAbort(AbortCode.VALUE_RANGE)
 
 
-class PdoObjects:
+class PdoConfigurator:
     """Changes PDO settings by the rules, for 14xxh…1Axxh and any equivalent parameter."""
 
     def __init__(
@@ -145,12 +151,12 @@ class PdoObjects:
         add = self._dictionary.add
         index = (0x1400 if receives else 0x1800) + number
         # An RPDO has no inhibit time and no event timer (BU 2500 §6.7.4: "not used").
-        add(index, 0, constant(DataType.UNSIGNED8, 2 if receives else 5))
+        add(index, 0, constant(IntegerType.UNSIGNED8, 2 if receives else 5))
         add(
             index,
             1,
             Number(
-                DataType.UNSIGNED32,
+                IntegerType.UNSIGNED32,
                 lambda: self.cob_id_object(pdo()),
                 lambda value: self.set_cob_id_object(pdo(), value),
             ),
@@ -159,20 +165,20 @@ class PdoObjects:
             index,
             2,
             Number(
-                DataType.UNSIGNED8,
+                IntegerType.UNSIGNED8,
                 lambda: pdo().transmission_type,
                 lambda value: self.set_transmission_type(pdo(), value),
             ),
         )
         if not receives:
-            add(index, 3, variable(DataType.UNSIGNED16, pdo, "inhibit_100us"))
-            add(index, 5, variable(DataType.UNSIGNED16, pdo, "event_timer_ms"))
+            add(index, 3, variable(IntegerType.UNSIGNED16, pdo, "inhibit_100us"))
+            add(index, 5, variable(IntegerType.UNSIGNED16, pdo, "event_timer_ms"))
         self._add_mapping((0x1600 if receives else 0x1A00) + number, pdo, receives=receives)
 
     def _add_mapping(self, index: int, pdo: Callable[[], PdoSettings], *, receives: bool) -> None:
         def entry(place: int) -> Number:
             return Number(
-                DataType.UNSIGNED32,
+                IntegerType.UNSIGNED32,
                 lambda: pdo().entries[place],
                 lambda word: self.set_entry(pdo(), place, word, receives=receives),
             )
@@ -180,7 +186,7 @@ class PdoObjects:
         self._dictionary.add(
             index,
             0,
-            Number(DataType.UNSIGNED8, lambda: pdo().count, lambda count: self.set_count(pdo(), count)),
+            Number(IntegerType.UNSIGNED8, lambda: pdo().count, lambda count: self.set_count(pdo(), count)),
         )
         for place in range(len(pdo().entries)):
             self._dictionary.add(index, place + 1, entry(place))

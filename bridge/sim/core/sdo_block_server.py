@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 
 _SEGMENT_SIZE: Final = 7
 _MAX_SEGMENTS: Final = 127

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
 from bridge.sim.core.dictionary import ServedObjects
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.sdo_block_server import BlockDownload, BlockUpload, checked_size
 
 _REQUEST_SIZE: Final = 8
@@ -35,7 +35,7 @@ class _Download:
     toggle: int = 0
 
 
-class SdoServer:
+class SimulatedSdoServer:
     """Answers each request with the frames that CiA 301 asks for: usually one, in a block none or many.
 
     With ``block_segments`` 0 block transfer is not offered; its commands are answered as unknown.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from bridge.base.errors import OperationFailed
-from bridge.sim.core.abort import SdoAbort
 from bridge.sim.core.dictionary import Dictionary, Number
+from bridge.sim.core.sdo_abort import SdoAbort
 
 
 def settable(objects: Dictionary, name: str, index: int, sub: int, what: str, is_command: bool) -> Number:

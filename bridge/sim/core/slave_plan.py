@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import cached_property
 
+from bridge.sim.core.communication_settings import CommunicationSettings, SdoSettings
 from bridge.sim.core.dictionary import Dictionary
-from bridge.sim.core.pdo import ActiveTpdo, MappedRpdo, Tpdo, entries_of, places_of
-from bridge.sim.core.sdo_server import SdoServer
-from bridge.sim.core.settings import CommunicationSettings, SdoSettings
+from bridge.sim.core.pdo_timing import ActiveTpdo, MappedRpdo, Tpdo, entries_of, places_of
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 
-Channel = tuple[SdoServer, SdoSettings]
+Channel = tuple[SimulatedSdoServer, SdoSettings]
 
 
 class SlavePlan:
@@ -24,7 +24,7 @@ class SlavePlan:
         self,
         settings: CommunicationSettings,
         own: Sequence[int],
-        servers: Sequence[SdoServer],
+        servers: Sequence[SimulatedSdoServer],
         channels: Sequence[SdoSettings],
         tpdos: Sequence[Tpdo],
         objects_of: Callable[[int], Dictionary],

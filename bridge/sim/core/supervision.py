@@ -9,7 +9,7 @@ FAILED: Final = 250
 NO_RESPONSE: Final = 255
 
 
-class Watch:
+class SignWatch:
     """Watch over a sign: from the first one on, the next must come within ``time_s``. With 0 nothing is
     watched."""
 
@@ -40,7 +40,7 @@ class Watch:
         return self._since + time_s if time_s else None
 
 
-class HeartbeatConsumer(Watch):
+class HeartbeatWatch(SignWatch):
     """1016h: one producer is watched, from its first heartbeat or boot-up on (CiA 301 §7.5.2.19)."""
 
     def __init__(self, node: Callable[[], int], time_ms: Callable[[], int]) -> None:

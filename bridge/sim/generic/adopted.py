@@ -7,9 +7,9 @@ from typing import Final
 
 from bridge.mapping import Family
 from bridge.mapping.model import IdentityRule
-from bridge.sim.core.abort import SdoAbort
-from bridge.sim.core.device import SimulatedDevice
-from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Domain, Entry, Number, constant
+from bridge.sim.core.dictionary import Cell, Dictionary, Domain, Entry, IntegerType, Number, constant
+from bridge.sim.core.sdo_abort import SdoAbort
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.generic.generic_family import objects_of_family
 from bridge.sim.generic.generic_plan import At, BytesPlan, NumberPlan
 
@@ -23,7 +23,7 @@ def adopt(node: SimulatedDevice, family: Family, values: Mapping[At, int]) -> No
     for at, want, mask in _identity(family.identity):
         have = _number(node.dictionary, at)
         if (have ^ want) & mask:
-            node.dictionary.add(*at, constant(DataType.UNSIGNED32, have & ~mask | want & mask))
+            node.dictionary.add(*at, constant(IntegerType.UNSIGNED32, have & ~mask | want & mask))
     for plan in objects_of_family(family):
         if not _has(node.dictionary, plan.at):
             node.dictionary.add(*plan.at, _variable(plan, values.get(plan.at)))

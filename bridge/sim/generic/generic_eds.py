@@ -6,14 +6,13 @@ import struct
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from bridge.eds import Access, Description, Entry
-from bridge.eds import DataType as EdsType
+from bridge.eds import Access, Description, Entry, StaticDataType
 from bridge.eds.pdos import PdoSummary, pdos
 from bridge.mapping import load_family
 from bridge.mapping.axes import MOST_AXES, on_axis
 from bridge.sim.core.communication_objects import DeviceIdentity
-from bridge.sim.core.dictionary import DataType
-from bridge.sim.core.settings import RPDO_BASES, TPDO_BASES, CobId
+from bridge.sim.core.communication_settings import RPDO_BASES, TPDO_BASES, CobId
+from bridge.sim.core.dictionary import IntegerType
 from bridge.sim.generic.generic_family import MODE_DISPLAY
 from bridge.sim.generic.generic_plan import (
     LEAST_ENTRIES,
@@ -21,18 +20,18 @@ from bridge.sim.generic.generic_plan import (
     AxisPlan,
     BytesPlan,
     Copy,
+    GenericPdo,
     NodePlan,
     NumberPlan,
-    PdoPlan,
 )
 
 _TYPES: Final = {
-    EdsType.BOOLEAN: DataType.UNSIGNED8,
-    EdsType.REAL32: DataType.UNSIGNED32,
-    EdsType.REAL64: DataType.UNSIGNED64,
-    **{EdsType[one.name]: one for one in DataType},
+    StaticDataType.BOOLEAN: IntegerType.UNSIGNED8,
+    StaticDataType.REAL32: IntegerType.UNSIGNED32,
+    StaticDataType.REAL64: IntegerType.UNSIGNED64,
+    **{StaticDataType[one.name]: one for one in IntegerType},
 }
-_REALS: Final = {EdsType.REAL32: "<f", EdsType.REAL64: "<d"}
+_REALS: Final = {StaticDataType.REAL32: "<f", StaticDataType.REAL64: "<d"}
 _CONTROL: Final = 0x6040
 _STATUS: Final = 0x6041
 _ERROR: Final = 0x603F
@@ -52,7 +51,7 @@ def plan_of_description(description: Description, node_id: int) -> NodePlan:
     lengths, or shorter than a byte, nothing is known: such a PDO carries nothing."""
     entries = {(entry.index, entry.sub): entry for one in description.objects for entry in one.entries}
     axes = tuple(_axes(entries))
-    plans = {True: list[PdoPlan](), False: list[PdoPlan]()}
+    plans = {True: list[GenericPdo](), False: list[GenericPdo]()}
     mapped: dict[bool, set[At]] = {True: set(), False: set()}
     for pdo in pdos(description, node_id):
         words = _mapping(pdo, entries)
@@ -86,7 +85,7 @@ def _axes(entries: Mapping[At, Entry]) -> Iterator[AxisPlan]:
 
 
 def _is_word(entry: Entry | None) -> bool:
-    return entry is not None and entry.data_type in (EdsType.UNSIGNED16, EdsType.INTEGER16)
+    return entry is not None and entry.data_type in (StaticDataType.UNSIGNED16, StaticDataType.INTEGER16)
 
 
 def _identity(description: Description, node_id: int) -> DeviceIdentity:
@@ -134,7 +133,7 @@ def _object(entry: Entry, node_id: int, *, in_rpdo: bool, in_tpdo: bool) -> Numb
     )
 
 
-def _pattern(kind: EdsType, plain: object) -> int:
+def _pattern(kind: StaticDataType, plain: object) -> int:
     if not isinstance(plain, int | float):
         return 0
     if kind in _REALS:
@@ -145,7 +144,7 @@ def _pattern(kind: EdsType, plain: object) -> int:
     return int(plain)
 
 
-def _limit(plain: object, kind: DataType) -> int | None:
+def _limit(plain: object, kind: IntegerType) -> int | None:
     """None where it is no limit of this type: files have FFh as the highest INTEGER8."""
     if not isinstance(plain, int):
         return None
@@ -165,7 +164,7 @@ def _mapping(pdo: PdoSummary, entries: dict[At, Entry]) -> tuple[int, ...]:
     return tuple(words) if sum(word & 0xFF for word in words) <= 64 else ()
 
 
-def _pdo(description: Description, pdo: PdoSummary, words: tuple[int, ...], node_id: int) -> PdoPlan:
+def _pdo(description: Description, pdo: PdoSummary, words: tuple[int, ...], node_id: int) -> GenericPdo:
     communication = (0x1400 if pdo.receives else 0x1800) + pdo.number - 1
     mapping = communication + 0x200
     bases = RPDO_BASES if pdo.receives else TPDO_BASES
@@ -177,7 +176,7 @@ def _pdo(description: Description, pdo: PdoSummary, words: tuple[int, ...], node
     count = description.entry(mapping, 0)
     place = description.entry(communication, 1)
     described = description.object(mapping)
-    return PdoPlan(
+    return GenericPdo(
         number=pdo.number,
         cob_id=cob_id,
         mapping=words,

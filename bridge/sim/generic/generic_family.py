@@ -9,8 +9,8 @@ from typing import Final
 from bridge.canopen.datatypes import INTEGERS, REALS, Plain, TypeName, encode
 from bridge.image import DataType as PointType
 from bridge.mapping import Family
-from bridge.mapping.device import Output, Signal
-from bridge.mapping.fields import WORD_BITS
+from bridge.mapping.device_signals import Output, Signal
+from bridge.mapping.entry_types import WORD_BITS
 from bridge.mapping.model import (
     IdentityRule,
     MappedObject,
@@ -21,41 +21,41 @@ from bridge.mapping.model import (
     Slot,
 )
 from bridge.sim.core.communication_objects import DeviceIdentity
-from bridge.sim.core.dictionary import DataType
-from bridge.sim.core.settings import RPDO_BASES, TPDO_BASES, CobId
-from bridge.sim.generic.generic_plan import At, AxisPlan, BytesPlan, Copy, NodePlan, NumberPlan, PdoPlan
+from bridge.sim.core.communication_settings import RPDO_BASES, TPDO_BASES, CobId
+from bridge.sim.core.dictionary import IntegerType
+from bridge.sim.generic.generic_plan import At, AxisPlan, BytesPlan, Copy, GenericPdo, NodePlan, NumberPlan
 
-NUMBER_TYPES: Final[dict[TypeName, DataType]] = {
-    "bool": DataType.UNSIGNED8,
-    "int8": DataType.INTEGER8,
-    "int16": DataType.INTEGER16,
-    "int32": DataType.INTEGER32,
-    "int64": DataType.INTEGER64,
-    "uint8": DataType.UNSIGNED8,
-    "uint16": DataType.UNSIGNED16,
-    "uint32": DataType.UNSIGNED32,
-    "uint64": DataType.UNSIGNED64,
-    "real32": DataType.UNSIGNED32,
-    "real64": DataType.UNSIGNED64,
+NUMBER_TYPES: Final[dict[TypeName, IntegerType]] = {
+    "bool": IntegerType.UNSIGNED8,
+    "int8": IntegerType.INTEGER8,
+    "int16": IntegerType.INTEGER16,
+    "int32": IntegerType.INTEGER32,
+    "int64": IntegerType.INTEGER64,
+    "uint8": IntegerType.UNSIGNED8,
+    "uint16": IntegerType.UNSIGNED16,
+    "uint32": IntegerType.UNSIGNED32,
+    "uint64": IntegerType.UNSIGNED64,
+    "real32": IntegerType.UNSIGNED32,
+    "real64": IntegerType.UNSIGNED64,
 }
 _UNSIGNED: Final = {
-    8: DataType.UNSIGNED8,
-    16: DataType.UNSIGNED16,
-    32: DataType.UNSIGNED32,
-    64: DataType.UNSIGNED64,
+    8: IntegerType.UNSIGNED8,
+    16: IntegerType.UNSIGNED16,
+    32: IntegerType.UNSIGNED32,
+    64: IntegerType.UNSIGNED64,
 }
 _SIGNED: Final = {
-    8: DataType.INTEGER8,
-    16: DataType.INTEGER16,
-    32: DataType.INTEGER32,
-    64: DataType.INTEGER64,
+    8: IntegerType.INTEGER8,
+    16: IntegerType.INTEGER16,
+    32: IntegerType.INTEGER32,
+    64: IntegerType.INTEGER64,
 }
 _POLLED: Final = {
-    PointType.UINT8: DataType.UNSIGNED8,
-    PointType.UINT16: DataType.UNSIGNED16,
-    PointType.UINT32: DataType.UNSIGNED32,
-    PointType.INT16: DataType.INTEGER16,
-    PointType.INT32: DataType.INTEGER32,
+    PointType.UINT8: IntegerType.UNSIGNED8,
+    PointType.UINT16: IntegerType.UNSIGNED16,
+    PointType.UINT32: IntegerType.UNSIGNED32,
+    PointType.INT16: IntegerType.INTEGER16,
+    PointType.INT32: IntegerType.INTEGER32,
 }
 MODE_DISPLAY: Final = Copy((0x6060, 0), (0x6061, 0))
 _STAYS: Final = "position"
@@ -155,7 +155,7 @@ def _raw(limit: float | None, parameter: Parameter) -> int | None:
     return round(limit / parameter.factor)
 
 
-def _further(family: Family) -> Iterator[tuple[At, DataType, int]]:
+def _further(family: Family) -> Iterator[tuple[At, IntegerType, int]]:
     """Objects that the bridge reads or writes beside parameters."""
     for poll in family.poll:
         yield (poll.object.index, poll.object.sub), _POLLED[poll.data_type], 0
@@ -164,10 +164,14 @@ def _further(family: Family) -> Iterator[tuple[At, DataType, int]]:
             if one is not None and one.object is not None:
                 ref = family.place(one.object)
                 at = (ref.index, ref.sub)
-                yield at, NUMBER_TYPES.get(one.data_type, DataType.UNSIGNED32), one.factory or 0
+                yield at, NUMBER_TYPES.get(one.data_type, IntegerType.UNSIGNED32), one.factory or 0
     for slot in family.slot:
         for write in slot.start:
-            yield (write.object.index, write.object.sub), NUMBER_TYPES.get(write.type, DataType.UNSIGNED32), 0
+            yield (
+                (write.object.index, write.object.sub),
+                NUMBER_TYPES.get(write.type, IntegerType.UNSIGNED32),
+                0,
+            )
 
 
 def _parts(pdo: Pdo) -> Iterator[tuple[At, int, bool]]:
@@ -187,14 +191,14 @@ def _parts(pdo: Pdo) -> Iterator[tuple[At, int, bool]]:
         yield (ref.index, ref.sub), whole, ref in signed
 
 
-def _pdo(pdo: Pdo, node_id: int) -> PdoPlan:
+def _pdo(pdo: Pdo, node_id: int) -> GenericPdo:
     words = tuple(index << 16 | sub << 8 | bits for (index, sub), bits, _ in _parts(pdo))
     kind = 255 if pdo.transmission_type is None else pdo.transmission_type
     inhibit, event_ms = round((pdo.inhibit_ms or 0) * 10), pdo.event_ms or 0
-    return PdoPlan(pdo.number, CobId(pdo.cob_id + node_id), words, kind, inhibit, event_ms)
+    return GenericPdo(pdo.number, CobId(pdo.cob_id + node_id), words, kind, inhibit, event_ms)
 
 
-def _device_pdos(family: Family, node_id: int) -> tuple[list[PdoPlan], list[PdoPlan]]:
+def _device_pdos(family: Family, node_id: int) -> tuple[list[GenericPdo], list[GenericPdo]]:
     """TPDOs with the inputs of a device and RPDOs with its outputs, in their order, as many to each as it
     holds. Beyond the fourth they have identifiers that the other direction does not need."""
     inputs, outputs = _runs(family.input), _runs(family.output)
@@ -202,11 +206,11 @@ def _device_pdos(family: Family, node_id: int) -> tuple[list[PdoPlan], list[PdoP
     to_bases = (*RPDO_BASES, *TPDO_BASES[len(inputs) :])
     return (
         [
-            PdoPlan(number, CobId(base + node_id), run, event_timer_ms=_EVENT_MS)
+            GenericPdo(number, CobId(base + node_id), run, event_timer_ms=_EVENT_MS)
             for number, (base, run) in enumerate(zip(of_bases, inputs, strict=False), 1)
         ],
         [
-            PdoPlan(number, CobId(base + node_id), run)
+            GenericPdo(number, CobId(base + node_id), run)
             for number, (base, run) in enumerate(zip(to_bases, outputs, strict=False), 1)
         ],
     )
@@ -237,10 +241,10 @@ def _output_objects(output: Output) -> Iterator[NumberPlan]:
         if is_digital:
             yield NumberPlan(mode_at, kind, (1 << 8 * kind.size) - 1)
         else:
-            yield NumberPlan(mode_at, DataType.UNSIGNED8, 1)
+            yield NumberPlan(mode_at, IntegerType.UNSIGNED8, 1)
     if output.error_value:
         value_at = (output.error_value.index, output.error_value.sub)
-        yield NumberPlan(value_at, kind if is_digital else DataType.INTEGER32)
+        yield NumberPlan(value_at, kind if is_digital else IntegerType.INTEGER32)
 
 
 def _axis(family: Family, slot: Slot) -> AxisPlan:

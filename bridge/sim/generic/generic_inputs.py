@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.sim.core.dictionary import DataType
+from bridge.sim.core.dictionary import IntegerType
 from bridge.sim.generic.generic_plan import At, NodePlan, NumberPlan
 
 TICK_S: Final = 0.1
@@ -44,7 +44,7 @@ class Walk:
 
 
 @dataclass(frozen=True, slots=True)
-class Ramp:
+class TriangleWave:
     """Up from ``low`` to ``high`` and down again."""
 
     at: At
@@ -58,7 +58,7 @@ class Ramp:
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class RotatingShaft:
     """A shaft that turns steadily: its position within ``steps``, and its speed in steps per second, where
     the node has that."""
 
@@ -71,7 +71,7 @@ class Turn:
             yield _SPEED, round(_STEPS_PER_TICK / TICK_S)
 
 
-Motion = Walk | Ramp | Turn
+Motion = Walk | TriangleWave | RotatingShaft
 
 
 def motions_of(plan: NodePlan) -> tuple[Motion, ...]:
@@ -93,19 +93,19 @@ def _walks(numbers: Mapping[At, NumberPlan]) -> Iterator[Walk]:
             yield Walk(tuple((at, 8 * size) for at in elements))
 
 
-def _ramps(numbers: Mapping[At, NumberPlan]) -> Iterator[Ramp]:
+def _ramps(numbers: Mapping[At, NumberPlan]) -> Iterator[TriangleWave]:
     for at, one in numbers.items():
         if _ANALOGUE.get(at[0]) == one.data_type.size:
             low, high = one.low or 0, (1 << 8 * one.data_type.size - 1) - 1
-            yield Ramp(at, low, high if one.high is None else one.high)
+            yield TriangleWave(at, low, high if one.high is None else one.high)
 
 
-def _turn(plan: NodePlan, numbers: Mapping[At, NumberPlan]) -> Iterator[Turn]:
+def _turn(plan: NodePlan, numbers: Mapping[At, NumberPlan]) -> Iterator[RotatingShaft]:
     position, speed = numbers.get(_POSITION), numbers.get(_SPEED)
-    if position is None or position.data_type not in (DataType.UNSIGNED32, DataType.INTEGER32):
+    if position is None or position.data_type not in (IntegerType.UNSIGNED32, IntegerType.INTEGER32):
         return
     steps = next((one.value for one in plan.objects if isinstance(one, NumberPlan) and one.at == _RANGE), 0)
-    yield Turn(
+    yield RotatingShaft(
         min(steps, 1 << 31) or 1 << 31,
-        speed is not None and speed.data_type in (DataType.INTEGER16, DataType.INTEGER32),
+        speed is not None and speed.data_type in (IntegerType.INTEGER16, IntegerType.INTEGER32),
     )

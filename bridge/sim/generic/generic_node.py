@@ -9,22 +9,22 @@ from functools import partial
 from typing import Final
 
 from bridge.canopen.frame import Frame
-from bridge.sim.core.abort import SdoAbort
 from bridge.sim.core.canopen_slave import CanopenSlave
 from bridge.sim.core.communication_objects import add_communication
-from bridge.sim.core.device import SimulatedDevice
-from bridge.sim.core.dictionary import DataType, Dictionary, Domain, Entry, Number, Text, constant
+from bridge.sim.core.communication_settings import SlaveRules
+from bridge.sim.core.dictionary import Dictionary, Domain, Entry, IntegerType, Number, VisibleString, constant
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtCommand, NmtState
-from bridge.sim.core.pdo_objects import PdoObjects
-from bridge.sim.core.sdo_server import SdoServer
-from bridge.sim.core.settings import SlaveRules
+from bridge.sim.core.nmt_slave import CommandSpecifier, SlaveState
+from bridge.sim.core.pdo_objects import PdoConfigurator
+from bridge.sim.core.sdo_abort import SdoAbort
+from bridge.sim.core.sdo_server import SimulatedSdoServer
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.core.store import Store
-from bridge.sim.core.supervision import HeartbeatConsumer
+from bridge.sim.core.supervision import HeartbeatWatch
 from bridge.sim.generic.generic_axis import GenericAxis
 from bridge.sim.generic.generic_inputs import TICK_S, Motion
 from bridge.sim.generic.generic_outputs import behaviour_in_error, outputs_in_error
-from bridge.sim.generic.generic_plan import At, AxisPlan, BytesPlan, Copy, NodePlan, NumberPlan, PdoPlan
+from bridge.sim.generic.generic_plan import At, AxisPlan, BytesPlan, Copy, GenericPdo, NodePlan, NumberPlan
 
 _RULES: Final = SlaveRules()
 _HEARTBEAT: Final = 0x700
@@ -32,7 +32,7 @@ _MASTER_LOST: Final = 0x8130
 _CONSUMER: Final = (0x1016, 1)
 _LONGEST: Final = 1 << 16
 _PDO_OBJECTS: Final = range(0x1400, 0x1C00)
-_IN_ERROR: Final = {0: NmtCommand.ENTER_PRE_OPERATIONAL, 2: NmtCommand.STOP}
+_IN_ERROR: Final = {0: CommandSpecifier.ENTER_PRE_OPERATIONAL, 2: CommandSpecifier.STOP}
 """NMT commands for the values of 1029h:01, carried out when the node has lost its master."""
 
 
@@ -52,12 +52,12 @@ class GenericNode(SimulatedDevice):
         self._contents = Store(lambda: copy.copy(contents))
         self._emcy = EmcyProducer(self._communication, _RULES)
         self.axes = tuple(GenericAxis(axis, partial(self._report, axis)) for axis in plan.axes)
-        self._consumer = HeartbeatConsumer(
+        self._consumer = HeartbeatWatch(
             lambda: self._watched() >> 16 & 0x7F, lambda: self._watched() & 0xFFFF
         )
         self.objects = Dictionary()
         self._fill()
-        server = SdoServer(self.objects, _RULES.sdo_block_segments)
+        server = SimulatedSdoServer(self.objects, _RULES.sdo_block_segments)
         self.slave = CanopenSlave(node_id, self._communication, self.objects, [server], self._emcy, self)
         self.heard = self._hears()
 
@@ -75,12 +75,12 @@ class GenericNode(SimulatedDevice):
 
     # The application of the CANopen slave.
 
-    def nmt_changed(self, state: NmtState) -> None:
-        if state is NmtState.STOPPED:
+    def nmt_changed(self, state: SlaveState) -> None:
+        if state is SlaveState.STOPPED:
             self._lose_master()
 
-    def restarted(self, command: NmtCommand) -> None:
-        if command is NmtCommand.RESET_NODE:
+    def restarted(self, command: CommandSpecifier) -> None:
+        if command is CommandSpecifier.RESET_NODE:
             self._restart()
             return
         self._consumer.stop()
@@ -94,7 +94,7 @@ class GenericNode(SimulatedDevice):
         self._lose_master()
         self._emcy.report(_MASTER_LOST, 0x11)
         command = _IN_ERROR.get(behaviour_in_error(self._numbers.current))
-        if command is not None and self.slave.state is NmtState.OPERATIONAL:
+        if command is not None and self.slave.state is SlaveState.OPERATIONAL:
             self.slave.on_frame(Frame(0, bytes([command, self.node_id])), self._now)
 
     def master_back(self) -> None:
@@ -187,8 +187,8 @@ class GenericNode(SimulatedDevice):
         everything = Dictionary()
         stores = (self._communication, self._numbers, self._contents)
         add_communication(everything, self._plan.identity, self._status, self._emcy, *stores)
-        pdos = PdoObjects(
-            self.objects, self._communication, _RULES, lambda: self.slave.state is NmtState.PRE_OPERATIONAL
+        pdos = PdoConfigurator(
+            self.objects, self._communication, _RULES, lambda: self.slave.state is SlaveState.PRE_OPERATIONAL
         )
         pdos.add()
         taken = self._add_communication(everything)
@@ -244,7 +244,7 @@ class GenericNode(SimulatedDevice):
     def _text(self, plan: BytesPlan) -> Entry:
         at = plan.at
         if not plan.writable:
-            return Text(plan.value.decode("ascii", "replace").replace("\ufffd", "?"))
+            return VisibleString(plan.value.decode("ascii", "replace").replace("\ufffd", "?"))
 
         def write(data: bytes) -> None:
             self._contents.current[at] = data
@@ -279,9 +279,9 @@ class GenericNode(SimulatedDevice):
             most[index] = max(sub, most.get(index, 0))
         for index, sub in most.items():
             if sub and index not in _PDO_OBJECTS and not _has(self.objects, index, 0):
-                self.objects.add(index, 0, constant(DataType.UNSIGNED8, sub))
+                self.objects.add(index, 0, constant(IntegerType.UNSIGNED8, sub))
 
-    def _fix(self, plan: PdoPlan, base: int) -> None:
+    def _fix(self, plan: GenericPdo, base: int) -> None:
         """Take the right to write from what the node has fixed."""
         index = base + plan.number - 1
         if plan.fixed_cob_id:
@@ -297,11 +297,11 @@ class GenericNode(SimulatedDevice):
                 self.objects.add(index, sub, replace(entry, write=None))
 
 
-def _part(parts: int, place: int) -> tuple[DataType, int, int]:
+def _part(parts: int, place: int) -> tuple[IntegerType, int, int]:
     """Type, lowest bit and mask of a part of a word."""
     if parts == 1:
-        return DataType.UNSIGNED16, 0, 0xFFFF
-    return DataType.UNSIGNED8, 8 * place, 0xFF
+        return IntegerType.UNSIGNED16, 0, 0xFFFF
+    return IntegerType.UNSIGNED8, 8 * place, 0xFF
 
 
 def _has(objects: Dictionary, index: int, sub: int) -> bool:

@@ -9,8 +9,7 @@ from typing import Final
 from bridge.mapping.axes import on_axis
 from bridge.mapping.model import ControlWord, StatusWord
 from bridge.sim.core.communication_objects import DeviceIdentity
-from bridge.sim.core.dictionary import DataType
-from bridge.sim.core.settings import (
+from bridge.sim.core.communication_settings import (
     RPDO_BASES,
     TPDO_BASES,
     CobId,
@@ -18,6 +17,7 @@ from bridge.sim.core.settings import (
     PdoSettings,
     SdoSettings,
 )
+from bridge.sim.core.dictionary import IntegerType
 
 At = tuple[int, int]
 """Index and sub-index."""
@@ -29,7 +29,7 @@ class NumberPlan:
     """A number as delivered; of a real its bit pattern."""
 
     at: At
-    data_type: DataType
+    data_type: IntegerType
     value: int = 0
     readable: bool = True
     writable: bool = True
@@ -78,7 +78,7 @@ class AxisPlan:
 
 
 @dataclass(frozen=True, slots=True)
-class PdoPlan:
+class GenericPdo:
     """A PDO as delivered, numbered from 1. ``mapping`` has words ``IIIISSLLh``."""
 
     number: int
@@ -99,8 +99,8 @@ class NodePlan:
 
     identity: DeviceIdentity
     objects: tuple[NumberPlan | BytesPlan, ...]
-    rpdo: tuple[PdoPlan, ...] = ()
-    tpdo: tuple[PdoPlan, ...] = ()
+    rpdo: tuple[GenericPdo, ...] = ()
+    tpdo: tuple[GenericPdo, ...] = ()
     axes: tuple[AxisPlan, ...] = ()
     mirrors: tuple[Copy, ...] = field(default=())
     """Values that show what was written, whatever the axes do."""
@@ -124,7 +124,7 @@ class NodePlan:
         )
 
 
-def _settings(plans: Sequence[PdoPlan], bases: Sequence[int], node_id: int) -> list[PdoSettings]:
+def _settings(plans: Sequence[GenericPdo], bases: Sequence[int], node_id: int) -> list[PdoSettings]:
     """All PDOs up to the highest; those between that there are not are off."""
     by_number = {plan.number: plan for plan in plans}
     settings: list[PdoSettings] = []

@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
-from bridge.sim.core.dictionary import DataType, Dictionary, Entry, Number, item, variable
+from bridge.sim.core.dictionary import Dictionary, Entry, IntegerType, Number, item, variable
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.store import Store
 from bridge.sim.lenze.lenze_settings import CODE_BASE, LenzeCodes
 
@@ -26,13 +26,13 @@ class CodeTable:
 
     def count(self, number: int, sub_codes: int) -> None:
         """Sub-index 0 of a code with sub-codes. The manual does not describe it; CiA 301 wants it."""
-        self.add(number, 0, DataType.UNSIGNED8, lambda: sub_codes)
+        self.add(number, 0, IntegerType.UNSIGNED8, lambda: sub_codes)
 
     def add(
         self,
         number: int,
         sub_code: int,
-        data_type: DataType,
+        data_type: IntegerType,
         read: Callable[[], int],
         write: Callable[[int], None] | None = None,
         limits: tuple[int, int] | None = None,
@@ -41,7 +41,7 @@ class CodeTable:
         self.put(number, sub_code, Number(data_type, read, write, low, high))
 
     def setting(
-        self, number: int, sub_code: int, data_type: DataType, name: str, limits: tuple[int, int]
+        self, number: int, sub_code: int, data_type: IntegerType, name: str, limits: tuple[int, int]
     ) -> None:
         """A code that is just stored, under ``name`` in ``LenzeCodes``."""
         self.put(number, sub_code, variable(data_type, lambda: self._codes.current, name, *limits))
@@ -57,7 +57,7 @@ class CodeTable:
 
         self.put(number, sub_code, replace(entry, write=choose))
 
-    def displays(self, number: int, data_type: DataType, count: int, read: Callable[[int], int]) -> None:
+    def displays(self, number: int, data_type: IntegerType, count: int, read: Callable[[int], int]) -> None:
         """Sub-codes 1…``count`` that can only be read; ``read`` counts from 0."""
         self.count(number, count)
         for place in range(count):
@@ -66,7 +66,7 @@ class CodeTable:
     def array(
         self,
         number: int,
-        data_type: DataType,
+        data_type: IntegerType,
         values: Values,
         limits: tuple[int, int],
         write: Callable[[int, int], None] | None = None,

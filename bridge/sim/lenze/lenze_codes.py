@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Final
 
-from bridge.sim.core.dictionary import DataType, Dictionary, Text, item, variable
-from bridge.sim.core.nmt_slave import NmtState
-from bridge.sim.core.settings import DISABLED, CommunicationSettings
+from bridge.sim.core.communication_settings import DISABLED, CommunicationSettings
+from bridge.sim.core.dictionary import Dictionary, IntegerType, VisibleString, item, variable
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.core.store import Store
 from bridge.sim.lenze.lenze_code_table import CodeTable
 from bridge.sim.lenze.lenze_drive import LenzeDrive, Reaction
@@ -27,17 +27,17 @@ BIT_RATES: Final = (0, 1, 2, 3, 4, 5, 14)
 MCI_REACTIONS: Final = (Reaction.NONE, Reaction.FAULT, Reaction.WARNING_LOCKED)
 """C01501 (§12.1)."""
 _NMT_STATES: Final = {
-    NmtState.OPERATIONAL: 0,
-    NmtState.PRE_OPERATIONAL: 1,
-    NmtState.INITIALISING: 4,
-    NmtState.STOPPED: 5,
+    SlaveState.OPERATIONAL: 0,
+    SlaveState.PRE_OPERATIONAL: 1,
+    SlaveState.INITIALISING: 4,
+    SlaveState.STOPPED: 5,
 }
 """C00359."""
 _NO_ERROR: Final = 1
 """C00364, bit 0: a simulated frame is never damaged."""
 
-U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
-I32 = DataType.INTEGER32
+U8, U16, U32 = IntegerType.UNSIGNED8, IntegerType.UNSIGNED16, IntegerType.UNSIGNED32
+I32 = IntegerType.INTEGER32
 
 
 @dataclass(slots=True)
@@ -67,7 +67,7 @@ class CodeParts:
     objects: LenzeObjects
     drive: LenzeDrive
     display: BusDisplay
-    nmt_state: Callable[[], NmtState]
+    nmt_state: Callable[[], SlaveState]
     watched_status: Callable[[], int]
     save: Callable[[], None]
     reset_node: Callable[[], None]
@@ -201,5 +201,5 @@ def _add_drive_codes(table: CodeTable, parts: CodeParts) -> None:
     table.add(61, 0, I32, lambda: drive.temperature_c)
     # Called U16 and U32 in the same example, and written with four bytes there (§9.3.2).
     table.setting(88, 0, U32, "motor_current_ca", (0, 60_000))
-    table.put(99, 0, Text(FIRMWARE))
+    table.put(99, 0, VisibleString(FIRMWARE))
     table.add(168, 0, U32, lambda: drive.error_number)

@@ -6,12 +6,12 @@ from typing import Final
 
 from bridge.canopen.frame import REMOTE, STANDARD_MASK, Frame
 from bridge.sim.core.canopen_slave import CanopenSlave
-from bridge.sim.core.device import SimulatedDevice
-from bridge.sim.core.dictionary import DataType, Dictionary, Number
+from bridge.sim.core.dictionary import Dictionary, IntegerType, Number
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtCommand, NmtState
-from bridge.sim.core.pdo import entries_of
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.nmt_slave import CommandSpecifier, SlaveState
+from bridge.sim.core.pdo_timing import entries_of
+from bridge.sim.core.sdo_server import SimulatedSdoServer
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.core.store import Store
 from bridge.sim.core.supervision import Cycle
 from bridge.sim.core.ticks import earliest
@@ -28,7 +28,7 @@ from bridge.sim.lenze.lenze_settings import (
     communication,
 )
 from bridge.sim.lenze.lenze_traffic import QuasiMaster, counters_of
-from bridge.sim.lenze.lenze_watch import BUS_OFF, BusWatch
+from bridge.sim.lenze.lenze_watch import BUS_OFF, LenzeWatch
 
 _HEARTBEAT: Final = 0x700
 
@@ -51,13 +51,15 @@ class LenzeMotec(SimulatedDevice):
         self._words = [0] * PDOS * PORT_WORDS
         self._own: list[Frame] = []
         emcy = EmcyProducer(self._stack, RULES)
-        self._watch = BusWatch(lambda: self.codes, self.drive, emcy)
+        self._watch = LenzeWatch(lambda: self.codes, self.drive, emcy)
         # 1005h, bit 30, and C00369.
         self._sync = Cycle(lambda: self.codes.sync_ms / 1000 if self.codes.sync_producer else 0.0)
         self._master = QuasiMaster(lambda: self.codes)
         self.objects = Dictionary()
         self._process = self._ports()
-        servers = [SdoServer(self.objects, RULES.sdo_block_segments) for _ in self._stack.current.sdo]
+        servers = [
+            SimulatedSdoServer(self.objects, RULES.sdo_block_segments) for _ in self._stack.current.sdo
+        ]
         self.slave = CanopenSlave(node_id, self._stack, self._process, servers, emcy, self)
         self.drive.dirty = self.slave.dirty
         self._fill(emcy)
@@ -112,10 +114,10 @@ class LenzeMotec(SimulatedDevice):
 
     # The application of the CANopen slave.
 
-    def nmt_changed(self, state: NmtState) -> None:
+    def nmt_changed(self, state: SlaveState) -> None:
         self._watch.nmt_changed(state, self._now)
 
-    def restarted(self, command: NmtCommand) -> None:
+    def restarted(self, command: CommandSpecifier) -> None:
         # Both resets initialise all that concerns CAN (§7.2.1); codes that were not saved stay until the
         # mains are switched off (§7.1.2). The words from the bus begin anew, so the drive is not enabled.
         del command
@@ -146,8 +148,8 @@ class LenzeMotec(SimulatedDevice):
 
     def _pass_time(self) -> None:
         self.drive.advance(self._now)
-        if self._watch.expire(self._now) and self.slave.state is NmtState.OPERATIONAL:
-            self._command_self(NmtCommand.ENTER_PRE_OPERATIONAL)
+        if self._watch.expire(self._now) and self.slave.state is SlaveState.OPERATIONAL:
+            self._command_self(CommandSpecifier.ENTER_PRE_OPERATIONAL)
 
     def _deadlines(self) -> tuple[float | None, ...]:
         parts = (self.drive, self._watch, self._sync, self._master)
@@ -164,7 +166,7 @@ class LenzeMotec(SimulatedDevice):
             def read(place: int = place) -> int:
                 return (self.drive.status_word, self.drive.speed_word)[place] if place < 2 else 0
 
-            u16 = DataType.UNSIGNED16
+            u16 = IntegerType.UNSIGNED16
             ports.add(PORT_IN, place + 1, Number(u16, None, write, in_rpdo=True))
             ports.add(PORT_OUT, place + 1, Number(u16, read, in_tpdo=True))
         return ports
@@ -181,7 +183,7 @@ class LenzeMotec(SimulatedDevice):
             lambda: self.slave.state,
             lambda: self._watch.node_status,
             self.save,
-            lambda: self._injected.append(lambda: self._command_self(NmtCommand.RESET_NODE)),
+            lambda: self._injected.append(lambda: self._command_self(CommandSpecifier.RESET_NODE)),
         )
         add_codes(self.objects, parts)
 
@@ -206,7 +208,7 @@ class LenzeMotec(SimulatedDevice):
     def _on_remote(self, cob_id: int) -> None:
         """A TPDO may be asked for (§8.4). A guard request gets no answer."""
         for pdo in self._stack.current.tpdo:
-            if self.slave.state is NmtState.OPERATIONAL and pdo.enabled and pdo.cob_id == cob_id:
+            if self.slave.state is SlaveState.OPERATIONAL and pdo.enabled and pdo.cob_id == cob_id:
                 words = b"".join(entry.upload() for entry in entries_of(self._process, pdo))
                 self._own.append(Frame(cob_id, words))
 
@@ -215,13 +217,13 @@ class LenzeMotec(SimulatedDevice):
         if self._watch.node and cob_id == _HEARTBEAT + self._watch.node:
             self._watch.on_heartbeat(frame.data, self._now)
             return
-        if self.slave.state is NmtState.OPERATIONAL:
+        if self.slave.state is SlaveState.OPERATIONAL:
             for pdo in self._stack.current.rpdo:
                 if pdo.enabled and cob_id == pdo.cob_id:
                     self._watch.check_length(len(frame.data), pdo.mapped_bits // 8)
         self.slave.on_frame(frame, self._now)
 
-    def _command_self(self, command: NmtCommand) -> None:
+    def _command_self(self, command: CommandSpecifier) -> None:
         self.slave.on_frame(Frame(0, bytes([command, self.slave.node_id])), self._now)
 
     def _finish_due(self) -> float | None:
@@ -229,10 +231,10 @@ class LenzeMotec(SimulatedDevice):
 
     def _finish(self) -> None:
         if self._master.due(self._now):
-            start = Frame(0, bytes([NmtCommand.START, 0]))
+            start = Frame(0, bytes([CommandSpecifier.START, 0]))
             self._own.append(start)
             self.slave.on_frame(start, self._now)
-        if self._sync.due(self._now) and self.slave.state is not NmtState.STOPPED:
+        if self._sync.due(self._now) and self.slave.state is not SlaveState.STOPPED:
             sync = Frame(self.codes.sync_tx)
             self._own.append(sync)
             self.slave.on_frame(sync, self._now)

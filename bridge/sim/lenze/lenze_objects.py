@@ -8,12 +8,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
 from bridge.sim.core.communication_objects import add_errors
-from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Number, constant
-from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.pdo_objects import PdoObjects
-from bridge.sim.core.settings import (
+from bridge.sim.core.communication_settings import (
     COB_ID_MASK,
     DISABLED,
     CobId,
@@ -21,6 +17,10 @@ from bridge.sim.core.settings import (
     PdoSettings,
     SdoSettings,
 )
+from bridge.sim.core.dictionary import Cell, Dictionary, IntegerType, Number, constant
+from bridge.sim.core.emcy_producer import EmcyProducer
+from bridge.sim.core.pdo_objects import PdoConfigurator
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.store import Store
 from bridge.sim.lenze.lenze_settings import CYCLE_PLACES, PDOS, PORT_WORDS, RULES, LenzeCodes, heartbeat_step
 
@@ -37,7 +37,7 @@ _INHIBIT_STEP: Final = 10
 _EVENT: Final = 254
 _CYCLIC_MAX: Final = 240
 
-U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
+U8, U16, U32 = IntegerType.UNSIGNED8, IntegerType.UNSIGNED16, IntegerType.UNSIGNED32
 
 
 class LenzeObjects:
@@ -47,7 +47,7 @@ class LenzeObjects:
         self._codes = codes
         self._stack = stack
         # The manual requires no NMT state: an object may be changed whenever its PDO or SDO is off.
-        self._rules = PdoObjects(Dictionary(), stack, RULES, lambda: True)
+        self._rules = PdoConfigurator(Dictionary(), stack, RULES, lambda: True)
 
     def add_to(self, dictionary: Dictionary, emcy: EmcyProducer) -> None:
         dictionary.add(0x1000, 0, constant(U32, 0))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridge.sim.core.settings import (
+from bridge.sim.core.communication_settings import (
     DISABLED,
     CobId,
     CommunicationSettings,

@@ -17,7 +17,7 @@ PDO_TOO_LONG: Final = 0x8220
 DEVICE_ERROR: Final = 0xF000
 
 
-class Watched(IntEnum):
+class LenzeError(IntEnum):
     """Errors of the CAN unit, as numbers of C00168.
 
     The manual prints one number only, 01.0127.00002 (§6.5), and not how its parts lie in the 32 bits:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bridge.sim.core.settings import CommunicationSettings
+from bridge.sim.core.communication_settings import CommunicationSettings
 from bridge.sim.lenze.lenze_settings import LenzeCodes
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from bridge.sim.core.communication_settings import CommunicationSettings
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtState
-from bridge.sim.core.settings import CommunicationSettings
-from bridge.sim.core.supervision import HeartbeatConsumer, Watch
+from bridge.sim.core.nmt_slave import SlaveState
+from bridge.sim.core.supervision import HeartbeatWatch, SignWatch
 from bridge.sim.core.ticks import earliest
 from bridge.sim.lenze.lenze_drive import LenzeDrive, Reaction
 from bridge.sim.lenze.lenze_settings import PDOS, LenzeCodes, heartbeat_step
@@ -20,15 +20,15 @@ from bridge.sim.lenze.lenze_supervision import (
     PDO_TOO_SHORT,
     SUPPLY_FAILED,
     ErrorReporter,
-    Watched,
+    LenzeError,
 )
 
-_LATE: Final = (Watched.RPDO1_LATE, Watched.RPDO2_LATE)
+_LATE: Final = (LenzeError.RPDO1_LATE, LenzeError.RPDO2_LATE)
 BUS_OFF: Final = 3
 """C00345."""
 
 
-class BusWatch:
+class LenzeWatch:
     """Reports errors and their end to the drive, and to the bus by EMCY."""
 
     def __init__(self, codes: Callable[[], LenzeCodes], drive: LenzeDrive, emcy: EmcyProducer) -> None:
@@ -36,7 +36,7 @@ class BusWatch:
         self._drive = drive
         self._reporter = ErrorReporter(emcy)
         self._monitors = [self._monitor(number) for number in range(PDOS)]
-        self._consumer = HeartbeatConsumer(
+        self._consumer = HeartbeatWatch(
             lambda: codes().watched_node, lambda: heartbeat_step(codes().watched_ms)
         )
 
@@ -56,15 +56,15 @@ class BusWatch:
         self._consumer.stop()
         self._reporter.reset()
 
-    def nmt_changed(self, state: NmtState, now: float) -> None:
+    def nmt_changed(self, state: SlaveState, now: float) -> None:
         for monitor in self._monitors:
-            if state is NmtState.OPERATIONAL:
+            if state is SlaveState.OPERATIONAL:
                 monitor.start(now)
             else:
                 monitor.stop()
         # The manual does not say which node's stop is meant; here it is this node's (§12.2, C00592/4).
-        stopped = state is NmtState.STOPPED
-        self._watch(Watched.COMMUNICATION_STOPPED, stopped, self._codes().bus_reactions[3])
+        stopped = state is SlaveState.STOPPED
+        self._watch(LenzeError.COMMUNICATION_STOPPED, stopped, self._codes().bus_reactions[3])
 
     def on_rpdo(self, number: int, now: float) -> None:
         """An RPDO, numbered from 0, has taken effect."""
@@ -73,19 +73,19 @@ class BusWatch:
 
     def on_heartbeat(self, data: bytes, now: float) -> None:
         self._consumer.on_heartbeat(data, now)
-        self._watch(Watched.HEARTBEAT, False, Reaction.NONE, HEARTBEAT_LOST)
+        self._watch(LenzeError.HEARTBEAT, False, Reaction.NONE, HEARTBEAT_LOST)
 
     def check_length(self, length: int, expected: int) -> None:
         """Check the length of an RPDO, in bytes (§10.4)."""
         reaction = self._codes().bus_reactions[0]
-        self._watch(Watched.FAULTY_TELEGRAM, length < expected, reaction, PDO_TOO_SHORT)
+        self._watch(LenzeError.FAULTY_TELEGRAM, length < expected, reaction, PDO_TOO_SHORT)
         self._reporter.communication_error(PDO_TOO_LONG, is_there=length > expected)
 
     def bus_error(self, state: int) -> None:
         """C00345 has changed."""
         reactions = self._codes().bus_reactions
-        self._watch(Watched.CAN_WARNING, state in (1, 2), reactions[2], CAN_WARNING)
-        self._watch(Watched.BUS_OFF, state == BUS_OFF, reactions[1])
+        self._watch(LenzeError.CAN_WARNING, state in (1, 2), reactions[2], CAN_WARNING)
+        self._watch(LenzeError.BUS_OFF, state == BUS_OFF, reactions[1])
 
     def supply(self, *, there: bool) -> None:
         self._reporter.communication_error(SUPPLY_FAILED, is_there=not there)
@@ -98,7 +98,7 @@ class BusWatch:
                 self._watch(_LATE[number], True, codes.rpdo_reactions[number])
         if not self._consumer.expired(now):
             return False
-        self._watch(Watched.HEARTBEAT, True, codes.bus_reactions[4], HEARTBEAT_LOST)
+        self._watch(LenzeError.HEARTBEAT, True, codes.bus_reactions[4], HEARTBEAT_LOST)
         return True
 
     def report(self, stack: CommunicationSettings) -> None:
@@ -111,11 +111,11 @@ class BusWatch:
     def next_deadline(self) -> float | None:
         return earliest(self._consumer.next_deadline(), *(one.next_deadline() for one in self._monitors))
 
-    def _monitor(self, number: int) -> Watch:
+    def _monitor(self, number: int) -> SignWatch:
         """C00357: while the node is operational, the next RPDO must come within this time (§10.1)."""
-        return Watch(lambda: self._codes().rpdo_time_ms[number] / 1000)
+        return SignWatch(lambda: self._codes().rpdo_time_ms[number] / 1000)
 
-    def _watch(self, number: Watched, present: bool, reaction: int, code: int = 0) -> None:
+    def _watch(self, number: LenzeError, present: bool, reaction: int, code: int = 0) -> None:
         """Note that something supervised has come or gone: ``reaction`` of C00592, and EMCY ``code``."""
         if present:
             self._drive.error(number, Reaction(reaction))

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from bridge.sim.core.dictionary import DataType, Dictionary, Number, variable
-from bridge.sim.core.pdo_objects import PdoObjects, check_cob_id, check_length
-from bridge.sim.core.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.core.communication_settings import CobId, CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.core.dictionary import Dictionary, IntegerType, Number, variable
+from bridge.sim.core.pdo_objects import PdoConfigurator, check_cob_id, check_length
 from bridge.sim.core.store import Store
 from bridge.sim.nord.nord_image import add_parameter
 from bridge.sim.nord.nord_settings import DRIVES, PDO_WORDS
@@ -21,7 +21,7 @@ _PDOS: Final = DRIVES + 1
 class CanParameters:
     """Adds P160…P167. They have no values of their own."""
 
-    def __init__(self, store: Store[CommunicationSettings], pdos: PdoObjects) -> None:
+    def __init__(self, store: Store[CommunicationSettings], pdos: PdoConfigurator) -> None:
         self._store = store
         self._pdos = pdos
 
@@ -87,7 +87,7 @@ class CanParameters:
         def half() -> CobId:
             return self._sdo(number).send if sends else self._sdo(number).receive
 
-        entry = variable(DataType.UNSIGNED16, half, "cob_id", high=0x7FF)
+        entry = variable(IntegerType.UNSIGNED16, half, "cob_id", high=0x7FF)
         return entry if number else replace(entry, write=None)  # P161 [-02] and [-03] are read only
 
     def _pdo_cob_id(self, number: int, receives: bool) -> Number:
@@ -132,14 +132,14 @@ class CanParameters:
             pdo.count = next((n for n, entry in enumerate(entries) if not entry), len(entries))
 
         return Number(
-            DataType.UNSIGNED32, lambda: self._pdos.pdo(number, receives=receives).entries[place], write
+            IntegerType.UNSIGNED32, lambda: self._pdos.pdo(number, receives=receives).entries[place], write
         )
 
     def _setting(self, name: str, high: int) -> Number:
-        return variable(DataType.UNSIGNED16, lambda: self._store.current, name, high=high)
+        return variable(IntegerType.UNSIGNED16, lambda: self._store.current, name, high=high)
 
     def _time(self, number: int, name: str) -> Number:
-        return variable(DataType.UNSIGNED16, lambda: self._tpdo(number), name, high=32767)
+        return variable(IntegerType.UNSIGNED16, lambda: self._tpdo(number), name, high=32767)
 
     def _sdo(self, number: int) -> SdoSettings:
         return self._store.current.sdo[number]
@@ -152,4 +152,4 @@ class CanParameters:
 
 
 def _word(read: Callable[[], int], write: Callable[[int], None] | None, *, high: int) -> Number:
-    return Number(DataType.UNSIGNED16, read, write, low=0, high=high)
+    return Number(IntegerType.UNSIGNED16, read, write, low=0, high=high)

@@ -7,10 +7,10 @@ from types import MappingProxyType
 from typing import Final
 
 from bridge.base.errors import OperationFailed
-from bridge.sim.core.device import SimulatedDevice
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_interface import Kind
-from bridge.sim.nord.nord_parameters import DriveParameters
+from bridge.sim.nord.nord_parameters import NordParameters
 from bridge.sim.nord.nord_posicon import commission as posicon
 from bridge.sim.nord.nord_single import NordSingle
 from bridge.sim.nord.nord_single_settings import RJ45_5XX, RJ45_54X, TU3, Variant
@@ -70,7 +70,7 @@ def _commission(name: str, drives: Mapping[str, NordDrive], parameters: Mapping[
                 _set(drive.parameters, key, int(parameter.removeprefix("P")), parameters[key])
 
 
-def _set(parameters: DriveParameters, key: str, number: int, value: float) -> None:
+def _set(parameters: NordParameters, key: str, number: int, value: float) -> None:
     try:
         parameters.commission(number, value)
     except KeyError:

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from bridge.sim.core.dictionary import DataType, Dictionary, Number
+from bridge.sim.core.dictionary import Dictionary, IntegerType, Number
 from bridge.sim.core.dirty_flag import DirtyFlag
 from bridge.sim.core.ramp import step
 from bridge.sim.core.ticks import next_tick
@@ -15,13 +15,13 @@ from bridge.sim.nord.nord_faults import INTERFACE_MISSING
 from bridge.sim.nord.nord_parameters import (
     PARAMETER_BASE,
     PARAMETERS,
-    DriveParameters,
-    Parameter,
+    NordParameter,
+    NordParameters,
     add_display,
 )
 from bridge.sim.nord.nord_posicon import PositionControl, approach, stretch, target
 from bridge.sim.nord.nord_ramp import Demand, turned
-from bridge.sim.nord.nord_states import STATE_BITS, State, commanded
+from bridge.sim.nord.nord_states import STATE_BITS, NordState, commanded
 
 CHARGING_S: Final = 0.2
 """Power-on until the charging relay closes (transition 1); the manual gives no time."""
@@ -39,7 +39,7 @@ _BUS_SOURCES: Final = (3, 6)
 """P509: system bus, CANopen (§7.2)."""
 _POSITION: Final = (10, 15)
 """P543: low and high word."""
-_AT_REST: Final = (State.SWITCH_ON_INHIBITED, State.READY, State.SWITCHED_ON, State.FAULT)
+_AT_REST: Final = (NordState.SWITCH_ON_INHIBITED, NordState.READY, NordState.SWITCHED_ON, NordState.FAULT)
 """Only a telegram leads out of these: time changes nothing."""
 _IGNORE: Final = -1
 """P513 = -0.1 s."""
@@ -58,12 +58,12 @@ class NordDrive:
         p112_a: float = 10.0,
         ripple: float = 0.0,
         seed: int = 0,
-        parameters: Sequence[Parameter] = PARAMETERS,
+        parameters: Sequence[NordParameter] = PARAMETERS,
     ) -> None:
-        self.parameters = DriveParameters(parameters)
+        self.parameters = NordParameters(parameters)
         self.parameters.commission(105, p105_hz)
         self.parameters.commission(112, p112_a)
-        self.state = State.NOT_READY
+        self.state = NordState.NOT_READY
         self.control_word = 0
         self.setpoints: tuple[int, ...] = (0,) * SET_POINTS
         self.demand: Demand | None = None
@@ -93,13 +93,13 @@ class NordDrive:
     @property
     def status_word(self) -> int:
         """ZSW, §6.5.2. Bits 10 and 13 (functions of P481) stay 0."""
-        if self.state is State.NOT_READY:
+        if self.state is NordState.NOT_READY:
             return 0  # §6.8, first line
         word = STATE_BITS[self.state] | self.control_word & 0xC000
         # Bits 4 and 5 mean that "disable voltage" and "quick stop" are not commanded. While it stops, the
         # drive has taken the command even if the master has lifted it meanwhile.
         word |= (self.control_word & 0x02) << 3 | (self.control_word & 0x04) << 3
-        if self.state is State.QUICK_STOP:
+        if self.state is NordState.QUICK_STOP:
             word = word & ~0x20 | 0x10
         word |= 0x0080 if self.warning_tenths else 0
         word |= 0x0100 if self._setpoint_reached() else 0
@@ -115,14 +115,14 @@ class NordDrive:
     @property
     def current_a(self) -> float:
         """A plausible motor current: magnetising, a load that grows with speed, more while accelerating."""
-        if self.state not in (State.ENABLED, State.QUICK_STOP):
+        if self.state not in (NordState.ENABLED, NordState.QUICK_STOP):
             return 0.0
         share = 0.35 + 0.25 * abs(self.output_hz) / self._max_hz + (0.3 if self._accelerating else 0.0)
         return self.parameters.value(112, self._set) * (share + self._ripple_now)
 
     def motor_hz(self, now: float) -> float:
         """Speed of the shaft in Hz of its field: the output's, or running down freely without voltage."""
-        if self.state in (State.ENABLED, State.QUICK_STOP):
+        if self.state in (NordState.ENABLED, NordState.QUICK_STOP):
             return self.output_hz
         lost_hz = self._max_hz / COAST_S * (now - self._coast_at)
         left_hz = max(0.0, abs(self._coast_hz) - lost_hz)
@@ -139,7 +139,7 @@ class NordDrive:
         add_display(dictionary, 740, words, lambda n: self._shown((self.control_word, *self.setpoints), n))
         add_display(dictionary, 741, words, lambda n: self._shown((self.status_word, *self.actual_values), n))
         for number in (744, 748):  # options seen, state of the system bus; BU 2500 prints no bits of either
-            dictionary.add(PARAMETER_BASE + number, 0, Number(DataType.INTEGER16, lambda: 0))
+            dictionary.add(PARAMETER_BASE + number, 0, Number(IntegerType.INTEGER16, lambda: 0))
 
     # What happens to it.
 
@@ -148,7 +148,7 @@ class NordDrive:
         self.control_word, self.setpoints, self.demand = 0, (0,) * SET_POINTS, None
         self.fault_tenths, self._cause_present = 0, False
         self._output_off(now)
-        self.state, self._until, self._time = State.NOT_READY, now + CHARGING_S, now
+        self.state, self._until, self._time = NordState.NOT_READY, now + CHARGING_S, now
         self.dirty.is_set = True
 
     def on_telegram(self, control_word: int, setpoints: Sequence[int]) -> bool:
@@ -167,9 +167,9 @@ class NordDrive:
         self.dirty.is_set = True
         acknowledge = bool(control_word & ~self.control_word & ACKNOWLEDGE)
         self.control_word, self.setpoints = control_word, words
-        if acknowledge and self.state is State.FAULT and not self._cause_present:
+        if acknowledge and self.state is NordState.FAULT and not self._cause_present:
             self.fault_tenths = 0
-            self.state = State.SWITCH_ON_INHIBITED  # transition 15
+            self.state = NordState.SWITCH_ON_INHIBITED  # transition 15
         self._settle()
         return True
 
@@ -181,12 +181,12 @@ class NordDrive:
 
     def trip(self, fault_tenths: int, *, lasting: bool = False) -> None:
         """Transition 13. A ``lasting`` cause blocks the acknowledge until ``cause_gone``."""
-        if self.state in (State.FAULT_REACTION, State.FAULT):
+        if self.state in (NordState.FAULT_REACTION, NordState.FAULT):
             return  # the first fault is the one to be seen
         self.fault_tenths, self._cause_present = fault_tenths, lasting
         self.last_faults.appendleft(fault_tenths)
         self._output_off(self._time)
-        self.state, self._until = State.FAULT_REACTION, self._time + FAULT_REACTION_S
+        self.state, self._until = NordState.FAULT_REACTION, self._time + FAULT_REACTION_S
         self.dirty.is_set = True
 
     def communication_lost(self, fault_tenths: int) -> None:
@@ -207,20 +207,20 @@ class NordDrive:
         if self.state in _AT_REST:
             return
         before = self.state
-        if self.state is State.NOT_READY and now >= self._until:
-            self.state = State.SWITCH_ON_INHIBITED  # transition 1
-        elif self.state is State.FAULT_REACTION and now >= self._until:
-            self.state = State.FAULT  # transition 14
-        elif self.state in (State.ENABLED, State.QUICK_STOP):
+        if self.state is NordState.NOT_READY and now >= self._until:
+            self.state = NordState.SWITCH_ON_INHIBITED  # transition 1
+        elif self.state is NordState.FAULT_REACTION and now >= self._until:
+            self.state = NordState.FAULT  # transition 14
+        elif self.state in (NordState.ENABLED, NordState.QUICK_STOP):
             self._ramp(dt_s)
         self._settle()
         if self.state is not before:
             self.dirty.is_set = True
 
     def next_deadline(self) -> float | None:
-        if self.state in (State.NOT_READY, State.FAULT_REACTION):
+        if self.state in (NordState.NOT_READY, NordState.FAULT_REACTION):
             return self._until
-        if self.state not in (State.ENABLED, State.QUICK_STOP):
+        if self.state not in (NordState.ENABLED, NordState.QUICK_STOP):
             return None
         restless = (self._ripple > 0 and self.output_hz != 0) or self._is_under_way()
         return next_tick(self._time) if restless or self.output_hz != self._ramp_target_hz() else None
@@ -275,16 +275,16 @@ class NordDrive:
 
     @property
     def _runs(self) -> bool:
-        return self.state is State.ENABLED and self.control_word & 0x7F == 0x7F
+        return self.state is NordState.ENABLED and self.control_word & 0x7F == 0x7F
 
     def _ramp_target_hz(self) -> float:
-        if self.state is State.ENABLED and self.control_word & 0x31 == 0x11:
+        if self.state is NordState.ENABLED and self.control_word & 0x31 == 0x11:
             return self.output_hz  # bit 5 = 0 holds the frequency
         return self._goal_hz()
 
     def _setpoint_reached(self) -> bool:
         """§6.5.2: with POSICON the set position."""
-        if self.state in (State.FAULT_REACTION, State.FAULT):
+        if self.state in (NordState.FAULT_REACTION, NordState.FAULT):
             return False
         goal = self._position_goal()
         if goal is not None:
@@ -306,7 +306,7 @@ class NordDrive:
             self._turn(before_hz, dt_s)
             return
         self.dirty.is_set = True
-        if self.state is State.ENABLED and self.control_word & 0x11 == 0x01:
+        if self.state is NordState.ENABLED and self.control_word & 0x11 == 0x01:
             self.output_hz = 0.0  # bit 4 = 0 sets the ramp generator to 0; the voltage stays on
         else:
             up_s, down_s = self._ramp_times_s()
@@ -339,23 +339,23 @@ class NordDrive:
         if self.demand:
             up_s = up_s if self.demand.accelerate_s is None else self.demand.accelerate_s
             down_s = down_s if self.demand.decelerate_s is None else self.demand.decelerate_s
-        if self.state is State.QUICK_STOP:
+        if self.state is NordState.QUICK_STOP:
             down_s = self.parameters.value(426, self._set)
         return up_s, down_s
 
     def _settle(self) -> None:
         """Make all transitions that the control word asks for; this goes on without a new telegram."""
         while True:
-            if self.state is State.QUICK_STOP and self.output_hz == 0:
-                self._enter(State.SWITCH_ON_INHIBITED)  # §6.5.1 bit 2: ends there at 0 Hz
+            if self.state is NordState.QUICK_STOP and self.output_hz == 0:
+                self._enter(NordState.SWITCH_ON_INHIBITED)  # §6.5.1 bit 2: ends there at 0 Hz
             transition = commanded(self.state, self.control_word)
             if transition is None or (transition.at_standstill and self.output_hz != 0):
                 return
             self._enter(transition.target)
 
-    def _enter(self, state: State) -> None:
+    def _enter(self, state: NordState) -> None:
         # Only from "enabled" to "quick stop" does the voltage stay on.
-        if self.state in (State.ENABLED, State.QUICK_STOP) and state is not State.QUICK_STOP:
+        if self.state in (NordState.ENABLED, NordState.QUICK_STOP) and state is not NordState.QUICK_STOP:
             self._output_off(self._time)
         self.state = state
 

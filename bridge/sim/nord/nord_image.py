@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from bridge.sim.core.dictionary import DataType, Dictionary, Number, constant
+from bridge.sim.core.dictionary import Dictionary, IntegerType, Number, constant
 from bridge.sim.core.dirty_flag import DirtyFlag
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_settings import (
@@ -87,7 +87,7 @@ class ProcessImage:
         count = DRIVES * self._per_drive
         dictionary.add_array(SETPOINTS, [self._setpoint_entry(place) for place in range(count)])
         dictionary.add_array(ACTUAL_VALUES, [self._actual_entry(place) for place in range(count)])
-        u16 = DataType.UNSIGNED16
+        u16 = IntegerType.UNSIGNED16
         outputs = Number(u16, lambda: self.outputs, self.set_outputs, in_rpdo=True, in_tpdo=True)
         dictionary.add(DIGITAL_OUTPUTS, 0, outputs)
         dictionary.add(DIGITAL_INPUTS, 0, Number(u16, lambda: self.inputs, in_tpdo=True))
@@ -101,11 +101,11 @@ class ProcessImage:
                 self.control[drive] = value
                 self.dirty.is_set = True
 
-        return Number(DataType.UNSIGNED16, lambda: self.control[drive], write, in_rpdo=True, in_tpdo=True)
+        return Number(IntegerType.UNSIGNED16, lambda: self.control[drive], write, in_rpdo=True, in_tpdo=True)
 
     def status_entry(self, drive: int) -> Number:
         """The status word of a drive, 3001h or 6041h."""
-        return Number(DataType.UNSIGNED16, lambda: self.status(drive), in_tpdo=True)
+        return Number(IntegerType.UNSIGNED16, lambda: self.status(drive), in_tpdo=True)
 
     def _setpoint_entry(self, place: int) -> Number:
         def write(value: int) -> None:
@@ -115,11 +115,13 @@ class ProcessImage:
                 self.dirty.is_set = True
 
         # §6.5.8 maps a control word and a setpoint into 1A00h: an RW object can be mapped both ways.
-        return Number(DataType.UNSIGNED16, lambda: self.setpoints[place], write, in_rpdo=True, in_tpdo=True)
+        return Number(
+            IntegerType.UNSIGNED16, lambda: self.setpoints[place], write, in_rpdo=True, in_tpdo=True
+        )
 
     def _actual_entry(self, place: int) -> Number:
         drive, value = divmod(place, self._per_drive)
-        return Number(DataType.UNSIGNED16, lambda: self.actual(drive, value), in_tpdo=True)
+        return Number(IntegerType.UNSIGNED16, lambda: self.actual(drive, value), in_tpdo=True)
 
 
 def add_parameter(dictionary: Dictionary, number: int, entries: Sequence[Number]) -> None:
@@ -130,8 +132,8 @@ def add_parameter(dictionary: Dictionary, number: int, entries: Sequence[Number]
 
 def display(read: Callable[[], int]) -> Number:
     """A 16-bit value that can only be read."""
-    return Number(DataType.UNSIGNED16, read)
+    return Number(IntegerType.UNSIGNED16, read)
 
 
 def fixed(value: int) -> Number:
-    return constant(DataType.UNSIGNED16, value)
+    return constant(IntegerType.UNSIGNED16, value)

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final, Literal
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
 from bridge.sim.core.communication_objects import DeviceIdentity, add_communication
-from bridge.sim.core.dictionary import DataType as Type
-from bridge.sim.core.dictionary import Dictionary, Entry, Number, ObjectAccess, item, variable
+from bridge.sim.core.communication_settings import CommunicationSettings
+from bridge.sim.core.dictionary import Dictionary, Entry, IntegerType, Number, ObjectAccess, item, variable
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.pdo_objects import PdoObjects
-from bridge.sim.core.sdo_server import SdoServer
-from bridge.sim.core.settings import CommunicationSettings
+from bridge.sim.core.pdo_objects import PdoConfigurator
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 from bridge.sim.core.store import Store
 from bridge.sim.nord.nord_can_parameters import CanParameters
 from bridge.sim.nord.nord_drive import NordDrive
@@ -62,7 +61,7 @@ def identity(device_name: str) -> DeviceIdentity:
     )
 
 
-def build_dictionary(dictionary: Dictionary, parts: InterfaceParts, pdos: PdoObjects) -> None:
+def build_dictionary(dictionary: Dictionary, parts: InterfaceParts, pdos: PdoConfigurator) -> None:
     """Fill ``dictionary``, which ``pdos`` already uses to check mappings."""
     stores = (parts.communication, parts.interface)
     add_communication(dictionary, identity(parts.kind), parts.module_state, parts.emcy, *stores)
@@ -85,12 +84,12 @@ def _add_standard_parameters(dictionary: Dictionary, parts: InterfaceParts) -> N
         return parts.interface.current
 
     def elements(values: Callable[[], list[int]], places: range, high: int) -> list[Number]:
-        return [item(Type.UNSIGNED16, values, place, 0, high) for place in places]
+        return [item(IntegerType.UNSIGNED16, values, place, 0, high) for place in places]
 
     def set_profile(value: int) -> None:
         parts.set_profile(value != 0)
 
-    u16 = Type.UNSIGNED16
+    u16 = IntegerType.UNSIGNED16
     if parts.kind == "SK TU4-CAO":  # the SK CU4-CAO has no outputs
         add_parameter(dictionary, 150, [variable(u16, settings, "relays", 0, 4)])
     add_parameter(dictionary, 151, [variable(u16, settings, "p151_ms", 0, 32767)])
@@ -119,7 +118,7 @@ def _add_displays(dictionary: Dictionary, parts: InterfaceParts) -> None:
     if parts.kind == "SK TU4-CAO":
         add_parameter(dictionary, 175, [display(relays)])
     for number, word in ((176, image.bus_in), (177, image.bus_out)):
-        words = [Number(Type.INTEGER16, partial(word, element)) for element in elements]
+        words = [Number(IntegerType.INTEGER16, partial(word, element)) for element in elements]
         add_parameter(dictionary, number, words)
     add_parameter(dictionary, 180, [fixed(parts.node_id)])
     add_parameter(dictionary, 181, [fixed(_BAUD_250)])
@@ -127,7 +126,7 @@ def _add_displays(dictionary: Dictionary, parts: InterfaceParts) -> None:
 
 def build_servers(
     dictionary: Dictionary, drives: Sequence[NordDrive], online: Callable[[int], bool]
-) -> list[SdoServer]:
+) -> list[SimulatedSdoServer]:
     """SDO1 for the interface and FU1, SDO2…4 for FU2…4 (§6.4)."""
     channels: list[DriveAccess] = []
     for place, drive in enumerate(drives):
@@ -135,7 +134,7 @@ def build_servers(
         drive.add_to(parameters)
         channels.append(DriveAccess(parameters, partial(online, place)))
     reaches = [FirstChannel([dictionary, channels[0]]), *channels[1:]]
-    return [SdoServer(objects, RULES.sdo_block_segments) for objects in reaches]
+    return [SimulatedSdoServer(objects, RULES.sdo_block_segments) for objects in reaches]
 
 
 class DriveAccess:

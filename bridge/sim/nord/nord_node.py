@@ -8,13 +8,13 @@ from typing import Final
 
 from bridge.canopen.frame import Frame
 from bridge.sim.core.canopen_slave import CanopenSlave
-from bridge.sim.core.device import SimulatedDevice
+from bridge.sim.core.communication_settings import CommunicationSettings
 from bridge.sim.core.dictionary import Dictionary
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtState
-from bridge.sim.core.pdo_objects import PdoObjects
-from bridge.sim.core.sdo_server import SdoServer
-from bridge.sim.core.settings import CommunicationSettings
+from bridge.sim.core.nmt_slave import SlaveState
+from bridge.sim.core.pdo_objects import PdoConfigurator
+from bridge.sim.core.sdo_server import SimulatedSdoServer
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.core.store import Store
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_settings import RULES
@@ -41,8 +41,8 @@ class NordNode(SimulatedDevice):
     def _build(self) -> None:
         """Make the CANopen slave with the family's objects."""
         dictionary = self._empty_dictionary()
-        pdos = PdoObjects(
-            dictionary, self._communication, RULES, lambda: self.slave.state is NmtState.PRE_OPERATIONAL
+        pdos = PdoConfigurator(
+            dictionary, self._communication, RULES, lambda: self.slave.state is SlaveState.PRE_OPERATIONAL
         )
         servers = self._fill(dictionary, pdos)
         self.slave = CanopenSlave(
@@ -57,7 +57,7 @@ class NordNode(SimulatedDevice):
         return Dictionary()
 
     @abstractmethod
-    def _fill(self, dictionary: Dictionary, pdos: PdoObjects) -> Sequence[SdoServer]:
+    def _fill(self, dictionary: Dictionary, pdos: PdoConfigurator) -> Sequence[SimulatedSdoServer]:
         """Put the node's objects into ``dictionary``; returns what each SDO channel reaches."""
 
     @abstractmethod
@@ -78,7 +78,7 @@ class NordNode(SimulatedDevice):
 
     # The application of the CANopen slave, as far as all have it in common.
 
-    def nmt_changed(self, state: NmtState) -> None:
+    def nmt_changed(self, state: SlaveState) -> None:
         # §7.1.1 demands the next valid telegram within P151 of the last without naming an exception, and
         # §6.2 closes the PDO channel outside Operational. So nothing is done here: the watch goes on
         # running and trips: a master that leaves Operational while a drive runs counts as silent.

@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.sim.core.dictionary import DataType, Dictionary, Number
+from bridge.sim.core.dictionary import Dictionary, IntegerType, Number
 
 PARAMETER_BASE: Final = 0x2000
 SETS: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class NordParameter:
     """A settable parameter. ``defaults`` has one raw value per array element; ``unit`` is one raw step.
 
     ``per_set``: the parameter has a value for each of the four parameter sets.
@@ -34,37 +34,37 @@ class Parameter:
 
 
 PARAMETERS: Final = (
-    Parameter(102, (200,), 0, 32000, unit=0.01, per_set=True),  # acceleration time, s
-    Parameter(103, (200,), 0, 32000, unit=0.01, per_set=True),  # deceleration time, s
-    Parameter(104, (0,), 0, 4000, unit=0.1, per_set=True),  # minimum frequency, Hz
-    Parameter(105, (500,), 1, 4000, unit=0.1, per_set=True),  # maximum frequency, Hz
-    Parameter(112, (100,), 1, 32767, unit=0.1, per_set=True),  # torque current limit, A (see NordDrive)
-    Parameter(113, (0,), -4000, 4000, unit=0.1, per_set=True),  # jog frequency, Hz
-    Parameter(120, (1, 1, 1, 1), 0, 2),  # option supervision
-    Parameter(426, (10,), 0, 32000, unit=0.01, per_set=True),  # quick stop time, s
-    Parameter(509, (3,), 0, 10),  # source of the control word; 3 = system bus (§7.2)
-    Parameter(510, (0, 0), 0, 10),  # source of the setpoints; 0 = as P509
-    Parameter(513, (10,), -1, 1000, unit=0.1),  # telegram downtime, s; -0.1 = ignore
-    Parameter(514, (5,), 0, 7),  # bit rate of the system bus; 5 = 250 kbit/s (§7.2)
-    Parameter(515, (32, 32, 32), 0, 255),  # its addresses
-    Parameter(543, (1, 3, 5, 0, 0), 0, 57, per_set=True),  # meaning of the actual values
-    Parameter(546, (1, 0, 0, 0, 0), 0, 57, per_set=True),  # meaning of the setpoints
-    Parameter(560, (1,), 0, 2),  # 0 = changes go to RAM only, 1 = to the EEPROM too
-    Parameter(600, (0,), 0, 2, per_set=True),  # position control, see nord_posicon
-    Parameter(604, (0,), 0, 17),  # encoder for positions
-    Parameter(607, (1, 1, 1), 1, 32000),  # ratio, and
-    Parameter(608, (1, 1, 1), 1, 32000),  # reduction of positions, see nord_posicon
+    NordParameter(102, (200,), 0, 32000, unit=0.01, per_set=True),  # acceleration time, s
+    NordParameter(103, (200,), 0, 32000, unit=0.01, per_set=True),  # deceleration time, s
+    NordParameter(104, (0,), 0, 4000, unit=0.1, per_set=True),  # minimum frequency, Hz
+    NordParameter(105, (500,), 1, 4000, unit=0.1, per_set=True),  # maximum frequency, Hz
+    NordParameter(112, (100,), 1, 32767, unit=0.1, per_set=True),  # torque current limit, A (see NordDrive)
+    NordParameter(113, (0,), -4000, 4000, unit=0.1, per_set=True),  # jog frequency, Hz
+    NordParameter(120, (1, 1, 1, 1), 0, 2),  # option supervision
+    NordParameter(426, (10,), 0, 32000, unit=0.01, per_set=True),  # quick stop time, s
+    NordParameter(509, (3,), 0, 10),  # source of the control word; 3 = system bus (§7.2)
+    NordParameter(510, (0, 0), 0, 10),  # source of the setpoints; 0 = as P509
+    NordParameter(513, (10,), -1, 1000, unit=0.1),  # telegram downtime, s; -0.1 = ignore
+    NordParameter(514, (5,), 0, 7),  # bit rate of the system bus; 5 = 250 kbit/s (§7.2)
+    NordParameter(515, (32, 32, 32), 0, 255),  # its addresses
+    NordParameter(543, (1, 3, 5, 0, 0), 0, 57, per_set=True),  # meaning of the actual values
+    NordParameter(546, (1, 0, 0, 0, 0), 0, 57, per_set=True),  # meaning of the setpoints
+    NordParameter(560, (1,), 0, 2),  # 0 = changes go to RAM only, 1 = to the EEPROM too
+    NordParameter(600, (0,), 0, 2, per_set=True),  # position control, see nord_posicon
+    NordParameter(604, (0,), 0, 17),  # encoder for positions
+    NordParameter(607, (1, 1, 1), 1, 32000),  # ratio, and
+    NordParameter(608, (1, 1, 1), 1, 32000),  # reduction of positions, see nord_posicon
 )
 
 _ON_SYSTEM_BUS: Final = (120, 509, 543, 546)
 _DIRECT: Final = (
     *(parameter for parameter in PARAMETERS if parameter.number not in _ON_SYSTEM_BUS),
-    Parameter(509, (6,), 0, 10),  # 6 = CANopen (§7.2)
+    NordParameter(509, (6,), 0, 10),  # 6 = CANopen (§7.2)
 )
 SK_5XXE: Final = (
     *_DIRECT,
-    *(Parameter(543 + place, (value,), 0, 57, per_set=True) for place, value in enumerate((1, 3, 5))),
-    *(Parameter(546 + place, (value,), 0, 57, per_set=True) for place, value in enumerate((1, 0, 0))),
+    *(NordParameter(543 + place, (value,), 0, 57, per_set=True) for place, value in enumerate((1, 3, 5))),
+    *(NordParameter(546 + place, (value,), 0, 57, per_set=True) for place, value in enumerate((1, 0, 0))),
 )
 """SK 500E…535E: P543…P545 and P546…P548 without elements (§6.5.4)."""
 SK_54XE: Final = (*_DIRECT, *(parameter for parameter in PARAMETERS if parameter.number in (543, 546)))
@@ -81,10 +81,10 @@ def sub_index(element: int, parameter_set: int) -> int:
     return 4 * (element - 1) + parameter_set
 
 
-class DriveParameters:
+class NordParameters:
     """RAM and EEPROM of a drive's parameters."""
 
-    def __init__(self, parameters: Sequence[Parameter] = PARAMETERS) -> None:
+    def __init__(self, parameters: Sequence[NordParameter] = PARAMETERS) -> None:
         self._by_number = {parameter.number: parameter for parameter in parameters}
         self._eeprom: Values = {}
         for parameter in parameters:
@@ -134,7 +134,7 @@ class DriveParameters:
         if self.raw(_SAVE_TO_EEPROM) == 1:
             self._eeprom[number, element, parameter_set] = raw
 
-    def write(self, parameter: Parameter, element: int, parameter_set: int, raw: int) -> None:
+    def write(self, parameter: NordParameter, element: int, parameter_set: int, raw: int) -> None:
         """A write over the bus: to the EEPROM too, unless P560 says RAM only (§6.6: 100 000 cycles)."""
         sets = (parameter_set,) if parameter.per_set else range(1, SETS + 1)
         to_eeprom = self.raw(_SAVE_TO_EEPROM) == 1 or parameter.number == _SAVE_TO_EEPROM
@@ -156,9 +156,9 @@ class DriveParameters:
                     entry = self._entry(parameter, element, parameter_set)
                     dictionary.add(index, sub_index(element, parameter_set), entry)
 
-    def _entry(self, parameter: Parameter, element: int, parameter_set: int) -> Number:
+    def _entry(self, parameter: NordParameter, element: int, parameter_set: int) -> Number:
         return Number(
-            DataType.INTEGER16,
+            IntegerType.INTEGER16,
             lambda: self.raw(parameter.number, element, parameter_set),
             lambda raw: self.write(parameter, element, parameter_set, raw),
             low=parameter.low,
@@ -170,7 +170,7 @@ def add_display(dictionary: Dictionary, number: int, elements: int, read: Callab
     """A display parameter: ``read`` gets the element from 1. It is the same in every parameter set."""
 
     def entry(element: int) -> Number:
-        return Number(DataType.INTEGER16, lambda: read(element))
+        return Number(IntegerType.INTEGER16, lambda: read(element))
 
     for element in range(1, elements + 1):
         for parameter_set in range(1, SETS + 1):

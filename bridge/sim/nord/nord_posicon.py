@@ -13,7 +13,7 @@ from enum import IntEnum
 from typing import Final
 
 from bridge.sim.core.motor import Motor
-from bridge.sim.nord.nord_parameters import DriveParameters
+from bridge.sim.nord.nord_parameters import NordParameters
 from bridge.sim.nord.nord_ramp import INCREMENTS, POLE_PAIRS
 
 LOW_WORD: Final = 23
@@ -41,7 +41,7 @@ class PositionControl(IntEnum):
     """Speed of the set frequency."""
 
 
-def commission(parameters: DriveParameters) -> None:
+def commission(parameters: NordParameters) -> None:
     """A drive as in §5.4."""
     for number, codes in ((543, ACTUAL), (546, SETPOINTS)):
         for element, code in enumerate(codes, start=1):
@@ -49,7 +49,7 @@ def commission(parameters: DriveParameters) -> None:
     parameters.commission(600, PositionControl.AT_SETPOINT)
 
 
-def stretch(parameters: DriveParameters) -> float:
+def stretch(parameters: NordParameters) -> float:
     """Increments to one step of the words."""
     return parameters.raw(607, 3) / parameters.raw(608, 3)
 

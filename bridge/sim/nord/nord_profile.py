@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from bridge.sim.core.dictionary import DataType as Type
-from bridge.sim.core.dictionary import Dictionary, Entry, Number, item
+from bridge.sim.core.dictionary import Dictionary, Entry, IntegerType, Number, item
 from bridge.sim.core.store import Store
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_faults import emcy_code
@@ -84,7 +83,7 @@ class VelocityMode:
         def set_outputs(value: int) -> None:
             self._image.set_outputs(value >> _IO_SHIFT)
 
-        u32 = Type.UNSIGNED32
+        u32 = IntegerType.UNSIGNED32
         dictionary.add(0x60FD, 0, Number(u32, lambda: self._image.inputs << _IO_SHIFT, in_tpdo=True))
         outputs = Number(
             u32, lambda: self._image.outputs << _IO_SHIFT, set_outputs, in_rpdo=True, in_tpdo=True
@@ -108,7 +107,7 @@ class VelocityMode:
             fault = drive.fault_tenths if self._online(place) else 0
             return emcy_code(fault) if fault else 0
 
-        u16, i16, u32 = Type.UNSIGNED16, Type.INTEGER16, Type.UNSIGNED32
+        u16, i16, u32 = IntegerType.UNSIGNED16, IntegerType.INTEGER16, IntegerType.UNSIGNED32
         objects = {
             0x603F: Number(u32, error, in_tpdo=True),
             0x6040: image.control_entry(place),

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
-from bridge.sim.core.abort import AbortCode
-from bridge.sim.core.settings import (
+from bridge.sim.core.communication_settings import (
     RPDO_BASES,
     TPDO_BASES,
     CobId,
@@ -15,6 +14,7 @@ from bridge.sim.core.settings import (
     SdoSettings,
     SlaveRules,
 )
+from bridge.sim.core.sdo_abort import AbortCode
 
 DRIVES: Final = 4
 ALL_SLOTS: Final = (1, 2, 3, 4)

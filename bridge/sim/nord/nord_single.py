@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.sim.core.communication_objects import add_communication
-from bridge.sim.core.dictionary import DataType as Type
-from bridge.sim.core.dictionary import Dictionary, Number, constant
-from bridge.sim.core.nmt_slave import NmtCommand, NmtState
-from bridge.sim.core.pdo_objects import PdoObjects
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.dictionary import Dictionary, IntegerType, Number, constant
+from bridge.sim.core.nmt_slave import CommandSpecifier, SlaveState
+from bridge.sim.core.pdo_objects import PdoConfigurator
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 from bridge.sim.core.store import Store
 from bridge.sim.nord.nord_drive import VALID, NordDrive
 from bridge.sim.nord.nord_faults import LINK_BROKEN, TELEGRAM_DOWNTIME
@@ -18,7 +17,7 @@ from bridge.sim.nord.nord_interface import DriveAccess, FirstChannel, identity
 from bridge.sim.nord.nord_node import NordNode
 from bridge.sim.nord.nord_settings import ACTUAL_VALUES, CONTROL_WORDS, RULES, SETPOINTS, STATUS_WORDS
 from bridge.sim.nord.nord_single_settings import ENCODER, TU3, Variant, factory_settings
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 from bridge.sim.nord.nord_supervision import TelegramWatch
 
 _P513: Final = 513
@@ -80,13 +79,13 @@ class NordSingle(NordNode):
 
     # The application of the CANopen slave.
 
-    def restarted(self, command: NmtCommand) -> None:
-        if command is NmtCommand.RESET_COMMUNICATION:
+    def restarted(self, command: CommandSpecifier) -> None:
+        if command is CommandSpecifier.RESET_COMMUNICATION:
             return  # the application, and with it P513, is not touched (CiA 301 §7.3.2.2.1)
         self._power_on()
         # Interface or CANopen are gone for a moment. The manual does not say how a drive reacts; here
         # a running one reports it, one at rest ignores it.
-        if self.drive.state in (State.ENABLED, State.QUICK_STOP):
+        if self.drive.state in (NordState.ENABLED, NordState.QUICK_STOP):
             self.drive.communication_lost(LINK_BROKEN if self.variant.has_interface else TELEGRAM_DOWNTIME)
             self.drive.cause_gone()
 
@@ -107,7 +106,7 @@ class NordSingle(NordNode):
 
     # How it works inside.
 
-    def _fill(self, dictionary: Dictionary, pdos: PdoObjects) -> Sequence[SdoServer]:
+    def _fill(self, dictionary: Dictionary, pdos: PdoConfigurator) -> Sequence[SimulatedSdoServer]:
         who = identity(self.variant.device_name)
         add_communication(dictionary, who, self._module_state, self._emcy, self._communication)
         self._add_words(dictionary)
@@ -115,14 +114,14 @@ class NordSingle(NordNode):
         parameters = Dictionary()
         self.drive.add_to(parameters)
         if self.variant.has_interface:
-            parameters.add(_P745, 0, constant(Type.INTEGER16, _VERSION_TENTHS))
-            parameters.add(_P746, 0, Number(Type.UNSIGNED16, self._module_state))
+            parameters.add(_P745, 0, constant(IntegerType.INTEGER16, _VERSION_TENTHS))
+            parameters.add(_P746, 0, Number(IntegerType.UNSIGNED16, self._module_state))
         access = DriveAccess(parameters, lambda: self.linked)
-        return [SdoServer(FirstChannel([dictionary, access]), RULES.sdo_block_segments)]
+        return [SimulatedSdoServer(FirstChannel([dictionary, access]), RULES.sdo_block_segments)]
 
     def _add_words(self, dictionary: Dictionary) -> None:
         """3000h…3003h as §6.5.7 numbers them for one drive: the two words without a sub-index."""
-        u16, drive = Type.UNSIGNED16, self.drive
+        u16, drive = IntegerType.UNSIGNED16, self.drive
 
         def set_control(value: int) -> None:
             self._control = value
@@ -155,7 +154,11 @@ class NordSingle(NordNode):
             self.drive.position_increments = value
 
         return Number(
-            Type.INTEGER32, lambda: round(self.drive.position_increments), write, in_rpdo=True, in_tpdo=True
+            IntegerType.INTEGER32,
+            lambda: round(self.drive.position_increments),
+            write,
+            in_rpdo=True,
+            in_tpdo=True,
         )
 
     def _p513_s(self) -> float:
@@ -164,7 +167,7 @@ class NordSingle(NordNode):
 
     def _module_state(self) -> int:
         """P746 (§7.2): ready, operational, fault, time-out; 0Ch in the high byte. 1002h shows it too."""
-        state = 0x01 | (0x02 if self.slave.state is NmtState.OPERATIONAL else 0)
+        state = 0x01 | (0x02 if self.slave.state is SlaveState.OPERATIONAL else 0)
         state |= (0 if self.linked else 0x10) | (0x20 if self._watch.tripped else 0)
         return state | _INTERFACE_ID if self.variant.has_interface else state
 
@@ -175,7 +178,7 @@ class NordSingle(NordNode):
         self._reporter.reset()
 
     def _words_by_sdo(self) -> None:
-        if self.slave.state is NmtState.OPERATIONAL:
+        if self.slave.state is SlaveState.OPERATIONAL:
             # They act on the drive, but only a process data telegram restarts P513.
             self._forward()
 

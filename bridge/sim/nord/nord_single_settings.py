@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.sim.core.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings
-from bridge.sim.nord.nord_parameters import SK_5XXE, SK_54XE, Parameter
+from bridge.sim.core.communication_settings import CobId, CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.nord.nord_parameters import SK_5XXE, SK_54XE, NordParameter
 from bridge.sim.nord.nord_settings import ACTUAL_VALUES, CONTROL_WORDS, PDO_WORDS, SETPOINTS, STATUS_WORDS
 
 ENCODER: Final = 0x3006
@@ -19,7 +19,7 @@ _EVENT_TIMER_MS: Final = 250
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class NordPdo:
     """One PDO as delivered: its identifier without the node address, and its mapping words."""
 
     cob_id: int
@@ -34,9 +34,9 @@ class Variant:
 
     device_name: str
     values: int
-    parameters: tuple[Parameter, ...]
-    rpdo: tuple[View, ...]
-    tpdo: tuple[View, ...]
+    parameters: tuple[NordParameter, ...]
+    rpdo: tuple[NordPdo, ...]
+    tpdo: tuple[NordPdo, ...]
     has_interface: bool = False
 
 
@@ -49,8 +49,8 @@ def _values(values: int, numbers: Sequence[int]) -> tuple[int, ...]:
 
 
 _THREE: Final = (1, 2, 3)
-_RPDO_1: Final = View(0x200, _words(CONTROL_WORDS, SETPOINTS, _THREE))
-_TPDO_1: Final = View(0x180, _words(STATUS_WORDS, ACTUAL_VALUES, _THREE))
+_RPDO_1: Final = NordPdo(0x200, _words(CONTROL_WORDS, SETPOINTS, _THREE))
+_TPDO_1: Final = NordPdo(0x180, _words(STATUS_WORDS, ACTUAL_VALUES, _THREE))
 _ENCODER_ENTRY: Final = (ENCODER << 16 | _BITS_32,)
 
 # The 32 bits of PDO3 are mapped in halves: §6.5.7 names objects of 16 bits alone, §6.5.4 splits a position
@@ -60,26 +60,28 @@ TU3: Final = Variant(
     3,
     SK_5XXE,
     rpdo=(
-        View(0x200, _words(CONTROL_WORDS, SETPOINTS, (1,))),
-        View(0x300, _words(CONTROL_WORDS, SETPOINTS, _THREE)),
-        View(0x400, _words(CONTROL_WORDS, SETPOINTS, _THREE)),
-        View(0x500, _words(CONTROL_WORDS, SETPOINTS, ())),
+        NordPdo(0x200, _words(CONTROL_WORDS, SETPOINTS, (1,))),
+        NordPdo(0x300, _words(CONTROL_WORDS, SETPOINTS, _THREE)),
+        NordPdo(0x400, _words(CONTROL_WORDS, SETPOINTS, _THREE)),
+        NordPdo(0x500, _words(CONTROL_WORDS, SETPOINTS, ())),
     ),
     tpdo=(
-        View(0x180, _words(STATUS_WORDS, ACTUAL_VALUES, (1,))),
-        View(0x280, _words(STATUS_WORDS, ACTUAL_VALUES, _THREE), enabled=False),
-        View(0x380, _words(STATUS_WORDS, ACTUAL_VALUES, _THREE), enabled=False),
-        View(0x480, _words(STATUS_WORDS, ACTUAL_VALUES, ()), enabled=False),
+        NordPdo(0x180, _words(STATUS_WORDS, ACTUAL_VALUES, (1,))),
+        NordPdo(0x280, _words(STATUS_WORDS, ACTUAL_VALUES, _THREE), enabled=False),
+        NordPdo(0x380, _words(STATUS_WORDS, ACTUAL_VALUES, _THREE), enabled=False),
+        NordPdo(0x480, _words(STATUS_WORDS, ACTUAL_VALUES, ()), enabled=False),
     ),
     has_interface=True,
 )
-RJ45_5XX: Final = Variant("SK 535E", 3, SK_5XXE, rpdo=(_RPDO_1, View(0x300, _ENCODER_ENTRY)), tpdo=(_TPDO_1,))
+RJ45_5XX: Final = Variant(
+    "SK 535E", 3, SK_5XXE, rpdo=(_RPDO_1, NordPdo(0x300, _ENCODER_ENTRY)), tpdo=(_TPDO_1,)
+)
 RJ45_54X: Final = Variant(
     "SK 540E",
     5,
     SK_54XE,
-    rpdo=(_RPDO_1, View(0x300, _values(SETPOINTS, (4, 5))), View(0x400, _ENCODER_ENTRY)),
-    tpdo=(_TPDO_1, View(0x280, _values(ACTUAL_VALUES, (4, 5)))),
+    rpdo=(_RPDO_1, NordPdo(0x300, _values(SETPOINTS, (4, 5))), NordPdo(0x400, _ENCODER_ENTRY)),
+    tpdo=(_TPDO_1, NordPdo(0x280, _values(ACTUAL_VALUES, (4, 5)))),
 )
 
 
@@ -93,7 +95,7 @@ def factory_settings(node_id: int, variant: Variant) -> CommunicationSettings:
     )
 
 
-def _settings(node_id: int, view: View, inhibit_100us: int = 0, event_timer_ms: int = 0) -> PdoSettings:
+def _settings(node_id: int, view: NordPdo, inhibit_100us: int = 0, event_timer_ms: int = 0) -> PdoSettings:
     return PdoSettings(
         view.cob_id + node_id,
         enabled=view.enabled,

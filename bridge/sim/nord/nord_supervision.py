@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from enum import IntEnum
 
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtState
-from bridge.sim.core.supervision import Watch
+from bridge.sim.core.nmt_slave import SlaveState
+from bridge.sim.core.supervision import SignWatch
 from bridge.sim.nord.nord_faults import emcy_code, register_bits
 
 
@@ -21,11 +21,11 @@ class Presence(IntEnum):
     LOST = 3
 
 
-def module_state(nmt: NmtState, master_lost: bool, p151_tripped: bool, drives: Sequence[Presence]) -> int:
+def module_state(nmt: SlaveState, master_lost: bool, p151_tripped: bool, drives: Sequence[Presence]) -> int:
     """P173: NMT state, time-outs, two bits per drive. The bus bits 4…7 stay 0: a simulated bus has no
     errors."""
-    state = 1 if nmt is NmtState.PRE_OPERATIONAL else 0
-    state |= 2 if nmt is NmtState.OPERATIONAL else 0
+    state = 1 if nmt is SlaveState.PRE_OPERATIONAL else 0
+    state |= 2 if nmt is SlaveState.OPERATIONAL else 0
     state |= 4 if master_lost else 0
     state |= 8 if p151_tripped else 0
     for place, presence in enumerate(drives):
@@ -33,7 +33,7 @@ def module_state(nmt: NmtState, master_lost: bool, p151_tripped: bool, drives: S
     return state
 
 
-class TelegramWatch(Watch):
+class TelegramWatch(SignWatch):
     """P151, or P513 without an interface that has parameters (§8.1): from the first valid telegram on, the
     next must come within this time."""
 

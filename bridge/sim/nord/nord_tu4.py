@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bridge.sim.core.dictionary import Dictionary
-from bridge.sim.core.nmt_slave import NmtCommand, NmtState
-from bridge.sim.core.pdo_objects import PdoObjects
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.nmt_slave import CommandSpecifier, SlaveState
+from bridge.sim.core.pdo_objects import PdoConfigurator
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 from bridge.sim.core.store import Store
 from bridge.sim.nord.nord_drive import VALID, NordDrive
 from bridge.sim.nord.nord_faults import (
@@ -30,7 +30,7 @@ from bridge.sim.nord.nord_settings import (
     factory_communication,
     place_of,
 )
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 from bridge.sim.nord.nord_supervision import FaultDisplay, Presence, TelegramWatch, module_state
 
 
@@ -95,15 +95,15 @@ class NordTu4(NordNode):
 
     # The application of the CANopen slave.
 
-    def restarted(self, command: NmtCommand) -> None:
-        if command is NmtCommand.RESET_COMMUNICATION:
+    def restarted(self, command: CommandSpecifier) -> None:
+        if command is CommandSpecifier.RESET_COMMUNICATION:
             self._fit_mappings()  # the mapping that was saved may be for the other kind of objects
             return  # the application, and with it P151, is not touched (CiA 301 §7.3.2.2.1)
         self._power_on()
         for drive in self.drives:
             # The restarting interface leaves the system bus for a moment. The manual does not say how
             # a drive reacts; here a running one reports it as missing, one at rest ignores it.
-            if drive.state in (State.ENABLED, State.QUICK_STOP):
+            if drive.state in (NordState.ENABLED, NordState.QUICK_STOP):
                 drive.communication_lost(INTERFACE_MISSING)
                 drive.cause_gone()
 
@@ -138,7 +138,7 @@ class NordTu4(NordNode):
     def _empty_dictionary(self) -> Dictionary:
         return ProfileDictionary(self.profile.hides)
 
-    def _fill(self, dictionary: Dictionary, pdos: PdoObjects) -> Sequence[SdoServer]:
+    def _fill(self, dictionary: Dictionary, pdos: PdoConfigurator) -> Sequence[SimulatedSdoServer]:
         parts = InterfaceParts(
             self.node_id,
             self._kind,
@@ -200,7 +200,7 @@ class NordTu4(NordNode):
 
     def _words_by_sdo(self) -> None:
         written = self.image.take_touched()
-        if written and self.slave.state is NmtState.OPERATIONAL:
+        if written and self.slave.state is SlaveState.OPERATIONAL:
             # Process words written by SDO act on the drive, but only a process data telegram restarts P151.
             self._forward(written)
 

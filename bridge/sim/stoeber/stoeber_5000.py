@@ -6,12 +6,12 @@ from dataclasses import replace
 from functools import partial
 
 from bridge.canopen.frame import Frame
-from bridge.sim.core.device import SimulatedDevice
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtCommand, NmtState
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.nmt_slave import CommandSpecifier, SlaveState
+from bridge.sim.core.sdo_server import SimulatedSdoServer
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.core.store import Store
-from bridge.sim.core.supervision import Watch
+from bridge.sim.core.supervision import SignWatch
 from bridge.sim.stoeber.stoeber_axis import StoeberAxis
 from bridge.sim.stoeber.stoeber_device import StoeberDevice
 from bridge.sim.stoeber.stoeber_dictionary import AxisView, WideDictionary
@@ -82,12 +82,12 @@ class Stoeber5000(SimulatedDevice):
 
     # The application of the CANopen slave.
 
-    def nmt_changed(self, state: NmtState) -> None:
+    def nmt_changed(self, state: SlaveState) -> None:
         # By the manual only life guarding stops the drive: outside Operational it goes on.
         del state
 
-    def restarted(self, command: NmtCommand) -> None:
-        if command is NmtCommand.RESET_NODE:
+    def restarted(self, command: CommandSpecifier) -> None:
+        if command is CommandSpecifier.RESET_NODE:
             self._restart()
 
     def master_lost(self) -> None:
@@ -119,7 +119,10 @@ class Stoeber5000(SimulatedDevice):
         mapped = [AxisView(dictionary, own, partial(min, n, len(own) - 1)) for n in range(CHANNELS)]
         reached = [AxisView(dictionary, own, partial(self._edited_axis, n + 1)) for n in range(CHANNELS)]
         pdos = StoeberPdoObjects(
-            self.node_id, mapped[0], self._communication, lambda: self.slave.state is NmtState.PRE_OPERATIONAL
+            self.node_id,
+            mapped[0],
+            self._communication,
+            lambda: self.slave.state is SlaveState.PRE_OPERATIONAL,
         )
         objects = CommunicationObjects(
             self.node_id, self._communication, self._settings, pdos, bit_31_opens=bit_31_opens_sdo
@@ -137,10 +140,10 @@ class Stoeber5000(SimulatedDevice):
             self.node_id,
             self._communication,
             mapped,
-            [SdoServer(view, RULES.sdo_block_segments) for view in reached],
+            [SimulatedSdoServer(view, RULES.sdo_block_segments) for view in reached],
             self._emcy,
             self,
-            Watch(lambda: self._settings.current.sync_timeout_us / 1e6),
+            SignWatch(lambda: self._settings.current.sync_timeout_us / 1e6),
             partial(self.device.trip, COMMUNICATION, SYNC_MISSING),
         )
 

@@ -13,9 +13,16 @@ from bridge.sim.core.communication_objects import (
     add_sdo_servers,
     by_signature,
 )
-from bridge.sim.core.dictionary import DataType as Type
-from bridge.sim.core.dictionary import Dictionary, Number, Text, constant, item, variable
-from bridge.sim.core.settings import COB_ID_MASK, DISABLED, CobId, CommunicationSettings
+from bridge.sim.core.communication_settings import COB_ID_MASK, DISABLED, CobId, CommunicationSettings
+from bridge.sim.core.dictionary import (
+    Dictionary,
+    IntegerType,
+    Number,
+    VisibleString,
+    constant,
+    item,
+    variable,
+)
 from bridge.sim.core.store import Store
 from bridge.sim.stoeber.stoeber_pdo_objects import StoeberPdoObjects, resolved
 from bridge.sim.stoeber.stoeber_settings import CHANNELS, MAP_ENTRIES, SDO_BASES, StoeberSettings, coordinate
@@ -72,8 +79,8 @@ class CommunicationObjects:
     ) -> None:
         """``register`` is 1001h, ``state`` 1002h."""
         add_identity(dictionary, who, state)
-        dictionary.add(0x1001, 0, Number(Type.UNSIGNED8, register))
-        dictionary.add(0x100B, 0, constant(Type.UNSIGNED32, self._node_id))
+        dictionary.add(0x1001, 0, Number(IntegerType.UNSIGNED8, register))
+        dictionary.add(0x100B, 0, constant(IntegerType.UNSIGNED32, self._node_id))
         add_protocols(dictionary, self._communication)
         self._add_ranges(dictionary)
         self._add_memory(dictionary)
@@ -85,8 +92,8 @@ class CommunicationObjects:
         self._add_coordinates(dictionary)
         named = {"E50": who.device_name, "E51": who.software_version, "E149": who.hardware_version}
         for name, text in named.items():
-            dictionary.add(coordinate(name), 0, Text(text))
-        dictionary.add(coordinate("E52"), 0, constant(Type.UNSIGNED32, who.serial))
+            dictionary.add(coordinate(name), 0, VisibleString(text))
+        dictionary.add(coordinate("E52"), 0, constant(IntegerType.UNSIGNED32, who.serial))
 
     def _save(self) -> None:
         self._communication.save()
@@ -95,7 +102,7 @@ class CommunicationObjects:
 
     def _add_ranges(self, dictionary: Dictionary) -> None:
         """Add the ranges of §11.1 that are narrower than CiA 301: SYNC 1…2047, 1015h as U32, 1006h."""
-        communication, u32 = self._communication, Type.UNSIGNED32
+        communication, u32 = self._communication, IntegerType.UNSIGNED32
 
         def set_emcy(value: int) -> None:
             cob_id = resolved(value & COB_ID_MASK, 0x80, self._node_id)
@@ -116,14 +123,16 @@ class CommunicationObjects:
                 self._save()
 
         dictionary.add_array(0x1010, [by_signature(SAVE, self._save)])
-        dictionary.add(coordinate("A00"), 0, Number(Type.UNSIGNED8, lambda: 0, by_action, low=0, high=1))
-        progress = Number(Type.UNSIGNED8, lambda: 100 if self.saves else 0)
+        dictionary.add(
+            coordinate("A00"), 0, Number(IntegerType.UNSIGNED8, lambda: 0, by_action, low=0, high=1)
+        )
+        progress = Number(IntegerType.UNSIGNED8, lambda: 100 if self.saves else 0)
         dictionary.add(coordinate("A00"), 1, progress)
-        dictionary.add(coordinate("A00"), 2, constant(Type.UNSIGNED8, 0))
+        dictionary.add(coordinate("A00"), 2, constant(IntegerType.UNSIGNED8, 0))
 
     def _add_configuration(self, dictionary: Dictionary) -> None:
         names = ("configuration_date", "configuration_time")
-        numbers = [variable(Type.UNSIGNED32, lambda: self._settings.current, name) for name in names]
+        numbers = [variable(IntegerType.UNSIGNED32, lambda: self._settings.current, name) for name in names]
         dictionary.add_array(0x1020, numbers)
 
     def _add_sdo_server(self, dictionary: Dictionary, number: int) -> None:
@@ -141,10 +150,10 @@ class CommunicationObjects:
                 cob_id().word = value ^ flip
                 cob_id().cob_id = resolved(cob_id().cob_id, function_code, self._node_id)
 
-            return Number(Type.UNSIGNED32, lambda: cob_id().word ^ flip, write)
+            return Number(IntegerType.UNSIGNED32, lambda: cob_id().word ^ flip, write)
 
         receive, send = SDO_BASES[number]
-        client = item(Type.UNSIGNED32, lambda: self._settings.current.sdo_client, number)
+        client = item(IntegerType.UNSIGNED32, lambda: self._settings.current.sdo_client, number)
         dictionary.add_array(0x1200 + number, [half("receive", receive), half("send", send), client])
 
     def _add_coordinates(self, dictionary: Dictionary) -> None:
@@ -155,7 +164,7 @@ class CommunicationObjects:
             alias(dictionary, name, index)
         alias(dictionary, "A211", 0x1020, (1,))
         alias(dictionary, "A212", 0x1020, (2,))
-        dictionary.add(coordinate("A83"), 0, constant(Type.UNSIGNED8, self._node_id))
+        dictionary.add(coordinate("A83"), 0, constant(IntegerType.UNSIGNED8, self._node_id))
         entries = tuple(range(1, MAP_ENTRIES + 1))
         for number in range(CHANNELS):
             if number:
@@ -169,4 +178,6 @@ class CommunicationObjects:
 
     def _length(self, number: int, receives: bool) -> Number:
         """A237…A244: bytes that the mapping makes."""
-        return Number(Type.UNSIGNED8, lambda: self._pdos.pdo(number, receives=receives).mapped_bits // 8)
+        return Number(
+            IntegerType.UNSIGNED8, lambda: self._pdos.pdo(number, receives=receives).mapped_bits // 8
+        )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from bridge.sim.core.dictionary import DataType as Type
-from bridge.sim.core.dictionary import Dictionary, Number, constant, item, variable
+from bridge.sim.core.dictionary import Dictionary, IntegerType, Number, constant, item, variable
 from bridge.sim.core.store import Store
 from bridge.sim.stoeber.stoeber_axis import ACKNOWLEDGE, AxisParameters, StoeberAxis
 from bridge.sim.stoeber.stoeber_device import StoeberDevice
@@ -18,7 +17,7 @@ _BAUD_250: Final = 5
 
 def add_device(dictionary: Dictionary, device: StoeberDevice, settings: Store[StoeberSettings]) -> None:
     """Parameters of the device, and A180 and D230 if there is only one axis."""
-    u8, i16 = Type.UNSIGNED8, Type.INTEGER16
+    u8, i16 = IntegerType.UNSIGNED8, IntegerType.INTEGER16
     for channel in range(CHANNELS + 1):
         # The axis that an SDO channel (0: the display) works on.
         edited = item(u8, lambda: settings.current.edited_axis, channel, 0, len(device.axes) - 1)
@@ -38,7 +37,7 @@ def add_device(dictionary: Dictionary, device: StoeberDevice, settings: Store[St
 def add_axis(dictionary: Dictionary, device: StoeberDevice, number: int) -> None:
     """The parameters of axis ``number`` (from 0)."""
     axis = device.axes[number]
-    u8, i16 = Type.UNSIGNED8, Type.INTEGER16
+    u8, i16 = IntegerType.UNSIGNED8, IntegerType.INTEGER16
 
     def parameters() -> AxisParameters:
         return device.parameters(number)
@@ -58,7 +57,12 @@ def add_axis(dictionary: Dictionary, device: StoeberDevice, number: int) -> None
 def _add_positioning(
     dictionary: Dictionary, axis: PositioningAxis, parameters: Callable[[], AxisParameters]
 ) -> None:
-    u8, u16, i16, i32 = Type.UNSIGNED8, Type.UNSIGNED16, Type.INTEGER16, Type.INTEGER32
+    u8, u16, i16, i32 = (
+        IntegerType.UNSIGNED8,
+        IntegerType.UNSIGNED16,
+        IntegerType.INTEGER16,
+        IntegerType.INTEGER32,
+    )
     for name, attribute in (("I07", "i07"), ("I08", "i08"), ("I10", "max_speed")):
         _put(dictionary, name, variable(i32, parameters, attribute, 1))
     for name, kind, attribute in (
@@ -88,6 +92,6 @@ def _add_command(
         if rising & ACKNOWLEDGE:
             device.acknowledge()
 
-    command = Number(Type.UNSIGNED8, lambda: axis.control, set_control, in_rpdo=True, in_tpdo=True)
+    command = Number(IntegerType.UNSIGNED8, lambda: axis.control, set_control, in_rpdo=True, in_tpdo=True)
     _put(dictionary, control, command)
-    _put(dictionary, setpoint, variable(Type.INTEGER16, lambda: axis, "setpoint", in_pdos=True))
+    _put(dictionary, setpoint, variable(IntegerType.INTEGER16, lambda: axis, "setpoint", in_pdos=True))

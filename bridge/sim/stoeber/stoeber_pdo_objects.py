@@ -5,11 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
-from bridge.sim.core.dictionary import DataType, Dictionary, Number, constant
-from bridge.sim.core.pdo import CYCLIC_MAX
-from bridge.sim.core.pdo_objects import PdoObjects, check_length
-from bridge.sim.core.settings import COB_ID_MASK, RPDO_BASES, TPDO_BASES, CommunicationSettings, PdoSettings
+from bridge.sim.core.communication_settings import (
+    COB_ID_MASK,
+    RPDO_BASES,
+    TPDO_BASES,
+    CommunicationSettings,
+    PdoSettings,
+)
+from bridge.sim.core.dictionary import Dictionary, IntegerType, Number, constant
+from bridge.sim.core.pdo_objects import PdoConfigurator, check_length
+from bridge.sim.core.pdo_timing import CYCLIC_MAX
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.store import Store
 from bridge.sim.stoeber.stoeber_settings import ANSWERED, MAP_ENTRIES, RULES
 
@@ -21,7 +27,7 @@ def resolved(cob_id: int, function_code: int, node_id: int) -> int:
     return cob_id + node_id if cob_id == function_code else cob_id
 
 
-class StoeberPdoObjects(PdoObjects):
+class StoeberPdoObjects(PdoConfigurator):
     """PDO objects where CAN 5000 differs from CiA 301."""
 
     def __init__(
@@ -71,12 +77,12 @@ class StoeberPdoObjects(PdoObjects):
     def _add_mapping(self, index: int, pdo: Callable[[], PdoSettings], *, receives: bool) -> None:
         def entry(place: int) -> Number:
             return Number(
-                DataType.UNSIGNED32,
+                IntegerType.UNSIGNED32,
                 lambda: pdo().entries[place],
                 lambda word: self.set_entry(pdo(), place, word, receives=receives),
             )
 
         # §11.1: sub-index 0 is read only; unused places read 0.
-        self._dictionary.add(index, 0, constant(DataType.UNSIGNED8, MAP_ENTRIES))
+        self._dictionary.add(index, 0, constant(IntegerType.UNSIGNED8, MAP_ENTRIES))
         for place in range(MAP_ENTRIES):
             self._dictionary.add(index, place + 1, entry(place))

@@ -30,7 +30,7 @@ _STEP_S: Final = 0.005
 _MOST_STEPS: Final = 2000
 
 
-class Command(IntEnum):
+class PosiCommand(IntEnum):
     """The low four bits of I210."""
 
     ABSOLUTE = 1
@@ -96,11 +96,11 @@ class PositioningAxis(StoeberAxis):
     def _begin(self) -> None:
         base = self.motor.position if self._goal is None else self._goal
         match self.command & _COMMAND:
-            case Command.ABSOLUTE:
+            case PosiCommand.ABSOLUTE:
                 self._goal = float(self.target)
-            case Command.RELATIVE:
+            case PosiCommand.RELATIVE:
                 self._goal = base + self.target
-            case Command.HOMING:
+            case PosiCommand.HOMING:
                 self._bits &= ~REFERENCED
                 self._goal = (HOME_AT if self.has_home_switch else -2 * LIMIT_AT) - self._machine
             case _:
@@ -147,6 +147,6 @@ class PositioningAxis(StoeberAxis):
     def _arrived(self) -> None:
         self._goal = None
         self._bits |= REACHED
-        if self._seen & _COMMAND == Command.HOMING:
+        if self._seen & _COMMAND == PosiCommand.HOMING:
             self._machine, self.motor.position = self.place, 0.0
             self._bits |= REFERENCED

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final
 
-from bridge.sim.core.settings import (
+from bridge.sim.core.communication_settings import (
     RPDO_BASES,
     TPDO_BASES,
     CobId,

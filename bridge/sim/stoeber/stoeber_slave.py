@@ -7,18 +7,18 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from bridge.sim.core.canopen_slave import Application, CanopenSlave
+from bridge.sim.core.communication_settings import CommunicationSettings, PdoSettings, SdoSettings
 from bridge.sim.core.dictionary import Dictionary
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtCommand, NmtState, nmt_command_for
-from bridge.sim.core.pdo import MappedRpdo, Tpdo, unpack
-from bridge.sim.core.sdo_server import SdoServer
-from bridge.sim.core.settings import CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.core.nmt_slave import CommandSpecifier, SlaveState, nmt_command_for
+from bridge.sim.core.pdo_timing import MappedRpdo, Tpdo, unpack
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 from bridge.sim.core.store import Store
-from bridge.sim.core.supervision import Watch
+from bridge.sim.core.supervision import SignWatch
 from bridge.sim.core.ticks import earliest
 from bridge.sim.stoeber.stoeber_settings import ANSWERED
 
-_FRESH: Final = (NmtState.INITIALISING, NmtState.STOPPED)
+_FRESH: Final = (SlaveState.INITIALISING, SlaveState.STOPPED)
 
 
 class StoeberTpdo(Tpdo):
@@ -72,10 +72,10 @@ class StoeberSlave(CanopenSlave):
         node_id: int,
         store: Store[CommunicationSettings],
         views: Sequence[Dictionary],
-        servers: Sequence[SdoServer],
+        servers: Sequence[SimulatedSdoServer],
         emcy: EmcyProducer,
         application: Application,
-        sync: Watch,
+        sync: SignWatch,
         sync_lost: Callable[[], None],
     ) -> None:
         """``sync``, from the first one on, is watched by 1006h (§6, red LED)."""
@@ -88,30 +88,30 @@ class StoeberSlave(CanopenSlave):
         self._sync_lost = sync_lost
 
     def poll(self, now: float) -> None:
-        if self.state is NmtState.OPERATIONAL and self._sync.expired(now):
+        if self.state is SlaveState.OPERATIONAL and self._sync.expired(now):
             self._sync_lost()
         super().poll(now)
-        if self.state is NmtState.STOPPED:  # §7.1: emergency messages are sent in Stopped too
+        if self.state is SlaveState.STOPPED:  # §7.1: emergency messages are sent in Stopped too
             for data in self.emcy.due(now):
                 self._send(self._store.current.emcy.cob_id, data)
 
     def next_deadline(self) -> float | None:
         deadlines = [super().next_deadline()]
-        if self.state is NmtState.STOPPED:
+        if self.state is SlaveState.STOPPED:
             deadlines.append(self.emcy.next_deadline())
-        if self.state is NmtState.OPERATIONAL:
+        if self.state is SlaveState.OPERATIONAL:
             deadlines.append(self._sync.next_deadline())
         return earliest(*deadlines)
 
     def _on_nmt(self, data: bytes) -> None:
-        if nmt_command_for(self.node_id, data) is NmtCommand.RESET_COMMUNICATION:
-            self._application.restarted(NmtCommand.RESET_COMMUNICATION)
+        if nmt_command_for(self.node_id, data) is CommandSpecifier.RESET_COMMUNICATION:
+            self._application.restarted(CommandSpecifier.RESET_COMMUNICATION)
             self.boot()
             return
         super()._on_nmt(data)
 
-    def _enter(self, state: NmtState) -> None:
-        if state is NmtState.PRE_OPERATIONAL and self.state in _FRESH:
+    def _enter(self, state: SlaveState) -> None:
+        if state is SlaveState.PRE_OPERATIONAL and self.state in _FRESH:
             self._open_sdo = copy.deepcopy(self._store.current.sdo)
         self._sync.stop()
         super()._enter(state)

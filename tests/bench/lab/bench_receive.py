@@ -13,9 +13,9 @@ import canopen
 
 from bridge.can.socketcan import SocketCanBus
 from bridge.canopen.pdo import PdoCodec, PdoEntry
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.node.boot import PdoPlan
-from bridge.node.places.words import Place
+from bridge.node.places.word_map import WordPlace
 from bridge.node.process.process_data import DrivePdos
 from tests.bench.canopen_node import with_four_words
 from tests.bench.figures import show
@@ -46,7 +46,7 @@ async def measure_ours(folder: Path) -> float:
     drive = bench.plant.drives["conveyor/fu1"]
     node_goes(bench.plant, bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, time.monotonic())
     entries = tuple(PdoEntry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
-    plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), tuple(Place(n) for n in range(4)))
+    plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), tuple(WordPlace(n) for n in range(4)))
     pdos = DrivePdos(drive, (plan,), (plan,), lambda frame, why: None)
     routes = pdos.handlers
     bus = SocketCanBus("can0", "vcan0")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.base.admission import Admission, Limits, Stage, Visitor
+from bridge.base.admission import Admission, ConnectionStage, Limits, Visitor
 from bridge.base.sources import source_of
-from bridge.uaserver.admission import (
+from bridge.uaserver.connection_limits import (
     DEADLINE_S,
     KEPT,
     MOST_CONNECTIONS,
@@ -32,15 +32,17 @@ class Rig:
         self.closed: list[Client] = []
         self.now = 0.0
 
-    def client(self, source: str = "10.0.0.1", stage: Stage = Stage.CONNECTED) -> Client:
+    def client(self, source: str = "10.0.0.1", stage: ConnectionStage = ConnectionStage.CONNECTED) -> Client:
         return Client(self, source, stage)
 
-    def crowd(self, count: int, source: str = "10.0.0.1", stage: Stage = Stage.CONNECTED) -> list[Client]:
+    def crowd(
+        self, count: int, source: str = "10.0.0.1", stage: ConnectionStage = ConnectionStage.CONNECTED
+    ) -> list[Client]:
         return [self.client(source, stage) for _ in range(count)]
 
 
 class Client:
-    def __init__(self, rig: Rig, source: str, stage: Stage) -> None:
+    def __init__(self, rig: Rig, source: str, stage: ConnectionStage) -> None:
         self.stage = stage
         self.held = 0
         self.has_rights = False
@@ -60,8 +62,10 @@ def rig() -> Rig:
     return Rig()
 
 
-@pytest.mark.parametrize("stage", [Stage.CONNECTED, Stage.GREETED, Stage.CHANNEL])
-def test_each_step_has_its_time(rig: Rig, stage: Stage) -> None:
+@pytest.mark.parametrize(
+    "stage", [ConnectionStage.CONNECTED, ConnectionStage.GREETED, ConnectionStage.CHANNEL]
+)
+def test_each_step_has_its_time(rig: Rig, stage: ConnectionStage) -> None:
     client = rig.client(stage=stage)
     rig.admission.look(DEADLINE_S[stage] - 0.1)
     assert rig.closed == []
@@ -71,12 +75,12 @@ def test_each_step_has_its_time(rig: Rig, stage: Stage) -> None:
 
 
 def test_a_session_may_stay_and_the_time_counts_anew_when_it_is_gone(rig: Rig) -> None:
-    client = rig.client(stage=Stage.SESSION)
+    client = rig.client(stage=ConnectionStage.SESSION)
     rig.admission.look(1000.0)
-    client.stage = Stage.CHANNEL
-    rig.admission.look(1000.0 + DEADLINE_S[Stage.CHANNEL] - 0.1)
+    client.stage = ConnectionStage.CHANNEL
+    rig.admission.look(1000.0 + DEADLINE_S[ConnectionStage.CHANNEL] - 0.1)
     assert rig.closed == []
-    rig.admission.look(1000.0 + DEADLINE_S[Stage.CHANNEL])
+    rig.admission.look(1000.0 + DEADLINE_S[ConnectionStage.CHANNEL])
     assert rig.closed == [client]
 
 
@@ -88,18 +92,18 @@ def test_the_oldest_without_a_session_makes_room(rig: Rig) -> None:
 
 
 def test_a_flood_of_idle_sockets_pushes_out_no_handshake(rig: Rig) -> None:
-    client = rig.client(stage=Stage.CHANNEL)
+    client = rig.client(stage=ConnectionStage.CHANNEL)
     rig.now = 0.01
     assert all(one.is_in for one in rig.crowd(1000))
     assert client not in rig.closed
-    client.stage = Stage.SESSION
+    client.stage = ConnectionStage.SESSION
     rig.admission.look(100.0)
     assert client not in rig.closed
 
 
 def test_channels_that_wait_push_out_no_newcomer(rig: Rig) -> None:
     """A client that sits on an open channel gives way before one that has only just connected."""
-    sitting = rig.crowd(MOST_WAITING, stage=Stage.CHANNEL)
+    sitting = rig.crowd(MOST_WAITING, stage=ConnectionStage.CHANNEL)
     rig.now = 6.0
     newcomers = rig.crowd(5)
     assert rig.closed == sitting[:5]
@@ -110,19 +114,19 @@ def test_crowds_of_several_addresses_push_out_no_newcomer_of_another(rig: Rig) -
     """They have said more than it, and come again before it can say anything."""
     hosts = [f"10.0.1.{number}" for number in range(MOST_CONNECTIONS // MOST_WAITING)]
     for host in hosts:
-        rig.crowd(MOST_WAITING, host, Stage.CHANNEL)
+        rig.crowd(MOST_WAITING, host, ConnectionStage.CHANNEL)
     newcomer = rig.client("10.0.2.1")
     assert newcomer.is_in
     for number in range(100):
         rig.now += 0.01
-        rig.client(hosts[number % len(hosts)], Stage.CHANNEL)
+        rig.client(hosts[number % len(hosts)], ConnectionStage.CHANNEL)
     assert newcomer not in rig.closed
 
 
 def test_who_holds_the_most_of_the_address_that_does_is_closed(rig: Rig) -> None:
-    reader = rig.client("10.0.0.2", Stage.SESSION)
+    reader = rig.client("10.0.0.2", ConnectionStage.SESSION)
     reader.held = MOST_HELD // 3
-    crowd = rig.crowd(40, stage=Stage.SESSION)
+    crowd = rig.crowd(40, stage=ConnectionStage.SESSION)
     for one in crowd:
         one.held = MOST_HELD // 50
     crowd[7].held += 1
@@ -142,12 +146,12 @@ def test_one_address_costs_no_other_anything(rig: Rig) -> None:
     rig.now = 0.1
     rig.crowd(1000)
     assert other not in rig.closed
-    rig.crowd(100, stage=Stage.SESSION)
+    rig.crowd(100, stage=ConnectionStage.SESSION)
     assert len(rig.admission) == MOST_OF_ADDRESS + 1
 
 
 def test_sessions_make_no_room_but_leave_some(rig: Rig) -> None:
-    sessions = rig.crowd(MOST_OF_ADDRESS, stage=Stage.SESSION)
+    sessions = rig.crowd(MOST_OF_ADDRESS, stage=ConnectionStage.SESSION)
     assert not rig.client().is_in
     assert rig.client("10.0.0.2").is_in
     assert rig.closed == []
@@ -158,37 +162,37 @@ def test_sessions_make_no_room_but_leave_some(rig: Rig) -> None:
 def test_when_all_are_taken_only_who_waits_makes_room(rig: Rig) -> None:
     waiting = rig.client("10.0.9.9")
     for number in range(MOST_CONNECTIONS - 1):
-        rig.client(f"10.0.1.{number}", Stage.SESSION)
-    assert rig.client("10.0.2.1", Stage.SESSION).is_in
+        rig.client(f"10.0.1.{number}", ConnectionStage.SESSION)
+    assert rig.client("10.0.2.1", ConnectionStage.SESSION).is_in
     assert rig.closed == [waiting]
     assert not rig.client("10.0.2.2").is_in
     assert len(rig.admission) == MOST_CONNECTIONS
 
 
 def test_one_place_is_kept_for_who_has_rights(rig: Rig) -> None:
-    readers = [rig.client(f"10.0.1.{number}", Stage.SESSION) for number in range(MOST_CONNECTIONS)]
+    readers = [rig.client(f"10.0.1.{number}", ConnectionStage.SESSION) for number in range(MOST_CONNECTIONS)]
     rig.admission.look(0.0)
     assert rig.closed == readers[: -KEPT - 1 : -1], "anybody may try the last place, none of them keeps it"
-    operator = rig.client("10.0.2.1", Stage.CHANNEL)
+    operator = rig.client("10.0.2.1", ConnectionStage.CHANNEL)
     assert operator.is_in
-    operator.stage, operator.has_rights = Stage.SESSION, True
+    operator.stage, operator.has_rights = ConnectionStage.SESSION, True
     rig.admission.look(1.0)
     assert operator not in rig.closed
     assert rig.client("10.0.2.2").is_in, "to come back to a session on"
 
 
 def test_where_somebody_has_rights_others_may_have_the_rest(rig: Rig) -> None:
-    rig.client("10.0.2.1", Stage.SESSION).has_rights = True
+    rig.client("10.0.2.1", ConnectionStage.SESSION).has_rights = True
     for number in range(MOST_CONNECTIONS - KEPT):
-        rig.client(f"10.0.1.{number}", Stage.SESSION)
+        rig.client(f"10.0.1.{number}", ConnectionStage.SESSION)
     rig.admission.look(0.0)
     assert rig.closed == []
 
 
 def test_where_all_yield_a_newcomer_always_gets_in_at_the_expense_of_the_largest_crowd() -> None:
     rig = Rig(Limits(4, 4, 4, all_yield=True))
-    owner = rig.client("10.0.0.2", Stage.SESSION)
-    crowd = rig.crowd(3, "10.0.0.3", Stage.SESSION)
+    owner = rig.client("10.0.0.2", ConnectionStage.SESSION)
+    crowd = rig.crowd(3, "10.0.0.3", ConnectionStage.SESSION)
     assert rig.client("10.0.0.4").is_in
     assert rig.closed == crowd[:1]
     assert rig.client("10.0.0.3").is_in
@@ -197,7 +201,7 @@ def test_where_all_yield_a_newcomer_always_gets_in_at_the_expense_of_the_largest
 
 def test_a_refusal_and_an_end_have_one_kind_of_line_each(rig: Rig) -> None:
     for _ in range(MOST_OF_ADDRESS):
-        rig.client(stage=Stage.SESSION)
+        rig.client(stage=ConnectionStage.SESSION)
     for _ in range(20):
         rig.client()
     assert {(kind, source) for kind, source, _ in rig.told} == {("refused connections", "10.0.0.1")}

@@ -12,7 +12,7 @@ import pytest
 
 from bridge.base.guard import Guard
 from bridge.base.notify import Notifier
-from bridge.command import Event, Kind
+from bridge.command import Event, EventKind
 from bridge.service.front_process import give_reason
 from tests.support import sites
 
@@ -45,7 +45,7 @@ def test_a_listener_that_fails_keeps_an_event_from_nobody() -> None:
 
     plant.on_event(fail)
     plant.on_event(heard.append)
-    event = Event(1.0, Kind.REFUSED, "bridge", 300, "\udcff")
+    event = Event(1.0, EventKind.REFUSED, "bridge", 300, "\udcff")
     plant.report(event)
     assert heard == [event]
 

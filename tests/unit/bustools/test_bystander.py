@@ -15,7 +15,7 @@ from bridge.mapping import Family
 from bridge.mapping import load_family as load_any
 from bridge.mapping.loader import family_names
 from bridge.mapping.own_places import places
-from bridge.parameter import Entry, Names, ParameterError, Transfer, TransferFailed
+from bridge.parameter import Names, ParameterEntry, ParameterError, Transfer, TransferFailed
 from bridge.text import Text
 
 load_family = cache(load_any)
@@ -54,7 +54,7 @@ def answered(
         return error
 
 
-def any_protected(names: Names, family: Family) -> Entry:
+def any_protected(names: Names, family: Family) -> ParameterEntry:
     """An entry that is not written while the drive is enabled; every family has one."""
     levels = ("communication", "while_enabled")
     objects = [names.resolve(str(ref)) for ref in own_objects(family)]

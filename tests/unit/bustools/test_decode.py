@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.bustools.decode import Decoder, Kind, Meaning
+from bridge.bustools.decode import Decoder, FrameKind, FrameMeaning
 from bridge.bustools.statistics import Statistics
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.config import NodeTable
@@ -26,7 +26,7 @@ def site() -> Decoder:
     return Decoder([CONVEYOR], {"nord/sk-tu4-cao": load_family("nord/sk-tu4-cao")})
 
 
-def heard(decoder: Decoder, *frames: tuple[int, str]) -> Meaning:
+def heard(decoder: Decoder, *frames: tuple[int, str]) -> FrameMeaning:
     """The meaning of the last of these frames."""
     return [decoder.decode(Frame(can_id, bytes.fromhex(data))) for can_id, data in frames][-1]
 
@@ -54,7 +54,7 @@ def heard(decoder: Decoder, *frames: tuple[int, str]) -> Meaning:
 )
 def test_the_manuals_sdo_frames(frames: list[tuple[int, str]], text: str) -> None:
     meaning = heard(Decoder(), *frames)
-    assert (meaning.kind, meaning.text) == (Kind.SDO, text)
+    assert (meaning.kind, meaning.text) == (FrameKind.SDO, text)
 
 
 def test_a_string_in_segments() -> None:
@@ -85,28 +85,28 @@ def test_block_segments_are_not_taken_for_commands() -> None:
 @pytest.mark.parametrize(
     ("can_id", "data", "kind", "label", "text"),
     [
-        (0x000, "0105", Kind.NMT, "NMT", "start: conveyor"),
-        (0x000, "8200", Kind.NMT, "NMT", "reset communication: all nodes"),
-        (0x000, "0707", Kind.NMT, "NMT", "unknown command 07h: node 7"),
-        (0x080, "", Kind.SYNC, "SYNC", ""),
-        (0x080, "03", Kind.SYNC, "SYNC", "counter 3"),
-        (0x100, "E80300000100", Kind.TIME, "TIME", "1984-01-02 00:00:01.000"),
-        (0x705, "00", Kind.HEARTBEAT, "boot-up conveyor", "has started"),
-        (0x705, "05", Kind.HEARTBEAT, "heartbeat conveyor", "operational"),
-        (0x705, "FF", Kind.HEARTBEAT, "heartbeat conveyor", "pre operational, toggle bit 1"),
-        (0x705 | REMOTE, "00", Kind.HEARTBEAT, "guarding conveyor", "asked for its NMT state"),
-        (0x7E5, "0401000000000000", Kind.LSS, "LSS master", "switch state global: configuration"),
-        (0x6F0, "01", Kind.OTHER, "unknown", "01"),
-        (0x001, "", Kind.OTHER, "global fail-safe command", "(the bridge has no part in it)"),
-        (0x071, "00", Kind.OTHER, "flying master", "00 (the bridge has no part in it)"),
-        (0x076, "00", Kind.OTHER, "flying master", "00 (the bridge has no part in it)"),
-        (0x077, "00", Kind.OTHER, "unknown", "00"),
-        (0x101, "01", Kind.OTHER, "SRDO", "01 (the bridge has no part in it)"),
-        (0x180, "01", Kind.OTHER, "SRDO", "01 (the bridge has no part in it)"),
-        (0x6E0, "01", Kind.OTHER, "SDO manager", "01 (the bridge has no part in it)"),
+        (0x000, "0105", FrameKind.NMT, "NMT", "start: conveyor"),
+        (0x000, "8200", FrameKind.NMT, "NMT", "reset communication: all nodes"),
+        (0x000, "0707", FrameKind.NMT, "NMT", "unknown command 07h: node 7"),
+        (0x080, "", FrameKind.SYNC, "SYNC", ""),
+        (0x080, "03", FrameKind.SYNC, "SYNC", "counter 3"),
+        (0x100, "E80300000100", FrameKind.TIME, "TIME", "1984-01-02 00:00:01.000"),
+        (0x705, "00", FrameKind.HEARTBEAT, "boot-up conveyor", "has started"),
+        (0x705, "05", FrameKind.HEARTBEAT, "heartbeat conveyor", "operational"),
+        (0x705, "FF", FrameKind.HEARTBEAT, "heartbeat conveyor", "pre operational, toggle bit 1"),
+        (0x705 | REMOTE, "00", FrameKind.HEARTBEAT, "guarding conveyor", "asked for its NMT state"),
+        (0x7E5, "0401000000000000", FrameKind.LSS, "LSS master", "switch state global: configuration"),
+        (0x6F0, "01", FrameKind.OTHER, "unknown", "01"),
+        (0x001, "", FrameKind.OTHER, "global fail-safe command", "(the bridge has no part in it)"),
+        (0x071, "00", FrameKind.OTHER, "flying master", "00 (the bridge has no part in it)"),
+        (0x076, "00", FrameKind.OTHER, "flying master", "00 (the bridge has no part in it)"),
+        (0x077, "00", FrameKind.OTHER, "unknown", "00"),
+        (0x101, "01", FrameKind.OTHER, "SRDO", "01 (the bridge has no part in it)"),
+        (0x180, "01", FrameKind.OTHER, "SRDO", "01 (the bridge has no part in it)"),
+        (0x6E0, "01", FrameKind.OTHER, "SDO manager", "01 (the bridge has no part in it)"),
     ],
 )
-def test_everything_has_a_name(can_id: int, data: str, kind: Kind, label: str, text: str) -> None:
+def test_everything_has_a_name(can_id: int, data: str, kind: FrameKind, label: str, text: str) -> None:
     meaning = heard(site(), (can_id, data))
     assert (meaning.kind, meaning.label, meaning.text) == (kind, label, text)
 
@@ -135,7 +135,7 @@ def test_no_frame_is_too_odd(frames: list[tuple[int, bytes]]) -> None:
 def test_no_sdo_conversation_is_too_odd(frames: list[tuple[int, bytes]]) -> None:
     decoder = Decoder()
     for can_id, data in frames:
-        assert decoder.decode(Frame(can_id, data)).kind is Kind.SDO
+        assert decoder.decode(Frame(can_id, data)).kind is FrameKind.SDO
 
 
 def test_statistics_by_identifier() -> None:

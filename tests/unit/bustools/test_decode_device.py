@@ -6,7 +6,7 @@ import pytest
 
 from bridge.bustools.decode_device import DevicePdoView
 from bridge.canopen.pdo import PdoCodec, PdoEntry
-from bridge.mapping.device import Signal
+from bridge.mapping.device_signals import Signal
 
 
 def signal(name: str, ref: str, kind: str, **more: object) -> Signal:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.bustools.decode import Decoder, Kind, Meaning
+from bridge.bustools.decode import Decoder, FrameKind, FrameMeaning
 from bridge.canopen.frame import Frame
 from bridge.config import NodeTable
 from bridge.mapping import load_family
@@ -21,7 +21,7 @@ def site() -> Decoder:
     return Decoder([CONVEYOR], {"nord/sk-tu4-cao": load_family("nord/sk-tu4-cao")})
 
 
-def heard(decoder: Decoder, *frames: tuple[int, str]) -> Meaning:
+def heard(decoder: Decoder, *frames: tuple[int, str]) -> FrameMeaning:
     """The meaning of the last of these frames."""
     return [decoder.decode(Frame(can_id, bytes.fromhex(data))) for can_id, data in frames][-1]
 
@@ -29,7 +29,7 @@ def heard(decoder: Decoder, *frames: tuple[int, str]) -> Meaning:
 def test_the_example_of_the_nord_manual() -> None:
     """BU 2500 §6.8: 047F, 2000 runs at 25 Hz; the drive answers xx37, 2000."""
     sent = heard(site(), (0x205, "7F04002000000000"))
-    assert sent.kind is Kind.PDO
+    assert sent.kind is FrameKind.PDO
     assert sent.label == "RPDO1 conveyor/fu1"
     assert "control_word 047Fh" in sent.text
     assert "setpoint_1 2000h (frequency 25 Hz)" in sent.text

@@ -6,14 +6,14 @@ import pytest
 
 from bridge.bustools.drop_test import DropOutcome
 from bridge.drive import DriveState, OwnJudgement, OwnVerdict
-from bridge.drive.own_supervision import Watch
+from bridge.drive.own_judgement import DriveWatch
 
 STOPS, RUNS_ON, UNKNOWN = OwnVerdict.STOPS, OwnVerdict.RUNS_ON, OwnVerdict.UNKNOWN
 
 
-def watch(setting: str, time_ms: float | None, verdict: OwnVerdict, why: str = "") -> Watch:
+def watch(setting: str, time_ms: float | None, verdict: OwnVerdict, why: str = "") -> DriveWatch:
     watches = "process_data" if setting.startswith("P151") else "heartbeat"
-    return Watch("own", watches, setting, time_ms, "", verdict, why)
+    return DriveWatch("own", watches, setting, time_ms, "", verdict, why)
 
 
 PROCESS_DATA = watch("P151 = 500 ms", 500.0, STOPS)
@@ -39,7 +39,7 @@ NOT_READ = watch("P151 is not known", None, UNKNOWN, "P151 is not known")
         (),
     ],
 )
-def test_the_time_that_was_read_is_told(watches: tuple[Watch, ...], rpdos_alone: bool) -> None:
+def test_the_time_that_was_read_is_told(watches: tuple[DriveWatch, ...], rpdos_alone: bool) -> None:
     outcome = DropOutcome("fu1", OwnJudgement(watches), DriveState.UNKNOWN, rpdos_alone=rpdos_alone)
     told = outcome.own_text
     for one in watches:

@@ -11,7 +11,7 @@ from bridge.drive import FaultWords
 from bridge.mapping import load_family
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, TransferFailed
 from bridge.sim.catalogue import simulate_node
-from bridge.sim.core.abort import SdoAbort
+from bridge.sim.core.sdo_abort import SdoAbort
 from bridge.text import Text
 from tests.unit.sim.conftest import Bench
 

@@ -23,7 +23,7 @@ from bridge.command import Action, Code, Outcome, ReadParameter, Reply, Request,
 from bridge.dictionary import load_dictionary
 from bridge.northbound.gateway.server import MOST_CLIENTS, GatewayServer
 from bridge.northbound.view import View
-from tests.unit.northbound.gateway.test_session import NET
+from tests.unit.northbound.gateway.test_gateway_session import NET
 
 
 class Plant:

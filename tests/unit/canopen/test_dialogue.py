@@ -7,12 +7,12 @@ from collections.abc import Generator
 import pytest
 
 from bridge.canopen import abort
-from bridge.canopen.dialogue import Dialogue, Read, Write, ask, attempt, optional
+from bridge.canopen.dialogue import Dialogue, SdoRead, SdoWrite, ask, attempt, optional
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import Result, SdoChannel, SdoError
 from bridge.canopen.sdo_queue import MOST_WAITING
 
-Steps = Generator[Read | Write, bytes | None, list[object]]
+Steps = Generator[SdoRead | SdoWrite, bytes | None, list[object]]
 Ends = list[list[object] | SdoError]
 
 
@@ -24,8 +24,8 @@ class Client:
         self.ends: Ends = []
         self.now = 0.0
 
-    def begin(self, steps: Steps) -> Dialogue[Read | Write, bytes | None, list[object], SdoError]:
-        def do(step: Read | Write, now: float) -> bool:
+    def begin(self, steps: Steps) -> Dialogue[SdoRead | SdoWrite, bytes | None, list[object], SdoError]:
+        def do(step: SdoRead | SdoWrite, now: float) -> bool:
             ask(step, self.sdo, now, lambda answer: dialogue.go_on(answer, self.now))
             return True
 
@@ -46,7 +46,7 @@ def refusal(code: int) -> str:
 
 def test_reads_and_writes_go_to_the_channel_and_answers_come_back() -> None:
     def steps() -> Steps:
-        return [(yield Read(0x1000)), (yield Write(0x1017, 0, b"\xf4\x01"))]
+        return [(yield SdoRead(0x1000)), (yield SdoWrite(0x1017, 0, b"\xf4\x01"))]
 
     client = Client()
     client.begin(steps())
@@ -61,7 +61,7 @@ def test_reads_and_writes_go_to_the_channel_and_answers_come_back() -> None:
 def test_an_error_is_thrown_at_the_step_that_it_belongs_to() -> None:
     def steps() -> Steps:
         try:
-            yield Read(0x1000)
+            yield SdoRead(0x1000)
         except SdoError as error:
             return [error.code]
         return []
@@ -74,7 +74,7 @@ def test_an_error_is_thrown_at_the_step_that_it_belongs_to() -> None:
 
 def test_an_error_that_nobody_catches_is_the_end() -> None:
     def steps() -> Steps:
-        yield Read(0x1000)
+        yield SdoRead(0x1000)
         return []
 
     client = Client()
@@ -87,7 +87,7 @@ def test_an_error_that_nobody_catches_is_the_end() -> None:
 
 def test_an_error_of_another_kind_is_a_fault_of_the_program() -> None:
     def steps() -> Steps:
-        yield Read(0x1000)
+        yield SdoRead(0x1000)
         raise KeyError
 
     client = Client()
@@ -162,7 +162,7 @@ def test_one_that_was_closed_has_no_result_and_hears_no_answer() -> None:
 
     def steps() -> Steps:
         try:
-            yield Read(0x1000)
+            yield SdoRead(0x1000)
         finally:
             closed.append(True)
         return []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.canopen.habits import HABITS, HabitCounter, Odd, Shown
+from bridge.canopen.habits import HABITS, HabitCount, HabitCounter, Odd
 
 
 def test_every_oddity_has_its_sentences() -> None:
@@ -65,7 +65,7 @@ def test_a_habit_is_one_from_the_third_frame_on() -> None:
     assert len(counter.said()) == 1
     counter.note(Odd.SDO_LENGTH, 4, 8)
     assert counter.has_news
-    assert counter.take_news() == counter.habits() == [Shown(Odd.SDO_LENGTH, 3, 4, 8)]
+    assert counter.take_news() == counter.habits() == [HabitCount(Odd.SDO_LENGTH, 3, 4, 8)]
     assert not counter.has_news
 
 
@@ -83,7 +83,7 @@ def test_who_asks_late_is_told_once_and_of_the_last_frame() -> None:
     counter = HabitCounter()
     for length in range(50):
         counter.note(Odd.TPDO_LENGTH, length, 8)
-    assert counter.take_news() == [Shown(Odd.TPDO_LENGTH, 50, 49, 8)]
+    assert counter.take_news() == [HabitCount(Odd.TPDO_LENGTH, 50, 49, 8)]
     for _ in range(249):
         counter.note(Odd.TPDO_LENGTH, 1, 8)
     assert counter.take_news() == []

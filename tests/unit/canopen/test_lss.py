@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.bustools import lss as lss_task
-from bridge.bustools.lss import LssTask
+from bridge.bustools import lss_task
+from bridge.bustools.lss_task import LssTask
 from bridge.canopen import lss
 from bridge.canopen.frame import Frame
 from bridge.canopen.lss import LssAddress, LssError, Service

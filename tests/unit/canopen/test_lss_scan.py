@@ -6,7 +6,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bridge.bustools.lss import LssTask
+from bridge.bustools.lss_task import LssTask
 from bridge.canopen.lss import LssAddress
 from bridge.canopen.lss_scan import Scanned, find_all
 from tests.support.lss_slave import WAITING, LssSlave

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from bridge.bustools import lss as lss_task
-from bridge.bustools.lss import LssTask
+from bridge.bustools import lss_task
+from bridge.bustools.lss_task import LssTask
 from bridge.canopen import lss
 from bridge.canopen.lss import LssError, Service
 from tests.support.lss_slave import CONFIGURATION, LssSlave

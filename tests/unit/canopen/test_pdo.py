@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.canopen.sync import burst_length, tpdo_deadline_s
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.mapping.model import Pdo
 from bridge.node.boot import PdoPlan, factory_entries, layouts, match_words
-from bridge.node.places.words import Place
+from bridge.node.places.word_map import WordPlace
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.process.remote_polling import RemotePolling
 from tests.support.bench import Bench, write_site
@@ -141,7 +141,7 @@ class Words:
 def plan(*bits: int, words: tuple[int | None, ...], kind: int = 255, signed: tuple[int, ...] = ()) -> PdoPlan:
     entries = tuple(PdoEntry(0x2000, n, length) for n, length in enumerate(bits))
     places = tuple(
-        None if word is None else Place(word, (length + 15) // 16)
+        None if word is None else WordPlace(word, (length + 15) // 16)
         for word, length in zip(words, bits, strict=True)
     )
     return PdoPlan(0x185, kind, 0, PdoCodec(entries, {(0x2000, n) for n in signed}), places)

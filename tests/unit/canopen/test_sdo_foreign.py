@@ -12,7 +12,7 @@ from canopen.sdo import SdoClient
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import SdoChannel
 from bridge.sim.core.dictionary import Dictionary, Domain
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 from tests.support.sdo_block import INDEX, LONG, REPLY, REQUEST
 
 Answer = Callable[[bytes], list[bytes]]
@@ -60,7 +60,7 @@ class Store:
         self.data = data
         objects = Dictionary()
         objects.add(INDEX, 0, Domain(1 << 16, lambda: self.data, self._set))
-        self.answer = SdoServer(objects, segments).on_request
+        self.answer = SimulatedSdoServer(objects, segments).on_request
 
     def _set(self, data: bytes) -> None:
         self.data = data

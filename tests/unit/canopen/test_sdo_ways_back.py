@@ -6,7 +6,7 @@ import pytest
 
 from bridge.canopen import abort
 from bridge.canopen.sdo import SdoError
-from bridge.canopen.sdo_ways_back import WAYS_BACK, Stage, WayBack, way_back
+from bridge.canopen.sdo_ways_back import WAYS_BACK, BlockStage, WayBack, way_back
 from tests.support.sdo_block import Asker
 
 DATA = bytes.fromhex("11223344556677") * 20
@@ -154,4 +154,4 @@ def test_every_row_of_the_table_is_reached(row: WayBack) -> None:
 
 def test_a_value_that_is_too_long_for_the_bridge_has_no_way_back() -> None:
     error = SdoError(0x1F20, 0, abort.OUT_OF_MEMORY, by_server=False)
-    assert all(way_back(stage, error) is None for stage in Stage)
+    assert all(way_back(stage, error) is None for stage in BlockStage)

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from bridge.bustools import scan
 from bridge.canopen import width
 from bridge.canopen.datatypes import INTEGERS, Integer
-from bridge.cli.sdo import ValueType
-from bridge.cli.sdo import decode as sdo_decode
-from bridge.cli.sdo import surplus as sdo_surplus
+from bridge.cli.sdo_command import ValueType
+from bridge.cli.sdo_command import decode as sdo_decode
+from bridge.cli.sdo_command import surplus as sdo_surplus
 from bridge.mapping.model import ObjectRef, Parameter
 from bridge.node.boot.actions import number, same
-from bridge.parameter import Entry
+from bridge.parameter import ParameterEntry
 from bridge.parameter.codec import decode as parameter_decode
 from bridge.parameter.codec import forms as parameter_forms
 from bridge.parameter.codec import matches
@@ -73,9 +73,9 @@ CASES = [
 ]
 
 
-def entry(kind: str) -> Entry:
+def entry(kind: str) -> ParameterEntry:
     definition = Parameter.model_validate({"name": "2001", "title": "", "data_type": kind})
-    return Entry("2001", ObjectRef(INDEX, 0), definition)
+    return ParameterEntry("2001", ObjectRef(INDEX, 0), definition)
 
 
 @pytest.mark.parametrize(("kind", "value", "answer"), CASES)

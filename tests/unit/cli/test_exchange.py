@@ -54,7 +54,7 @@ def test_each_drive_of_the_node_needs_its_own_backup(tmp_path: Path) -> None:
     assert "is not TOML" in str(done.exception)
 
 
-def begun(folder: Path, file: Path, serial: int = 1) -> exchange_report.Exchange:
+def begun(folder: Path, file: Path, serial: int = 1) -> exchange_report.DeviceExchange:
     occasion = Occasion("ann", "box", "agreed", datetime.now(UTC), folder / "site.toml")
     return exchange_report.begin(folder / "state", occasion, "conveyor", {"serial": serial}, [file])
 

@@ -12,7 +12,7 @@ import pytest
 
 from bridge.base.errors import OperationFailed
 from bridge.cli.drop_report import Occasion
-from bridge.cli.exchange_report import Exchange, begin, markdown
+from bridge.cli.exchange_report import DeviceExchange, begin, markdown
 
 IDENTITY = {"vendor": 0x38, "serial": 7}
 PROVEN = {"drive": "conveyor/fu1", "verdict": "proven", "reacted_ms": 250.0}
@@ -26,7 +26,7 @@ def occasion(folder: Path, hour: int) -> Occasion:
 
 def begun(
     folder: Path, hour: int = 10, content: str = "set", identity: dict[str, int] = IDENTITY
-) -> Exchange:
+) -> DeviceExchange:
     file = folder / "fu1.toml"
     file.write_text(content)
     return begin(folder / "state", occasion(folder, hour), "conveyor", identity, [file])

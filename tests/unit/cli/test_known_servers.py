@@ -10,7 +10,7 @@ import pytest
 from bridge.bustools.single import SdoTask
 from bridge.canopen.frame import Frame
 from bridge.cli import known_servers
-from bridge.cli.bus import BusChoice, choose_bus
+from bridge.cli.bus_runner import BusChoice, choose_bus
 from bridge.cli.known_servers import KnownServers
 from tests.support.sdo_block import INDEX
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from bridge.bustools.decode import Kind, Meaning
+from bridge.bustools.decode import FrameKind, FrameMeaning
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.cli.monitor import Record, for_people
 
-SAID = Meaning(next(iter(Kind)), 5, "TPDO1 conveyor", "ready")
+SAID = FrameMeaning(next(iter(FrameKind)), 5, "TPDO1 conveyor", "ready")
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def test_a_frame_has_its_columns(frame: Frame, line: str) -> None:
 
 
 def test_what_others_say_is_escaped_and_no_blank_stands_at_the_end() -> None:
-    said = Meaning(SAID.kind, 5, "a\x1b[31m", "")
+    said = FrameMeaning(SAID.kind, 5, "a\x1b[31m", "")
     line = for_people(Frame(0x185), said, 1.5)
     assert "\x1b" not in line
     assert line == line.rstrip()

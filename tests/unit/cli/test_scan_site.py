@@ -21,7 +21,7 @@ from bridge.mapping import family_names, load_family
 from bridge.mapping.match import Found, Match, best_match
 from bridge.project import load_project
 from bridge.sim.catalogue import simulate_description, simulate_node
-from bridge.sim.core.device import SimulatedDevice
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.generic.generic_eds import plan_of_description
 from bridge.sim.generic.generic_node import GenericNode
 from tests.support.devices import DEVICES

@@ -8,8 +8,8 @@ import signal
 import pytest
 
 from bridge.base.errors import OperationFailed
-from bridge.cli.signals import ending_signals
-from bridge.cli.stopping import Ending, until_stopped
+from bridge.cli.ending_signals import ending_signals
+from bridge.cli.stopping import Shutdown, until_stopped
 
 
 def test_work_that_ends_by_itself_has_ended() -> None:
@@ -37,7 +37,7 @@ def test_a_signal_ends_it_after_what_has_to_come_first() -> None:
             order.append("cancelled")
             raise
 
-    until_stopped(work(), Ending(first=lambda: order.append("first")))
+    until_stopped(work(), Shutdown(first=lambda: order.append("first")))
     assert order == ["first", "cancelled"]
 
 
@@ -55,7 +55,7 @@ def test_what_has_to_come_first_may_fail_and_the_work_ends_all_the_same() -> Non
         finally:
             ended.append(True)
 
-    until_stopped(work(), Ending(first=fail))
+    until_stopped(work(), Shutdown(first=fail))
     assert ended == [True]
 
 

@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.base.errors import OperationFailed
-from bridge.bustools.decode import Kind, Meaning
+from bridge.bustools.decode import FrameKind, FrameMeaning
 from bridge.bustools.single import SdoTask
 from bridge.canopen.frame import Frame
-from bridge.cli import logs, monitor, sdo
+from bridge.cli import logs, monitor, sdo_command
 from bridge.cli.app import run_app
-from bridge.cli.bus import print_table
+from bridge.cli.bus_runner import print_table
 from bridge.cli.terminal import printable, progress
 
 CLEAR = "\x1b[2J"
@@ -51,16 +51,16 @@ def test_a_table_is_as_wide_as_what_is_shown(capsys: pytest.CaptureFixture[str])
 
 
 def test_the_monitor_shows_them_escaped() -> None:
-    meaning = Meaning(Kind.SDO, 5, f"SDO {CLEAR}", f'"{CLEAR}"')
+    meaning = FrameMeaning(FrameKind.SDO, 5, f"SDO {CLEAR}", f'"{CLEAR}"')
     line = monitor.for_people(Frame(0x585, b""), meaning, 0.0)
     assert CLEAR not in line
     assert line.count(r"\x1b[2J") == 2
 
 
 def test_a_value_that_was_read_is_shown_escaped_and_is_itself_for_scripts() -> None:
-    value = sdo.decode("string", CLEAR.encode())
+    value = sdo_command.decode("string", CLEAR.encode())
     assert value == CLEAR
-    assert sdo.for_people(value, b"") == r"\x1b[2J"
+    assert sdo_command.for_people(value, b"") == r"\x1b[2J"
 
 
 def test_a_device_description_is_shown_escaped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

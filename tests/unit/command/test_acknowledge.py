@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.command import Action, Kind
-from bridge.command.link import NodeState
+from bridge.command import Action, EventKind
+from bridge.command.drive_link import NodeState
 from tests.support.nightly import examples
 from tests.support.rig import (
     ACKNOWLEDGE,
@@ -228,7 +228,7 @@ class TestRegister:
             assert rig.watchdog == "tripped"
             rig.ask(Action.RESET_FAULT, pressed=True)
             assert rig.watchdog == "running"
-            assert rig.told(Kind.WATCHDOG)[-1] == f"acknowledged by {PLC}; the drive stays stopped"
+            assert rig.told(EventKind.WATCHDOG)[-1] == f"acknowledged by {PLC}; the drive stays stopped"
             rig.ask(Action.KEEP_ALIVE, pressed=False)
 
     def test_a_1_that_is_no_edge_is_told_as_not_forwarded(self):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.command import Action, Drive
-from bridge.command.link import FurtherTpdo, NodeState
+from bridge.command.drive_link import FurtherTpdo, NodeState
 from bridge.command.stop_check.state import LastStop
 from bridge.image import Quality, Reading, Value
 from tests.support import sites

@@ -12,8 +12,8 @@ from bridge.command import (
     Action,
     Code,
     Event,
+    EventKind,
     Identity,
-    Kind,
     Outcome,
     Rejection,
     Reply,
@@ -24,7 +24,7 @@ from bridge.command import (
     command_of,
 )
 from bridge.command.audit import SUMMARY_S, AuditEntry
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Value
 from tests.support import sites
 from tests.support.node_states import node_goes
@@ -163,7 +163,7 @@ def test_a_refused_command_of_a_node_is_an_event_and_counts(hall: Hall) -> None:
     outcomes: list[Outcome] = []
     hall.plant.submit(request, hall.now, outcomes.append, refuse)
     assert not outcomes[0].ok
-    (event,) = [event for event in hall.events if event.kind is Kind.REFUSED]
+    (event,) = [event for event in hall.events if event.kind is EventKind.REFUSED]
     assert (event.source, event.message) == ("conveyor", "reset by opcua:guest refused: may only read")
     hall.plant.refresh(hall.now)
     assert hall.plant.image.read("bridge/refused_writes").value == 1
@@ -173,7 +173,7 @@ def test_what_a_protocol_refuses_by_itself_is_told_as_an_event_and_counts(hall: 
     hall.plant.rejected(Rejection(OBSERVER, FU1, Action.WRITE, Code.READ_ONLY, "BadNotWritable"), hall.now, 3)
     hall.plant.rejected(Rejection(OBSERVER, "attic/fu9", "call", Code.UNKNOWN_POINT, "no such"), hall.now)
     assert hall.told() == [("write", "read_only", 3), ("call", "unknown_point", 1)]
-    events = [(event.source, event.message) for event in hall.events if event.kind is Kind.REFUSED]
+    events = [(event.source, event.message) for event in hall.events if event.kind is EventKind.REFUSED]
     assert events == [
         (FU1, "write by opcua:guest refused: BadNotWritable"),
         ("bridge", "call on 'attic/fu9' by opcua:guest refused: no such"),
@@ -185,7 +185,7 @@ def test_what_a_protocol_refuses_by_itself_is_told_as_an_event_and_counts(hall: 
 def test_several_requests_that_are_told_as_one_name_nobody(hall: Hall) -> None:
     nobody = Identity(Source.OPCUA, "", address="10.0.0.9")
     hall.plant.rejected(Rejection(nobody, "", "", Code.UNKNOWN_POINT, ""), hall.now, 7)
-    (event,) = [event for event in hall.events if event.kind is Kind.REFUSED]
+    (event,) = [event for event in hall.events if event.kind is EventKind.REFUSED]
     assert (event.source, event.message) == ("bridge", "requests by opcua refused")
 
 

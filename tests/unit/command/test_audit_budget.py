@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Do, Identity, Rejection, Request, Source, Write
 from bridge.command.audit import AT_ONCE, DONE_EVERY_S, REFUSED_EVERY_S, SUMMARY_S, AuditEntry, client_of
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Value
 from tests.support import sites
 from tests.support.nightly import examples

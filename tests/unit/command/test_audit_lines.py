@@ -17,7 +17,7 @@ from bridge.command import (
     Source,
     WriteParameter,
 )
-from bridge.command.audit import AuditEntry, Ending
+from bridge.command.audit import AuditEntry, AuditOutcome
 from bridge.text import Text
 from tests.support.node_states import hand_over
 from tests.support.rig import ENABLE, OPERATOR, OTHER_PLC, PLC, READY, SHUT_DOWN
@@ -97,7 +97,7 @@ def test_a_parameter_has_what_was_last_read_of_it(hall: Hall) -> None:
 def test_what_a_protocol_has_refused_was_not_forwarded(hall: Hall) -> None:
     hall.plant.rejected(Rejection(PLC, FU1, "write", "malformed", "no number", {"value": "x"}), hall.now)
     (entry,) = hall.entries
-    assert entry.ending == Ending("malformed", "no number", forwarded=False)
+    assert entry.ending == AuditOutcome("malformed", "no number", forwarded=False)
     assert entry.new == {"value": "x"}
     assert entry.is_refused
 
@@ -114,7 +114,7 @@ def test_the_end_of_a_stop_has_a_line_of_the_bridges_own() -> None:
     hall.at(hall.now)
     assert [entry.action for entry in entries] == ["stop", "stop_ended"]
     bridge = Identity(Source.NONE, "drivebridge", Role.ENGINEER)
-    ending = Ending(Code.OK, Text.of("stop.done_after", took_s=0.0625), forwarded=True)
+    ending = AuditOutcome(Code.OK, Text.of("stop.done_after", took_s=0.0625), forwarded=True)
     assert entries[1] == AuditEntry(100.0625, bridge, FU1, "stop_ended", ending, count=1)
 
 

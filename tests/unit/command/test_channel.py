@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.command import Action, Event, Kind, Outcome
+from bridge.command import Action, Event, EventKind, Outcome
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import DriveTable
 from bridge.text import render
 from tests.support.leg_words import ALL
@@ -105,7 +105,7 @@ def test_an_answer_that_the_bridge_reads_late_is_an_answer() -> None:
     rig.drive_says(POSITION.enabled)
     rig.drive_says(POSITION.enabled | POSITION.taken)
     rig.channel.on_time(rig.now)
-    assert [event.message for event in rig.events if event.kind is not Kind.OWNER] == []
+    assert [event.message for event in rig.events if event.kind is not EventKind.OWNER] == []
 
 
 @pytest.mark.parametrize("state", [NodeState.OPERATIONAL, NodeState.DISABLED])
@@ -137,8 +137,8 @@ def test_why_nothing_is_enabled_is_said_of_the_node_or_of_the_data() -> None:
 # what it tells
 
 
-def severities(rig: Rig) -> list[tuple[Kind, int]]:
-    return [(event.kind, event.severity) for event in rig.events if event.kind is not Kind.OWNER]
+def severities(rig: Rig) -> list[tuple[EventKind, int]]:
+    return [(event.kind, event.severity) for event in rig.events if event.kind is not EventKind.OWNER]
 
 
 def test_how_much_an_event_matters() -> None:
@@ -150,10 +150,10 @@ def test_how_much_an_event_matters() -> None:
     rig.channel.on_emcy(emergency(0x2310), rig.now)
     rig.channel.on_emcy(emergency(0), rig.now)
     assert severities(rig) == [
-        (Kind.WATCHDOG, 900),
-        (Kind.WATCHDOG, 700),
-        (Kind.EMERGENCY, 700),
-        (Kind.EMERGENCY, 100),
+        (EventKind.WATCHDOG, 900),
+        (EventKind.WATCHDOG, 700),
+        (EventKind.EMERGENCY, 700),
+        (EventKind.EMERGENCY, 100),
     ]
 
 
@@ -161,7 +161,7 @@ def test_a_silent_controller_that_is_ignored_matters_less() -> None:
     rig = Rig(telegram_downtime_s=-0.1)
     rig.run()
     rig.wait(0.2)
-    assert severities(rig) == [(Kind.WATCHDOG, 500)]
+    assert severities(rig) == [(EventKind.WATCHDOG, 500)]
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_a_trip_names_what_is_done(why_not: str, reaction: str) -> None:
     rig.channel.on_own_watch(why_not, rig.now)
     rig.wait(0.2)
     assert rig.silent is (reaction == "silence")
-    trip = rig.told(Kind.WATCHDOG)[-1]
+    trip = rig.told(EventKind.WATCHDOG)[-1]
     assert trip.startswith(f"modbus:192.168.1.10 was silent for 200 ms: {reaction}, E010/10.3")
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.command import Action, Code, Identity, Kind, Role, Source
-from bridge.command.link import NodeState
+from bridge.command import Action, Code, EventKind, Identity, Role, Source
+from bridge.command.drive_link import NodeState
 from tests.support.rig import (
     ACKNOWLEDGE,
     ENABLE,
@@ -41,7 +41,7 @@ class TestIgnoreAll:
         assert rig.sent_setpoints[0] == HALF_SPEED
         assert rig.channel.trips == 0
         assert rig.channel.last_fault == 10.3
-        assert len(rig.told(Kind.WATCHDOG)) == 1
+        assert len(rig.told(EventKind.WATCHDOG)) == 1
 
     def test_a_lost_node_is_reported_and_the_drive_is_commanded_on(self):
         rig = Rig(telegram_downtime_s=-0.1)
@@ -130,14 +130,14 @@ class TestSetTimeout:
         )
         rig.run()
         rig.wait(0.2)
-        told = len(rig.told(Kind.WATCHDOG))
+        told = len(rig.told(EventKind.WATCHDOG))
         assert told == 1
         for timeout_ms in (400, 0, 300):
             assert rig.ask(Action.SET_TIMEOUT, timeout_ms=timeout_ms).ok
             assert rig.channel.leg.timer.deadline is None
         assert rig.channel.controller_is_overdue
         rig.wait(10)
-        assert len(rig.told(Kind.WATCHDOG)) == told
+        assert len(rig.told(EventKind.WATCHDOG)) == told
         assert rig.channel.trips == (downtime_s > 0)
 
     @pytest.mark.parametrize("who", [OTHER_PLC, OPERATOR, ENGINEER])
@@ -193,7 +193,7 @@ class TestTheSitesTimeoutIsBack:
         goes(rig)
         assert rig.channel.owner != PLC
         assert rig.channel.timeout_ms == 200
-        assert "fieldbus_timeout_ms = 200 again, as in the site file" in rig.told(Kind.CONFIGURATION)
+        assert "fieldbus_timeout_ms = 200 again, as in the site file" in rig.told(EventKind.CONFIGURATION)
 
     def test_when_a_lease_runs_out_and_the_next_owner_is_watched(self):
         rig = self.rig(control="lease")

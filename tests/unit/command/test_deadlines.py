@@ -10,10 +10,10 @@ import pytest
 from bridge.catalogue import Catalogue
 from bridge.command.deadlines import Deadlines
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.link import NodeState
-from bridge.command.messages.event import Event, Kind
+from bridge.command.drive_link import NodeState
+from bridge.command.messages.event import Event, EventKind
 from bridge.command.plant import Plant
-from bridge.command.stop_check.drive import DriveStopCheck
+from bridge.command.stop_check.drive_check import DriveStopCheck
 from bridge.config import load_site
 from tests.support import sites
 from tests.support.node_states import node_goes
@@ -188,7 +188,7 @@ def test_a_drive_of_which_nobody_told_is_reported(tmp_path) -> None:
     for _ in range(10):
         plant.refresh(10.0)
     assert [(event.kind, event.severity, event.source) for event in events] == [
-        (Kind.WATCHDOG, 700, "conveyor/fu1")
+        (EventKind.WATCHDOG, 700, "conveyor/fu1")
     ]
     assert plant.image.read("bridge/missed_deadlines").value == 1
     assert plant.next_deadline(10.0) == pytest.approx(10.1)

@@ -7,7 +7,7 @@ import pytest
 
 from bridge.command import Action, Identification
 from bridge.drive import OwnJudgement, OwnVerdict
-from bridge.drive.own_supervision import Watch
+from bridge.drive.own_judgement import DriveWatch
 from bridge.image import Quality, Reading
 from tests.support import sites
 from tests.support.node_states import hand_over
@@ -101,7 +101,9 @@ def test_ages_and_counts_are_those_of_the_moment_when_somebody_looks(hall: Hall)
 
 
 def judged(time_ms: float, verdict: OwnVerdict, why: str = "") -> OwnJudgement:
-    return OwnJudgement((Watch("P151", "process_data", "P151", time_ms, "", verdict, why, silent_ms=100),))
+    return OwnJudgement(
+        (DriveWatch("P151", "process_data", "P151", time_ms, "", verdict, why, silent_ms=100),)
+    )
 
 
 STOPS = judged(300.0, OwnVerdict.STOPS)

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Kind
-from bridge.command.link import Link, NodeState
+from bridge.command import EventKind
+from bridge.command.drive_link import DriveLink, NodeState
 from bridge.image import Quality
 from bridge.text import render
 from tests.support.rig import ENABLED, Rig
@@ -15,8 +15,8 @@ from tests.support.rig import ENABLED, Rig
 _PAST = 1e-6
 
 
-def link(downtime_s: float = 0.5, hold_ms: int = 2000, deadline_s: float | None = 0.1) -> Link:
-    link = Link(downtime_s, hold_ms)
+def link(downtime_s: float = 0.5, hold_ms: int = 2000, deadline_s: float | None = 0.1) -> DriveLink:
+    link = DriveLink(downtime_s, hold_ms)
     link.pdo_deadline_s = deadline_s
     return link
 
@@ -141,7 +141,7 @@ class TestTelegramDowntime:
         assert rig.channel.current_fault == 10.2
         assert rig.channel.fault_text == "E010/10.2 telegram downtime of the external bus interface"
         rig.wait(10)
-        assert len(rig.told(Kind.WATCHDOG)) == 1
+        assert len(rig.told(EventKind.WATCHDOG)) == 1
         assert rig.channel.trips == 0
 
     def test_ends_with_the_next_tpdo_and_leaves_the_drive_stopped(self):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.command import Action, Code, Outcome, Request, command_of
-from bridge.command.link import FurtherTpdo, NodeState
+from bridge.command.drive_link import FurtherTpdo, NodeState
 from bridge.image import Value
 from tests.support import sites
 from tests.support.node_states import node_goes

@@ -15,7 +15,9 @@ class Handshake:
         self.order = Order()
 
     def steps(self, words: tuple[int, ...], *, taken: bool = False, enabled: bool = True) -> None:
-        self.order, is_untaken = orders.went_on(self.order, words, 0.0, is_taken=taken, commanded=enabled)
+        self.order, is_untaken = orders.went_on(
+            self.order, words, 0.0, is_acknowledged=taken, commanded=enabled
+        )
         assert not is_untaken, "no time passes"
 
     def orders(self, *words: int, taken: bool = False, enabled: bool = True) -> bool:

@@ -7,7 +7,7 @@ import pytest
 from bridge.command import Action
 from bridge.command.stop_check.state import LastStop
 from bridge.drive import OwnJudgement, OwnVerdict
-from bridge.drive.own_supervision import Watch
+from bridge.drive.own_judgement import DriveWatch
 from bridge.text import Text
 from tests.support.judged_plant import JudgedPlant
 from tests.support.leg_words import NORD_TU4, VELOCITY, LegWords
@@ -131,7 +131,7 @@ def test_a_drive_that_is_sent_nothing_is_told_as_such() -> None:
     """The drive's own time-out of half a second, and the bound."""
     more = 'ignored_stop_ms = 500\non_expiry = "silence"'
     line = JudgedPlant(more=more, timeout_ms=250)
-    p151 = Watch("P151", "process_data", "P151", 500.0, "", OwnVerdict.STOPS)
+    p151 = DriveWatch("P151", "process_data", "P151", 500.0, "", OwnVerdict.STOPS)
     line.drive.on_own_supervision(OwnJudgement((p151,)), line.now)
     line.enables().goes_on(0.25 + 0.5 + 0.5)
     message = f"ignores its stop: nothing is sent since 1.00 s, {SAYS}; NMT stop of conveyor{STAYS}"

@@ -15,7 +15,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, ru
 
 from bridge.command import Action, Identity, Outcome
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.drive import DriveState
 from bridge.image import Value
 from tests.support.nightly import examples

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from tests.support.rig import FAULT, Rig, emergency
 
 OVERCURRENT, OVERTEMPERATURE = 3.0, 1.0

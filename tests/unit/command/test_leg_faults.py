@@ -8,13 +8,13 @@ from unittest.mock import patch
 
 import pytest
 
-from bridge.command.leg import deeds, due, order, owners, reports, start, step, words
+from bridge.command.leg import deeds, due, order, owners, reports, start, step, word_table
+from bridge.command.leg.draft import Draft
 from bridge.command.leg.effect import Heard
 from bridge.command.leg.event import BridgeGap, Connection, Event
-from bridge.command.leg.state import Output, Stage
+from bridge.command.leg.state import RpdoWords, Stage
 from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
-from bridge.command.leg.turn import Turn
-from bridge.command.leg.words import Word
+from bridge.command.leg.word_table import WordChoice
 from bridge.command.messages.request import Identity
 from tests.support import leg_space
 from tests.support.leg_profiles import CYCLIC, MOST, space
@@ -153,37 +153,41 @@ def _before(function: Callable[..., Any], first: Callable[..., Any]) -> Callable
     return both
 
 
-def _loses_its_lease(leg: Turn) -> None:
+def _loses_its_lease(leg: Draft) -> None:
     leg.owner = leg.owner._replace(lease_until=None)
 
 
-def _edge(leg: Turn, *_: Any) -> None:
+def _edge(leg: Draft, *_: Any) -> None:
     leg.edges = leg.edges._replace(bit=False)
 
 
-def _presses(leg: Turn, identity: Identity, of: Callable[..., None] = owners._hand_over) -> None:
+def _presses(leg: Draft, identity: Identity, of: Callable[..., None] = owners._hand_over) -> None:
     """What one connection has pressed counts for the other, too."""
     of(leg, identity)
     if identity.is_same(leg.edges.pressed_by):
         leg.edges = leg.edges._replace(pressed_by=identity)
 
 
-def _counts(leg: Turn, *_: Any) -> None:
+def _counts(leg: Draft, *_: Any) -> None:
     if leg.timer.deadline is not None:
         leg.timer = leg.timer._replace(deadline=leg.now + 2.0)
         leg.effects.append(Heard())
 
 
-def _speaks(leg: Turn, may_hold: bool, of: Callable[[Turn, bool], Output] = words._silence) -> Output:
-    return Output(of(leg, may_hold).words)
+def _speaks(
+    leg: Draft, may_hold: bool, of: Callable[[Draft, bool], RpdoWords] = word_table._silence
+) -> RpdoWords:
+    return RpdoWords(of(leg, may_hold).words)
 
 
-def _moves(leg: Turn, may_hold: bool, of: Callable[[Turn, bool], Output] = words._reaction) -> Output:
+def _moves(
+    leg: Draft, may_hold: bool, of: Callable[[Draft, bool], RpdoWords] = word_table._reaction
+) -> RpdoWords:
     word, *_ = of(leg, may_hold).words
-    return Output((word, 1, *leg.rest[1:]))
+    return RpdoWords((word, 1, *leg.rest[1:]))
 
 
-def _weak(leg: Turn, may_hold: bool) -> int:
+def _weak(leg: Draft, may_hold: bool) -> int:
     return leg.settings.words.stop(leg.sent.words[0])
 
 
@@ -196,8 +200,8 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
         _before(owners.check_authority, _counts),
     ),
     "the owner is refused": ("telegrams", owners, "refusal", lambda *_, **__: "no"),
-    "a word lifts the interlock": ("telegrams", words, "at_rest", lambda words, word: words.run),
-    "a quick stop is a ramp": ("quick_stop", words, "_reaction_word", _weak),
+    "a word lifts the interlock": ("telegrams", word_table, "at_rest", lambda words, word: words.run),
+    "a quick stop is a ramp": ("quick_stop", word_table, "_reaction_word", _weak),
     "a quick stop has no end": ("quick_stop", deeds, "_RAMP_LIMIT_S", 20.0),
     "what is asked is told as sent": ("moved", step, "judged", lambda *given: given[-1]),
     "who asks again breaks the silence again": (
@@ -236,14 +240,14 @@ DEEDS: Final[dict[str, tuple[str, object, str, object]]] = {
         lambda order, words: order._replace(is_waiting=True),
     ),
     "a stop forgets no position": ("positions", order, "dropped", lambda order: order),
-    "an axis jumps when it is enabled": ("moved", Turn, "keep_at_rest", lambda leg: None),
+    "an axis jumps when it is enabled": ("moved", Draft, "keep_at_rest", lambda leg: None),
     "a fault reaction follows an enable": ("states", reports, "MAY_FOLLOW_LATE", frozenset[Any]()),
 }
 
 
-WORDS: Final[dict[str, tuple[str, Word, Callable[[Turn, bool], Output]]]] = {
-    "silence speaks": ("silence", Word.SILENCE, _speaks),
-    "a reaction keeps setpoints": ("telegrams", Word.REACTION, _moves),
+WORDS: Final[dict[str, tuple[str, WordChoice, Callable[[Draft, bool], RpdoWords]]]] = {
+    "silence speaks": ("silence", WordChoice.SILENCE, _speaks),
+    "a reaction keeps setpoints": ("telegrams", WordChoice.REACTION, _moves),
 }
 EVENTS: Final[dict[str, tuple[str, type[Event]]]] = {
     "a gap is not noticed": ("way", BridgeGap),
@@ -254,7 +258,7 @@ EVENTS: Final[dict[str, tuple[str, type[Event]]]] = {
 @pytest.mark.parametrize("fault", WORDS)
 def test_wrong_words_are_found(fault: str) -> None:
     profile, word, wrong = WORDS[fault]
-    with patch.dict(words._MADE, {word: wrong}), pytest.raises(AssertionError, match="\nafter "):
+    with patch.dict(word_table._MADE, {word: wrong}), pytest.raises(AssertionError, match="\nafter "):
         space(**PROFILES[profile]).explore(MOST)
 
 

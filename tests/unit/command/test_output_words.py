@@ -10,7 +10,7 @@ from bridge.command import Code
 from bridge.command.messages.telegram import Refusal, Telegram
 from bridge.command.output_words import ACTIVE, OutputWords
 from bridge.config import SafeValue
-from bridge.mapping.device import Output
+from bridge.mapping.device_signals import Output
 
 
 def output(name: str, data_type: str, on_expiry: SafeValue = 0, **more: object) -> Output:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bridge.command.leg.turn import Turn
+from bridge.command.leg.draft import Draft
 from bridge.command.output_words import OutputWords
 from bridge.command.outputs import OutputChannel
 from tests.support.leg_outputs import OutputSpace
@@ -23,14 +23,14 @@ def test_whatever_happens_to_outputs(on_expiry: Any) -> None:
     assert space.steps > 3000
 
 
-def _forgets(turn: Turn, word: int, *, is_asked: bool = False) -> None:
+def _forgets(turn: Draft, word: int, *, is_asked: bool = False) -> None:
     turn.word, turn.is_ours, turn.is_asked = word, True, is_asked
     turn.drop_setpoints()
 
 
 FAULTS: dict[str, tuple[object, str, object]] = {
     "what holds outlasts a stop": (OutputChannel, "_on_let_go", lambda channel: None),
-    "an acknowledge takes a stop back": (Turn, "stop", _forgets),
+    "an acknowledge takes a stop back": (Draft, "stop", _forgets),
     "outputs keep what they got": (OutputWords, "safe", lambda words, held: tuple(held)),
 }
 

@@ -10,8 +10,8 @@ from bridge.command import (
     Do,
     Drive,
     Event,
+    EventKind,
     Identification,
-    Kind,
     Outcome,
     PlantView,
     Reply,
@@ -20,7 +20,7 @@ from bridge.command import (
     Write,
     command_of,
 )
-from bridge.command.link import REASONS, NodeState
+from bridge.command.drive_link import REASONS, NodeState
 from bridge.command.worst_case import Wire
 from bridge.image import Quality, Reading, Value
 from tests.support import sites
@@ -258,8 +258,8 @@ class TestData:
         node_goes(running.plant, running.node, NodeState.LOST, 100.05)
         assert running.read("status/state") == Reading(4, Quality.LOST, 100.05, REASONS[NodeState.LOST])
         assert [event.kind for event in running.events if event.source == "conveyor"] == [
-            Kind.NODE_BACK,
-            Kind.NODE_LOST,
+            EventKind.NODE_BACK,
+            EventKind.NODE_LOST,
         ]
 
     def test_a_disabled_node_is_disabled(self, running: Hall):
@@ -417,7 +417,7 @@ def test_a_fault_of_the_drive_is_told_in_the_manuals_words(running: Hall):
     running.pdo(FAULT)
     assert running.value("status/emcy_code") == 0x2310
     assert running.value("status/fault_text") == "3.0 overcurrent of the inverter"
-    assert [event.message for event in running.events if event.kind is Kind.EMERGENCY] == [
+    assert [event.message for event in running.events if event.kind is EventKind.EMERGENCY] == [
         "emergency 2310h: 3.0 overcurrent of the inverter"
     ]
     running.drive.channel.on_emcy(emergency(0), running.now)

@@ -12,8 +12,8 @@ from bridge.command import (
     Code,
     Do,
     Event,
+    EventKind,
     Identity,
-    Kind,
     Outcome,
     Plant,
     ReadParameter,
@@ -24,7 +24,7 @@ from bridge.command import (
     Start,
     Write,
 )
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import Site
 from bridge.image import Quality, Reading
 from tests.support import sites
@@ -52,11 +52,13 @@ def running(hall: Hall) -> Hall:
 
 
 def refused(hall: Hall) -> list[tuple[str, str]]:
-    return [(event.source, event.message) for event in hall.events if event.kind is Kind.REFUSED]
+    return [(event.source, event.message) for event in hall.events if event.kind is EventKind.REFUSED]
 
 
 def test_what_a_node_has_reported_is_told_before_what_comes_after_it(hall: Hall) -> None:
-    first, second, third = (Event(1.0, Kind.BUS, "can0", 300, text) for text in ("first", "second", "third"))
+    first, second, third = (
+        Event(1.0, EventKind.BUS, "can0", 300, text) for text in ("first", "second", "third")
+    )
     hall.events.clear()
     hall.plant.events.report(first)
     assert hall.events == []
@@ -73,10 +75,10 @@ def test_what_a_listener_reports_is_told_too(hall: Hall) -> None:
 
     def answer(event: Event) -> None:
         if event.message == "first":
-            hall.plant.events.report(Event(1.0, Kind.BUS, "can0", 300, "second"))
+            hall.plant.events.report(Event(1.0, EventKind.BUS, "can0", 300, "second"))
 
     hall.plant.on_event(answer)
-    hall.plant.events.report(Event(1.0, Kind.BUS, "can0", 300, "first"))
+    hall.plant.events.report(Event(1.0, EventKind.BUS, "can0", 300, "first"))
     hall.plant.tell_events()
     assert [event.message for event in hall.events] == ["first", "second"]
 
@@ -322,9 +324,9 @@ def test_who_has_gone_is_told_no_more_and_may_go_twice(hall: Hall) -> None:
     hall.view.forget(gone.append)
     hall.view.forget(gone.append)
     node_goes(hall.plant, hall.node, NodeState.LOST, 2.0)
-    assert [(event.kind, event.severity) for event in gone] == [(Kind.NODE_BACK, 200)]
+    assert [(event.kind, event.severity) for event in gone] == [(EventKind.NODE_BACK, 200)]
     told = [(event.kind, event.severity) for event in hall.events if event.source == "conveyor"]
-    assert told == [(Kind.NODE_BACK, 200), (Kind.NODE_LOST, 800)]
+    assert told == [(EventKind.NODE_BACK, 200), (EventKind.NODE_LOST, 800)]
 
 
 def test_a_state_that_is_not_told_is_shown_all_the_same(hall: Hall) -> None:

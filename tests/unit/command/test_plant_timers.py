@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.command import Action, Plant, Request, Write
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Quality, Value
 from tests.support import sites
 from tests.support.node_states import hand_over, node_goes

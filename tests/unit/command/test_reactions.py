@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Identity, Kind
-from bridge.command.link import NodeState
+from bridge.command import Action, EventKind, Identity
+from bridge.command.drive_link import NodeState
 from tests.support.leg_words import NORD_TU4
 from tests.support.rig import (
     ACKNOWLEDGE,
@@ -224,7 +224,7 @@ def test_silence_that_would_not_stop_the_drive_is_disable_voltage():
     assert not rig.silent
     assert rig.sent == 0x0474
     assert rig.sent_setpoints[0] == 0
-    (trip,) = (message for message in rig.told(Kind.WATCHDOG) if "was silent" in message)
+    (trip,) = (message for message in rig.told(EventKind.WATCHDOG) if "was silent" in message)
     assert ": disable_voltage, " in trip
 
 
@@ -263,7 +263,7 @@ def test_that_silence_would_not_stop_the_drive_is_told_once_and_only_where_it_ma
         rig = Rig(on_expiry=on_expiry, then_silence_ms=then_silence_ms)
         for _ in range(2):
             rig.channel.on_own_watch("P151 is 0 (off)", rig.now)
-        assert sum("P151 is 0 (off)" in message for message in rig.told(Kind.WATCHDOG)) == count
+        assert sum("P151 is 0 (off)" in message for message in rig.told(EventKind.WATCHDOG)) == count
         rig.channel.on_own_watch("", rig.now)
         rig.channel.on_own_watch("P513 is -1", rig.now)
-        assert sum("P513 is -1" in message for message in rig.told(Kind.WATCHDOG)) == count
+        assert sum("P513 is -1" in message for message in rig.told(EventKind.WATCHDOG)) == count

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.command import Action, Code, Kind
-from bridge.command.link import NodeState
+from bridge.command import Action, Code, EventKind
+from bridge.command.drive_link import NodeState
 from tests.support.rig import ENABLE, ENABLED, HALF_SPEED, OBSERVER, OPERATOR, PLC, READY, SHUT_DOWN, Rig
 
 
@@ -104,7 +104,7 @@ def test_a_lost_node_stops_the_commands_at_once_and_is_reported(running: Rig):
     assert running.sent == SHUT_DOWN
     assert running.channel.current_fault == 10.9
     assert running.channel.fault_text == "E010/10.9 bus interface missing"
-    assert running.told(Kind.WATCHDOG) == ["E010/10.9: the node is lost"]
+    assert running.told(EventKind.WATCHDOG) == ["E010/10.9: the node is lost"]
     running.node(NodeState.OPERATIONAL)
     assert running.channel.current_fault == 0
     assert running.channel.last_fault == 10.9
@@ -151,9 +151,9 @@ class TestStopCommands:
 
     def test_of_somebody_else_are_told(self, running: Rig):
         running.ask(Action.QUICK_STOP)
-        before = running.told(Kind.OWNER)
+        before = running.told(EventKind.OWNER)
         running.ask(Action.STOP, OPERATOR)
-        assert running.told(Kind.OWNER) == [*before, "stop by opcua:ann"]
+        assert running.told(EventKind.OWNER) == [*before, "stop by opcua:ann"]
 
     def test_of_the_owner_are_one(self, running: Rig):
         running.wait(0.15)

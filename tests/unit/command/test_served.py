@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.command import Action
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.drive import DriveState
 from tests.support.leg_words import ALL, LegWords
 from tests.support.rig import Rig

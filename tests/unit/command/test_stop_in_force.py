@@ -32,8 +32,8 @@ class Drive(Leg):
         self.words = self.settings.words
         self.run, self.stop, self.withheld = FAMILIES[family]
 
-    def says(self, state: DriveState, after_s: float = 1.0, *, is_taken: bool = False) -> int:
-        return super().says(state, after_s, is_taken=is_taken)
+    def says(self, state: DriveState, after_s: float = 1.0, *, is_acknowledged: bool = False) -> int:
+        return super().says(state, after_s, is_acknowledged=is_acknowledged)
 
     def gets_ready(self) -> None:
         self.writes(self.words.ready)

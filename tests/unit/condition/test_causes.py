@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.condition.causes import KEPT_MS
-from bridge.condition.findings import Rank
+from bridge.condition.point_troubles import Rank
 from bridge.image import Quality
 from bridge.text import Text
 from tests.support import sites

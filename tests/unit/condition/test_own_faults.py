@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from bridge.condition.layout import layout_of
 from bridge.condition.own_faults import with_faults
+from bridge.condition.plant_layout import layout_of
 from tests.support import sites
 
 FAULT, READY = 0x0008, 0x0231

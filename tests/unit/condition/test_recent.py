@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from bridge.condition.causes import Shown
-from bridge.condition.findings import Rank, Trouble
+from bridge.condition.causes import TroubleLine
+from bridge.condition.point_troubles import Rank, Trouble
 from bridge.condition.recent import KEPT_MS, Recent
 
 
-def shown(kind: str, place: str) -> Shown:
-    return Shown(Trouble(Rank.ALARM, kind, place), Rank.ALARM, 0.0)
+def shown(kind: str, place: str) -> TroubleLine:
+    return TroubleLine(Trouble(Rank.ALARM, kind, place), Rank.ALARM, 0.0)
 
 
 FAN, LIFT = shown("node_lost", "fan"), shown("drive_fault", "lift")
 
 
-def see(recent: Recent, now_ms: float, *troubles: Shown) -> None:
+def see(recent: Recent, now_ms: float, *troubles: TroubleLine) -> None:
     recent.see(troubles, (), now_ms, now_ms)
 
 

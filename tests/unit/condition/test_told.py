@@ -7,8 +7,8 @@ import json
 import pytest
 
 from bridge.catalogue.codes import CONDITIONS
-from bridge.condition.causes import Known, Shown
-from bridge.condition.findings import Rank, Trouble
+from bridge.condition.causes import Known, TroubleLine
+from bridge.condition.point_troubles import Rank, Trouble
 from bridge.condition.told import MOST, condition, troubles_json
 from bridge.text import Text
 
@@ -25,8 +25,8 @@ def test_the_worst_trouble_has_the_highest_number(rank: Rank | None, number: int
     assert dict(CONDITIONS)[number] == word
 
 
-def shown(trouble: Trouble, *explains: Known) -> Shown:
-    return Shown(trouble, trouble.rank, 1234.4, explains=explains, is_or_longer=False, until_ms=None)
+def shown(trouble: Trouble, *explains: Known) -> TroubleLine:
+    return TroubleLine(trouble, trouble.rank, 1234.4, explains=explains, is_or_longer=False, until_ms=None)
 
 
 def test_a_trouble_is_told_with_its_facts() -> None:

@@ -10,10 +10,10 @@ import pytest
 
 from bridge.base.errors import OperationFailed
 from bridge.config import Site
-from bridge.dbc import BusDescription, Message, Signal, describe
+from bridge.dbc import BusDescription, Message, MessageSignal, describe
 from bridge.dbc.write import dbc_text
 from bridge.lint import family_dictionaries
-from bridge.lint.bus import view_bus
+from bridge.lint.checked_bus import view_bus
 from bridge.mapping import Family, load_family
 from tests.support import sites
 
@@ -37,7 +37,7 @@ def message(bus: BusDescription, name: str) -> Message:
     return next(message for message in bus.messages if message.name == name)
 
 
-def signals(bus: BusDescription, name: str) -> dict[str, Signal]:
+def signals(bus: BusDescription, name: str) -> dict[str, MessageSignal]:
     return {signal.name: signal for signal in message(bus, name).signals}
 
 

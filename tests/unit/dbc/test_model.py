@@ -7,12 +7,12 @@ from dataclasses import FrozenInstanceError
 import pytest
 
 from bridge.config import NodeTable
-from bridge.dbc.model import BRIDGE, Message, Signal
+from bridge.dbc.model import BRIDGE, Message, MessageSignal
 from tests.support import sites
 
 
 def test_a_signal_is_its_raw_number_without_limits() -> None:
-    signal = Signal("x", 0, 16)
+    signal = MessageSignal("x", 0, 16)
     assert (signal.factor, signal.offset, signal.low, signal.high) == (1.0, 0.0, None, None)
     assert (signal.is_signed, signal.is_float, dict(signal.choices)) == (False, False, {})
 

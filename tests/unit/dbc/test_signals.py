@@ -6,9 +6,9 @@ import tomllib
 from collections.abc import Mapping
 
 from bridge.config import Site
-from bridge.dbc import BusDescription, Message, Signal, describe
+from bridge.dbc import BusDescription, Message, MessageSignal, describe
 from bridge.lint import family_dictionaries
-from bridge.lint.bus import view_bus
+from bridge.lint.checked_bus import view_bus
 from bridge.mapping import Family, load_family
 from tests.support import sites
 
@@ -34,7 +34,7 @@ def message(bus: BusDescription, name: str) -> Message:
     return next(message for message in bus.messages if message.name == name)
 
 
-def signals(bus: BusDescription, name: str) -> dict[str, Signal]:
+def signals(bus: BusDescription, name: str) -> dict[str, MessageSignal]:
     return {signal.name: signal for signal in message(bus, name).signals}
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.eds.model import Report
-from bridge.eds.text import decode
+from bridge.eds.text_file import decode
 from bridge.mapping.loader import mappings_dir
 from tests.support.devices import DEVICES
 from tests.support.eds_dialects import in_every_dialect

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from bridge.derive import derive_family
-from bridge.derive.device import is_of, wanted_identity
+from bridge.derive.device_family import is_of, wanted_identity
 from bridge.eds import Description, read_device
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from tests.support.invented_eds import (
     BASIC,
     SPIN,
@@ -63,7 +63,7 @@ def test_nothing_is_demanded_that_the_file_does_not_describe(
     rule = family_of(tmp_path, derive_family(description, "spin.eds")).identity
     assert (rule.vendor_id, rule.product_code) == wanted
     bench = DerivedBench(tmp_path, description)
-    assert bench.generic.slave.state is NmtState.OPERATIONAL
+    assert bench.generic.slave.state is SlaveState.OPERATIONAL
 
 
 @pytest.mark.parametrize(

@@ -11,11 +11,11 @@ import pytest
 from bridge.base.errors import FileFaults, OperationFailed
 from bridge.command import Identity, Outcome, Request, Role, Source, WriteParameter
 from bridge.derive import derive_family
-from bridge.derive.device import GENERIC
+from bridge.derive.device_family import GENERIC
 from bridge.lint import Severity, lint
 from bridge.mapping.loader import read_family
 from bridge.project import load_project
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from tests.support import sites
 from tests.support.invented_eds import (
     BASIC,
@@ -109,7 +109,7 @@ def test_a_mode_is_asked_of_drives_alone() -> None:
 
 def test_what_is_only_read_is_served_and_refuses_every_write_with_the_reason(tmp_path: Path) -> None:
     bench = DerivedBench(tmp_path, described(profile(402)))
-    assert bench.generic.slave.state is NmtState.OPERATIONAL
+    assert bench.generic.slave.state is SlaveState.OPERATIONAL
     for name in ("2001", "1017:00", "6200:00", "5000:01"):
         asked: list[Outcome] = []
         bench.view.submit(Request(ENGINEER, "conveyor", WriteParameter(name, 7)), asked.append)

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.base.errors import FileFaults, OperationFailed
-from bridge.cli.family import new
+from bridge.cli.family_command import new
 from bridge.eds.model import Report
-from bridge.eds.text import decode
+from bridge.eds.text_file import decode
 from bridge.mapping.loader import mappings_dir, read_family
 from tests.support.invented_eds import FIXED, SPIN, eds
 from tests.support.nightly import examples

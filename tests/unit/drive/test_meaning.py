@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from bridge.command import Action, Code, Outcome, Request, command_of
 from bridge.command.messages.telegram import Refusal
 from bridge.image import Quality
-from bridge.sim.core.abort import AbortCode, SdoAbort
 from bridge.sim.core.dictionary import Entry
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_interface import DriveAccess
 from bridge.sim.nord.nord_parameters import PARAMETER_BASE, sub_index

@@ -7,7 +7,16 @@ from pathlib import Path
 import pytest
 
 from bridge.base.errors import FileFaults
-from bridge.eds import Access, DataType, Description, Finding, Severity, Value, read_device, read_device_file
+from bridge.eds import (
+    Access,
+    Description,
+    Finding,
+    FindingSeverity,
+    StaticDataType,
+    Value,
+    read_device,
+    read_device_file,
+)
 from bridge.eds.pdos import pdos
 
 HEAD = """[DeviceInfo]
@@ -61,7 +70,7 @@ def test_a_file_as_the_standard_has_it_has_no_findings() -> None:
 def test_umlauts_are_read_however_they_were_saved(encoding: str) -> None:
     description = read(HEAD.replace("Mover", "Überströmer").encode(encoding))
     assert description.device_info.product == "Überströmer"
-    assert all(finding.severity is Severity.WARNING for finding in description.findings)
+    assert all(finding.severity is FindingSeverity.WARNING for finding in description.findings)
 
 
 def test_the_line_of_the_first_foreign_character_is_named() -> None:
@@ -84,7 +93,7 @@ def test_lower_case_keys_are_read_and_reported_once() -> None:
 
 def test_a_stray_line_is_named_and_ignored() -> None:
     description, [finding] = odd("this is nothing\n")
-    assert (finding.line, finding.severity) == (21, Severity.ERROR)
+    assert (finding.line, finding.severity) == (21, FindingSeverity.ERROR)
     assert "this is nothing" in finding.text
     assert description.number(0x1000) == 0x10192
 
@@ -97,14 +106,14 @@ def test_comments_are_no_oddity() -> None:
 def test_of_a_key_that_is_there_twice_the_first_counts() -> None:
     description, [finding] = odd(entry("DataType=6\nAccessType=rw\nDefaultValue=1\nDefaultValue=2"))
     assert description.number(0x2000) == 1
-    assert (finding.line, finding.severity) == (26, Severity.ERROR)
+    assert (finding.line, finding.severity) == (26, FindingSeverity.ERROR)
 
 
 def test_a_section_that_is_there_twice_is_joined() -> None:
     description, [finding] = odd(entry("DataType=6") + "[2000]\nAccessType=wo\n")
     found = description.entry(0x2000)
     assert found
-    assert (found.data_type, found.access) == (DataType.UNSIGNED16, Access.WO)
+    assert (found.data_type, found.access) == (StaticDataType.UNSIGNED16, Access.WO)
     assert "appears again, first in line 21" in finding.text
 
 
@@ -144,7 +153,7 @@ def test_the_node_id_in_every_form(text: str) -> None:
 def test_what_is_no_expression_is_left_out_and_named(text: str) -> None:
     description, [finding] = odd(entry(f"DataType=7\nAccessType=rw\nDefaultValue={text}"))
     assert description.number(0x2000, node_id=5) is None
-    assert (finding.line, finding.severity) == (25, Severity.ERROR)
+    assert (finding.line, finding.severity) == (25, FindingSeverity.ERROR)
 
 
 @pytest.mark.parametrize(
@@ -173,7 +182,7 @@ def test_a_value_beyond_its_type_is_left_out(value: str) -> None:
     found = description.entry(0x2000)
     assert found
     assert found.default is None
-    assert finding.severity is Severity.ERROR
+    assert finding.severity is FindingSeverity.ERROR
 
 
 def test_what_is_missing_gets_its_default() -> None:
@@ -184,10 +193,10 @@ def test_what_is_missing_gets_its_default() -> None:
         "[2000sub2]\nParameterName=B\n"
     )
     count, first, second = description.objects[1].entries
-    assert (count.data_type, count.access) == (DataType.UNSIGNED8, Access.RO)
+    assert (count.data_type, count.access) == (StaticDataType.UNSIGNED8, Access.RO)
     assert (first.access, second.access) == (Access.RW, Access.RW)
-    assert second.data_type is DataType.UNSIGNED16
-    assert {finding.severity for finding in findings} == {Severity.WARNING}
+    assert second.data_type is StaticDataType.UNSIGNED16
+    assert {finding.severity for finding in findings} == {FindingSeverity.WARNING}
     assert len(findings) == 5
 
 
@@ -236,7 +245,7 @@ def test_a_type_that_the_file_itself_describes_is_looked_up() -> None:
     description, findings = odd(entry("DataType=0xA0\nAccessType=rw") + "[A0]\n[A0sub1]\nDefaultValue=0x6\n")
     found = description.entry(0x2000)
     assert found
-    assert found.data_type is DataType.UNSIGNED16
+    assert found.data_type is StaticDataType.UNSIGNED16
     assert findings == []
 
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.eds.ini import SPELLING, Text, read_sections, shown, stripped
-from bridge.eds.model import Report, Severity
+from bridge.eds.ini import SPELLING, IniValue, read_sections, shown, stripped
+from bridge.eds.model import FindingSeverity, Report
 
 
 def read(text: str) -> tuple[dict[str, dict[str, tuple[str, int]]], list[tuple[int, str]]]:
@@ -68,7 +68,7 @@ def test_the_first_value_counts_unless_it_is_empty() -> None:
 
 def test_a_key_is_found_in_any_case_and_an_empty_one_is_missing() -> None:
     section = read_sections(["[a]", "DefaultValue=5", "unit="], Report())["a"]
-    assert section.get("DEFAULTVALUE") == Text("5", 2)
+    assert section.get("DEFAULTVALUE") == IniValue("5", 2)
     assert section.get("unit") is None
     assert (section.text("unit"), section.text("other")) == ("", "")
 
@@ -97,4 +97,4 @@ def test_no_text_raises_and_each_finding_has_a_line_of_it(text: str) -> None:
     report = Report()
     read_sections(text.split("\n"), report)
     lines = text.count("\n") + 1
-    assert all(1 <= one.line <= lines and one.severity in Severity for one in report.findings())
+    assert all(1 <= one.line <= lines and one.severity in FindingSeverity for one in report.findings())

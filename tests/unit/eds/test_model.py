@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 
 from bridge.eds.model import (
     Access,
-    DataType,
     Description,
     Entry,
     Finding,
+    FindingSeverity,
     Module,
     Object,
     ObjectType,
     Report,
-    Severity,
+    StaticDataType,
     Value,
 )
 
@@ -24,23 +24,23 @@ from bridge.eds.model import (
 @pytest.mark.parametrize(
     ("kind", "code"),
     [
-        (DataType.BOOLEAN, 0x01),
-        (DataType.INTEGER8, 0x02),
-        (DataType.UNSIGNED8, 0x05),
-        (DataType.UNSIGNED16, 0x06),
-        (DataType.UNSIGNED32, 0x07),
-        (DataType.REAL32, 0x08),
-        (DataType.VISIBLE_STRING, 0x09),
-        (DataType.OCTET_STRING, 0x0A),
-        (DataType.DOMAIN, 0x0F),
-        (DataType.INTEGER24, 0x10),
-        (DataType.REAL64, 0x11),
-        (DataType.INTEGER64, 0x15),
-        (DataType.UNSIGNED24, 0x16),
-        (DataType.UNSIGNED64, 0x1B),
+        (StaticDataType.BOOLEAN, 0x01),
+        (StaticDataType.INTEGER8, 0x02),
+        (StaticDataType.UNSIGNED8, 0x05),
+        (StaticDataType.UNSIGNED16, 0x06),
+        (StaticDataType.UNSIGNED32, 0x07),
+        (StaticDataType.REAL32, 0x08),
+        (StaticDataType.VISIBLE_STRING, 0x09),
+        (StaticDataType.OCTET_STRING, 0x0A),
+        (StaticDataType.DOMAIN, 0x0F),
+        (StaticDataType.INTEGER24, 0x10),
+        (StaticDataType.REAL64, 0x11),
+        (StaticDataType.INTEGER64, 0x15),
+        (StaticDataType.UNSIGNED24, 0x16),
+        (StaticDataType.UNSIGNED64, 0x1B),
     ],
 )
-def test_the_codes_of_data_types(kind: DataType, code: int) -> None:
+def test_the_codes_of_data_types(kind: StaticDataType, code: int) -> None:
     """CiA 301 §7.4.7.1, table 44."""
     assert kind == code
 
@@ -82,7 +82,7 @@ def test_a_value_in_words(value: Value, text: str) -> None:
 
 
 def entry(index: int, sub: int = 0, **more: object) -> Entry:
-    return Entry(index, sub, "x", DataType.UNSIGNED8, Access.RW, **more)  # type: ignore[arg-type]
+    return Entry(index, sub, "x", StaticDataType.UNSIGNED8, Access.RW, **more)  # type: ignore[arg-type]
 
 
 def test_what_a_file_configures_counts_before_the_default() -> None:
@@ -118,9 +118,9 @@ def test_where_a_file_breaks_off_is_an_error_with_its_line() -> None:
     report = Report()
     report.breaks_off(7, "ends")
     assert report.broken_off_at == 7
-    assert report.findings() == (Finding(7, Severity.ERROR, "ends"),)
-    assert str(Finding(7, Severity.ERROR, "ends")) == "error: line 7: ends"
-    assert str(Finding(0, Severity.WARNING, "odd")) == "warning: odd"
+    assert report.findings() == (Finding(7, FindingSeverity.ERROR, "ends"),)
+    assert str(Finding(7, FindingSeverity.ERROR, "ends")) == "error: line 7: ends"
+    assert str(Finding(0, FindingSeverity.WARNING, "odd")) == "warning: odd"
 
 
 @pytest.mark.parametrize(

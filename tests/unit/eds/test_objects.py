@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.eds import Description, read_device
-from bridge.eds.model import DataType, Object, ObjectType
+from bridge.eds.model import Object, ObjectType, StaticDataType
 
 
 def read(text: str) -> tuple[Object, list[str]]:
@@ -27,7 +27,7 @@ def sub(number: int, more: str = "DataType=0x0006\n") -> str:
 def test_a_variable_is_its_own_entry() -> None:
     one, told = read(VAR)
     assert (one.name, one.object_type, [entry.sub for entry in one.entries]) == ("Own", ObjectType.VAR, [0])
-    assert one.entries[0].data_type is DataType.UNSIGNED16
+    assert one.entries[0].data_type is StaticDataType.UNSIGNED16
     assert told == []
 
 
@@ -52,7 +52,7 @@ def test_compact_sub_indices_are_all_there() -> None:
     assert [entry.sub for entry in one.entries] == [0, 1, 2, 3]
     third = one.entry(3)
     assert third is not None
-    assert third.data_type is DataType.UNSIGNED16
+    assert third.data_type is StaticDataType.UNSIGNED16
     assert third.default is not None
     assert third.default.plain == 7
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.base.errors import FileFaults
-from bridge.eds import Access, DataType, Severity, Value, configuration, read_device
+from bridge.eds import Access, FindingSeverity, StaticDataType, Value, configuration, read_device
 
 XDD = """<?xml version="1.0" encoding="utf-8"?>
 <ISO15745ProfileContainer xmlns="http://www.canopen.org/xml/1.1"
@@ -57,7 +57,11 @@ def test_an_xdc_is_read_without_findings() -> None:
 def test_a_parameter_of_the_application_process_tells_the_rest() -> None:
     speed = read_device(XDD.encode(), "test.xdc").entry(0x2000)
     assert speed
-    assert (speed.data_type, speed.access, speed.default) == (DataType.UNSIGNED16, Access.RW, Value(0x12))
+    assert (speed.data_type, speed.access, speed.default) == (
+        StaticDataType.UNSIGNED16,
+        Access.RW,
+        Value(0x12),
+    )
     assert speed.pdo_mappable
 
 
@@ -80,7 +84,7 @@ def test_of_a_broken_file_the_whole_part_is_read() -> None:
     description = read_device(broken.encode(), "test.xdd")
     assert [one.index for one in description.objects] == [0x1000, 0x1800]
     [finding] = description.findings
-    assert finding.severity is Severity.ERROR
+    assert finding.severity is FindingSeverity.ERROR
     assert "is not XML from here on" in finding.text
 
 

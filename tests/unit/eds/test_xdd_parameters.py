@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.eds import Access, DataType, Description, Entry, Value, configuration, read_device
+from bridge.eds import Access, Description, Entry, StaticDataType, Value, configuration, read_device
 
 FILE = """<?xml version="1.0" encoding="utf-8"?>
 <ISO15745ProfileContainer xmlns="http://www.canopen.org/xml/1.1"><ISO15745Profile><ProfileBody>
@@ -15,25 +15,25 @@ FILE = """<?xml version="1.0" encoding="utf-8"?>
 """
 OBJECT = '<CANopenObject index="2000" name="Thing" objectType="{kind}" uniqueIDRef="P"{more}/>'
 EVERY_TYPE = {
-    "BOOL": (DataType.BOOLEAN, "1", 1),
-    "BITSTRING": (DataType.OCTET_STRING, "56 34 12", b"\x56\x34\x12"),
-    "CHAR": (DataType.INTEGER8, "-1", -1),
-    "SINT": (DataType.INTEGER8, "-1", -1),
-    "INT": (DataType.INTEGER16, "0xFFFF", -1),
-    "DINT": (DataType.INTEGER32, "-70000", -70000),
-    "LINT": (DataType.INTEGER64, "-1", -1),
-    "USINT": (DataType.UNSIGNED8, "255", 255),
-    "BYTE": (DataType.UNSIGNED8, "255", 255),
-    "UINT": (DataType.UNSIGNED16, "65535", 65535),
-    "WORD": (DataType.UNSIGNED16, "65535", 65535),
-    "UDINT": (DataType.UNSIGNED32, "0x12345678", 0x1234_5678),
-    "DWORD": (DataType.UNSIGNED32, "0x12345678", 0x1234_5678),
-    "ULINT": (DataType.UNSIGNED64, "1", 1),
-    "LWORD": (DataType.UNSIGNED64, "1", 1),
-    "REAL": (DataType.REAL32, "1.5", 1.5),
-    "LREAL": (DataType.REAL64, "1.5", 1.5),
-    "STRING": (DataType.VISIBLE_STRING, "abc", "abc"),
-    "WSTRING": (DataType.UNICODE_STRING, "abc", "abc"),
+    "BOOL": (StaticDataType.BOOLEAN, "1", 1),
+    "BITSTRING": (StaticDataType.OCTET_STRING, "56 34 12", b"\x56\x34\x12"),
+    "CHAR": (StaticDataType.INTEGER8, "-1", -1),
+    "SINT": (StaticDataType.INTEGER8, "-1", -1),
+    "INT": (StaticDataType.INTEGER16, "0xFFFF", -1),
+    "DINT": (StaticDataType.INTEGER32, "-70000", -70000),
+    "LINT": (StaticDataType.INTEGER64, "-1", -1),
+    "USINT": (StaticDataType.UNSIGNED8, "255", 255),
+    "BYTE": (StaticDataType.UNSIGNED8, "255", 255),
+    "UINT": (StaticDataType.UNSIGNED16, "65535", 65535),
+    "WORD": (StaticDataType.UNSIGNED16, "65535", 65535),
+    "UDINT": (StaticDataType.UNSIGNED32, "0x12345678", 0x1234_5678),
+    "DWORD": (StaticDataType.UNSIGNED32, "0x12345678", 0x1234_5678),
+    "ULINT": (StaticDataType.UNSIGNED64, "1", 1),
+    "LWORD": (StaticDataType.UNSIGNED64, "1", 1),
+    "REAL": (StaticDataType.REAL32, "1.5", 1.5),
+    "LREAL": (StaticDataType.REAL64, "1.5", 1.5),
+    "STRING": (StaticDataType.VISIBLE_STRING, "abc", "abc"),
+    "WSTRING": (StaticDataType.UNICODE_STRING, "abc", "abc"),
 }
 """The simple types of CiA 311's schema, each with a default value."""
 
@@ -63,7 +63,7 @@ def test_every_type_of_the_schema_is_a_type(name: str) -> None:
 
 
 def test_the_bit_string_of_a_domain_is_a_domain() -> None:
-    assert only(read(parameter("<BITSTRING/>"), kind=2)).data_type is DataType.DOMAIN
+    assert only(read(parameter("<BITSTRING/>"), kind=2)).data_type is StaticDataType.DOMAIN
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_an_unknown_access_is_read_only_and_told() -> None:
 
 def test_what_the_object_says_itself_comes_first() -> None:
     entry = only(read(parameter("<UINT/>", 'access="read"'), more=' accessType="rw" dataType="05"'))
-    assert (entry.access, entry.data_type) == (Access.RW, DataType.UNSIGNED8)
+    assert (entry.access, entry.data_type) == (Access.RW, StaticDataType.UNSIGNED8)
 
 
 def test_an_object_without_any_access_is_read_only_and_told() -> None:
@@ -126,7 +126,7 @@ def test_a_type_that_the_file_derives_is_the_one_it_is_made_of() -> None:
         '<enum uniqueID="D2"><enumValue value="1"/><USINT/></enum></dataTypeList>'
     )
     entry = only(read(types + parameter('<dataTypeIDRef uniqueIDRef="D1"/>')))
-    assert entry.data_type is DataType.UNSIGNED8
+    assert entry.data_type is StaticDataType.UNSIGNED8
     circle = '<dataTypeList><derived uniqueID="D1"><dataTypeIDRef uniqueIDRef="D1"/></derived></dataTypeList>'
     assert only(read(circle + parameter('<dataTypeIDRef uniqueIDRef="D1"/>'))).data_type is None
 
@@ -137,6 +137,6 @@ def test_a_parameter_says_what_its_template_says() -> None:
         "</parameterTemplate></templateList>"
     )
     entry = only(read(template + parameter("", 'templateIDRef="T"')))
-    assert (entry.access, entry.data_type, entry.default) == (Access.RW, DataType.UNSIGNED16, Value(7))
+    assert (entry.access, entry.data_type, entry.default) == (Access.RW, StaticDataType.UNSIGNED16, Value(7))
     entry = only(read(template + parameter("<UDINT/>", 'templateIDRef="T" access="read"')))
-    assert (entry.access, entry.data_type) == (Access.RO, DataType.UNSIGNED32)
+    assert (entry.access, entry.data_type) == (Access.RO, StaticDataType.UNSIGNED32)

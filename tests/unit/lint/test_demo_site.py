@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bridge.lint import Severity, Verdict, lint
+from bridge.lint import CheckResult, Severity, lint
 from bridge.project import load_project
 
 DEMO = Path("bridge/demo/site.toml")
 
 
-def verdict() -> Verdict:
+def verdict() -> CheckResult:
     project = load_project(DEMO)
     return lint(project.site, project.families, DEMO, project.downloads)
 

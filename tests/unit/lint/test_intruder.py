@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.config import load_site
-from bridge.lint.bus import view_bus
+from bridge.lint.checked_bus import view_bus
 from bridge.lint.intruder import Exposure, exposure
 from tests.support import sites
 

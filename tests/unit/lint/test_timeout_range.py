@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.lint import Severity, Verdict, lint
+from bridge.lint import CheckResult, Severity, lint
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names, mapping_folders
 from bridge.project import load_project
@@ -20,7 +20,7 @@ SITE_MS = 200
 
 def judge(
     folder: Path, mapping: str, more: str, *, control: str = "modbus", timeout_ms: int = SITE_MS
-) -> Verdict:
+) -> CheckResult:
     slot = load_family(mapping).slot[0].name
     whole = sites.node(sites.drive(slot, control, timeout_ms, more), name="n", mapping=mapping)
     path = sites.write(folder, sites.bus(whole), sites.modbus())
@@ -28,7 +28,7 @@ def judge(
     return lint(project.site, project.families, path, project.downloads)
 
 
-def told(verdict: Verdict) -> list[str]:
+def told(verdict: CheckResult) -> list[str]:
     assert not [one for one in verdict.of(Severity.ERROR) if "range" in str(one)]
     return [str(one) for one in verdict.of(Severity.WARNING) if "fieldbus_timeout_range_ms" in str(one)]
 

@@ -7,7 +7,7 @@ import pytest
 from bridge.mapping import load_family
 from bridge.mapping.alias_places import aliases, place_of
 from bridge.mapping.aliases import Aliases
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.entry_types import ObjectRef
 from bridge.mapping.model import Parameter
 
 NORD = load_family("nord/sk-tu4-cao")

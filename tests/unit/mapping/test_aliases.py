@@ -6,7 +6,7 @@ import pytest
 from pydantic import ValidationError
 
 from bridge.mapping.aliases import COMMUNICATION, Aliases
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.entry_types import ObjectRef
 
 TYPE, INHIBIT = ObjectRef(0x1400, 2), ObjectRef(0x1400, 3)
 

@@ -12,7 +12,7 @@ from bridge.mapping.axes import MOST_AXES, axis_of, on_axis, on_first
 from bridge.mapping.loader import read_family
 from bridge.mapping.own_places import places
 from bridge.parameter import Names
-from bridge.parameter.effect import Effect
+from bridge.parameter.write_effect import Effect
 
 SLOT = """
 [[slot]]

@@ -11,23 +11,23 @@ from bridge.drive import ControlWords, DriveState, StatusWords
 from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mapping_folders, read_family
 from bridge.mapping.match import Found, best_match
-from bridge.mapping.site import load_site_and_families
+from bridge.mapping.site_families import load_site_and_families
 from bridge.parameter import Names
 from bridge.sim.cia402.cia402_catalogue import MAPPINGS
-from bridge.sim.cia402.cia402_states import Command, State, command_of
+from bridge.sim.cia402.cia402_states import Cia402Command, Cia402State, command_of
 from tests.support import sites
 
 FAMILIES = {name: load_family(f"cia402/{name}") for name in MAPPINGS}
 ANY = FAMILIES["profile-velocity"]
 STATES = {
-    State.NOT_READY: DriveState.NOT_READY,
-    State.SWITCH_ON_DISABLED: DriveState.SWITCH_ON_INHIBITED,
-    State.READY: DriveState.READY,
-    State.SWITCHED_ON: DriveState.SWITCHED_ON,
-    State.ENABLED: DriveState.OPERATION_ENABLED,
-    State.QUICK_STOP_ACTIVE: DriveState.QUICK_STOP_ACTIVE,
-    State.FAULT_REACTION: DriveState.FAULT_REACTION_ACTIVE,
-    State.FAULT: DriveState.FAULT,
+    Cia402State.NOT_READY: DriveState.NOT_READY,
+    Cia402State.SWITCH_ON_DISABLED: DriveState.SWITCH_ON_INHIBITED,
+    Cia402State.READY: DriveState.READY,
+    Cia402State.SWITCHED_ON: DriveState.SWITCHED_ON,
+    Cia402State.ENABLED: DriveState.OPERATION_ENABLED,
+    Cia402State.QUICK_STOP_ACTIVE: DriveState.QUICK_STOP_ACTIVE,
+    Cia402State.FAULT_REACTION: DriveState.FAULT_REACTION_ACTIVE,
+    Cia402State.FAULT: DriveState.FAULT,
 }
 
 
@@ -59,12 +59,12 @@ def test_every_state_is_told_whatever_the_other_bits_are(name: str):
 @pytest.mark.parametrize("name", MAPPINGS)
 def test_the_words_are_the_commands_of_the_standard(name: str):
     words = ControlWords(FAMILIES[name].control_word)
-    assert command_of(words.stopped) is Command.DISABLE_VOLTAGE
-    assert command_of(words.ready) is Command.SHUTDOWN
-    assert command_of(words.run) is Command.ENABLE_OPERATION
-    assert command_of(words.stop(words.run)) is Command.SWITCH_ON
-    assert command_of(words.quick_stop(words.run)) is Command.QUICK_STOP
-    assert command_of(words.disable_voltage(words.run)) is Command.DISABLE_VOLTAGE
+    assert command_of(words.stopped) is Cia402Command.DISABLE_VOLTAGE
+    assert command_of(words.ready) is Cia402Command.SHUTDOWN
+    assert command_of(words.run) is Cia402Command.ENABLE_OPERATION
+    assert command_of(words.stop(words.run)) is Cia402Command.SWITCH_ON
+    assert command_of(words.quick_stop(words.run)) is Cia402Command.QUICK_STOP
+    assert command_of(words.disable_voltage(words.run)) is Cia402Command.DISABLE_VOLTAGE
     assert words.acknowledge_mask == 0x0080
     assert words.enables(words.run | words.begin)
 

@@ -10,7 +10,7 @@ from bridge.base.errors import FileFaults
 from bridge.mapping import family_names, load_family, read_family
 from bridge.mapping.loader import mappings_dir
 from bridge.mapping.model import pattern_bits
-from bridge.mapping.site import load_site_and_families
+from bridge.mapping.site_families import load_site_and_families
 from tests.support.sample_family import FAMILY, told
 
 

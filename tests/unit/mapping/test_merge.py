@@ -7,7 +7,7 @@ import pytest
 from bridge.base.errors import FileFaults
 from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mapping_folders, mappings_dir
-from bridge.mapping.site import load_site_and_families
+from bridge.mapping.site_families import load_site_and_families
 from tests.support.invented import NAME, SPIN
 from tests.support.mapping_folder import BASE, Folder
 

@@ -9,7 +9,7 @@ import pytest
 
 from bridge.can.wirebits import longest_bits
 from bridge.master.answers import SHARE, Answers, answer_bits
-from bridge.node.node import NodeCore
+from bridge.node.node_core import NodeCore
 
 BITRATE = 100_000
 BITS_PER_S = SHARE * BITRATE

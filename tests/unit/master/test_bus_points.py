@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from bridge.can.interface import ControllerState
-from bridge.command import Kind
+from bridge.command import EventKind
 from tests.support.bench import Bench, write_site
 
 
@@ -21,7 +21,7 @@ def test_error_frames_are_shown_at_once_and_told_every_ten_seconds(tmp_path: Pat
     bench.run(0.2)
     assert "no acknowledge" in str(bench.value("bus/can0/last_error"))
     assert bench.value("bus/can0/error_frames") == 15_000
-    told = [event.message for event in bench.events if event.kind is Kind.BUS]
+    told = [event.message for event in bench.events if event.kind is EventKind.BUS]
     assert 3 <= len(told) <= 4
     assert re.match(r"50\d\d error frames: no acknowledge", told[1])
 
@@ -35,6 +35,6 @@ def test_a_bus_that_flaps_is_told_now_and_then_and_its_last_state_always(tmp_pat
         bench.run(0.05)
     bench.bus.status.state = ControllerState.PASSIVE
     bench.run(6.0)
-    told = [event.message for event in bench.events if event.kind is Kind.BUS]
+    told = [event.message for event in bench.events if event.kind is EventKind.BUS]
     assert 10 <= len(told) <= 16
     assert told[-1].startswith("bus can0 is passive")

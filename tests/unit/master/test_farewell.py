@@ -16,7 +16,7 @@ from bridge.config import load_site
 from bridge.mapping import load_family
 from bridge.sim.catalogue import simulate_node
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.lenze.lenze_motec import LenzeMotec
 from bridge.sim.nord.nord_single import NordSingle
 from bridge.sim.nord.nord_tu4 import NordTu4
@@ -278,7 +278,7 @@ def test_started_again_meanwhile_it_is_stopped_first_and_then_booted(tmp_path: P
     bench.run(4.0)
     commands = [frame.data[0] for frame in bench.log if not frame.can_id]
     assert commands[:2] == [0x02, 0x80]
-    assert bench.node.slave.state is NmtState.OPERATIONAL
+    assert bench.node.slave.state is SlaveState.OPERATIONAL
     assert speed(bench.node) == 0
 
 
@@ -301,7 +301,7 @@ def test_a_bus_that_goes_meanwhile_does_not_lose_the_stop(tmp_path: Path) -> Non
     assert not leaves_at(bench)
     bench.network.bus_is_back(bench.now)
     bench.run(0.5)
-    assert leaves_at(bench) and bench.node.slave.state is NmtState.STOPPED
+    assert leaves_at(bench) and bench.node.slave.state is SlaveState.STOPPED
 
 
 def test_a_drive_that_ignores_its_stop_gets_its_nmt_stop_at_once(tmp_path: Path) -> None:

@@ -14,10 +14,10 @@ import pytest
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Code, Identity, Outcome, Request, Role, Source, command_of
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import STOP_ACTIONS
 from bridge.image import Value
-from bridge.master.listening import Listening
+from bridge.master.standby import Standby
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from bridge.text import as_json
 from tests.support.bench import Bench, write_site
@@ -247,7 +247,7 @@ def test_an_answer_says_forwarded_where_the_bus_says_what_was_asked(
 @pytest.mark.parametrize("target", RPDO)
 def test_while_the_bridge_listens_at_its_start_nothing_is_forwarded(tmp_path: Path, target: str) -> None:
     bench = bench_of(tmp_path, target)
-    bench.network.mastership._listening = Listening(LISTENS_S)
+    bench.network.mastership._listening = Standby(LISTENS_S)
     bench.run(0.01)
     for asked in ASKED[target]:
         outcome = asked.ask(bench)

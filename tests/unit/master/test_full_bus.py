@@ -10,8 +10,8 @@ from bridge.canopen import abort
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
 from bridge.canopen.sdo import Result, SdoError
-from bridge.command import Kind
-from bridge.command.link import NodeState
+from bridge.command import EventKind
+from bridge.command.drive_link import NodeState
 from tests.support.bench import write_site
 from tests.support.busy_bench import BusyBench
 
@@ -65,7 +65,7 @@ def test_where_the_others_frames_are_less_urgent_everything_goes_on(bench: BusyB
     bench.babble = LAST
     keep_running(bench, 3.0)
     assert bench.value("conveyor/node/nmt_state") == NmtState.OPERATIONAL
-    assert [event for event in bench.events if event.kind in (Kind.NODE_LOST, Kind.WATCHDOG)] == []
+    assert [event for event in bench.events if event.kind in (EventKind.NODE_LOST, EventKind.WATCHDOG)] == []
     assert bench.bus.status.frames_expired == 0
     assert any(moves(frame) for frame in bench.sent(RPDO1))
     results: list[Result] = []
@@ -91,7 +91,7 @@ def test_where_nothing_gets_through_the_node_is_told_lost_and_is_not_forgotten(b
     assert bench.plant.drives["conveyor/fu1"].quality.label == "good"
     bench.babble, began = FIRST, bench.now
     keep_running(bench, 0.5)
-    lost = [event for event in bench.events if event.kind is Kind.NODE_LOST]
+    lost = [event for event in bench.events if event.kind is EventKind.NODE_LOST]
     assert lost
     assert lost[0].time - began < 0.2 + 0.1, "supervision_ms, and a frame that was on its way"
     assert "no heartbeat for 200 ms" in str(bench.value("conveyor/node/boot_status"))

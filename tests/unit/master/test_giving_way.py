@@ -15,7 +15,7 @@ import pytest
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.command import Action, Identity, Request, Role, Source, Start
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.text import Text
 from tests.support.bench import Bench, write_site
 from tests.support.nightly import by_night
@@ -334,7 +334,7 @@ def test_a_node_that_is_to_stop_is_stopped_when_the_bus_is_back(
     bench.run(0.1)
     bench.bus.status.state = ControllerState.OK
     bench.run(0.3)
-    assert bench.node.slave.state is NmtState.STOPPED
+    assert bench.node.slave.state is SlaveState.STOPPED
     bench.run(2.0)
     assert speed(bench.node) == 0
 

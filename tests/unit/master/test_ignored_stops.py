@@ -8,9 +8,9 @@ import pytest
 
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
-from bridge.command import Action, Event, Identity, Kind, Role, Source
+from bridge.command import Action, Event, EventKind, Identity, Role, Source
 from bridge.command.audit import AuditEntry
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.stop_check.state import LastStop
 from bridge.image import Quality
 from bridge.master.ending import end, waits_for
@@ -82,7 +82,7 @@ def test_a_deaf_drive_is_named_and_its_node_stopped(bench: DeafBench) -> None:
     began = bench.now
     bench.run(10.0)
     (event,) = worst(bench)
-    assert event.kind is Kind.WATCHDOG
+    assert event.kind is EventKind.WATCHDOG
     assert event.source == FU1
     assert "ignores its stop: " in event.message
     assert "0474h is sent" in event.message

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Event, Identity, Kind, Role, Source
+from bridge.command import Action, Event, EventKind, Identity, Role, Source
 from bridge.master.answers import SHARE, answer_bits
 from tests.support.bench import Bench, write_site
 from tests.support.quick import Quick, quick_site
@@ -31,7 +31,7 @@ def running(tmp_path: Path, bus: str = "", node: str = "", drive: str = "") -> B
 
 
 def told(bench: Bench) -> list[Event]:
-    return [event for event in bench.events if event.kind is Kind.INTRUDER]
+    return [event for event in bench.events if event.kind is EventKind.INTRUDER]
 
 
 def nmt(bench: Bench, since: float = 0.0) -> list[bytes]:
@@ -279,7 +279,7 @@ def test_who_only_reads_is_told_and_stops_nobody(tmp_path: Path, data: bytes) ->
     quick.receive(Frame(0x602, data))
     quick.run(0.15)
     assert quick.states() == "ooo"
-    [event] = [event for event in quick.events if event.kind is Kind.INTRUDER]
+    [event] = [event for event in quick.events if event.kind is EventKind.INTRUDER]
     assert event.severity == 500 and "SDO request to n2 (602h)" in event.message
     assert quick.value("bus/can0/intruders") == 1
 

@@ -17,7 +17,7 @@ from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.master import intruders
 from bridge.master.intruders import Intruders
-from bridge.node.node import NodeCore
+from bridge.node.node_core import NodeCore
 from bridge.text import render
 
 RUN, STOP = b"\x01", b"\x00"

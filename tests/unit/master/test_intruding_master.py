@@ -10,7 +10,7 @@ from typing import Final
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Identity, Kind, Role, Source
+from bridge.command import Action, EventKind, Identity, Role, Source
 from bridge.drive import DriveState, StatusWords
 from bridge.master.answers import SHARE, Answers, answer_bits
 from tests.support.bench import Bench
@@ -212,7 +212,9 @@ def test_a_drive_that_answers_do_not_stop_is_reset_and_stays_stopped(
     bench.run(3.0)
     assert speed(bench.node) == 0
     assert str(bench.value("n/node/boot_status")).startswith("stopped by the bridge, because of an intruder")
-    told = [event for event in bench.events if event.kind is Kind.INTRUDER and "reset node" in event.message]
+    told = [
+        event for event in bench.events if event.kind is EventKind.INTRUDER and "reset node" in event.message
+    ]
     assert bool(told) == is_reset and len(told) <= 3
 
 

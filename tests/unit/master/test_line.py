@@ -6,7 +6,7 @@ from pathlib import Path
 
 from bridge.can.burstend import Burst
 from bridge.command import Action, Outcome, Request, Write
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import load_site
 from tests.support import sites
 from tests.support.bench import PLC, Bench, write_site

@@ -14,7 +14,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule, run_stat
 
 from bridge.canopen.frame import Frame
 from bridge.command import Action
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import NODE_ACTIONS
 from tests.support.nightly import examples
 from tests.support.quick import Quick, quick_site

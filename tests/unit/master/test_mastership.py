@@ -7,9 +7,9 @@ from typing import Any, cast
 import pytest
 
 from bridge.command import Event
-from bridge.master.listening import Listening
 from bridge.master.mastership import BusMastership
-from bridge.node.node import NodeCore
+from bridge.master.standby import Standby
+from bridge.node.node_core import NodeCore
 from bridge.text import Text, render
 from tests.support import sites
 
@@ -44,7 +44,7 @@ class Case:
         plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "none", 0)))))
         self.events = plant.events
         self.nodes = [Node(), Node(is_out_of_service=True)]
-        self.listening = Listening(0.0 if begins_acting else 1.0, lambda: 0.0)
+        self.listening = Standby(0.0 if begins_acting else 1.0, lambda: 0.0)
         nodes = cast("list[NodeCore]", self.nodes)
         self.mastership = BusMastership(plant.site.bus[0], nodes, plant.events, self.listening)
 

@@ -15,7 +15,7 @@ from bridge.command.node import Enforce
 from bridge.image import Quality
 from bridge.mapping.model import IdentityRule
 from bridge.master.line import BusLine
-from bridge.master.standstill import Alarm, StoodStill
+from bridge.master.standstill import StoodStill, WatchdogTimer
 from tests.support.bench import NORD, PLC, Bench, write_site
 
 RPDO1 = 0x205
@@ -252,7 +252,7 @@ def test_a_process_stopped_at_the_end_of_its_last_look_at_the_clock_sends_nothin
 ) -> None:
     """The time that it has read is right, and a second old."""
     running(bench)
-    alarm, look = Alarm(), BusLine.stood_still
+    alarm, look = WatchdogTimer(), BusLine.stood_still
 
     def stand_still_after(line: BusLine, since: float) -> bool:
         found = look(line, since)
@@ -280,7 +280,7 @@ def test_a_process_stopped_on_the_way_to_the_kernel_hands_nothing_over(
 ) -> None:
     """Behind both looks: the alarm breaks in."""
     running(bench)
-    alarm, hand_over = Alarm(), bench.bus.burst
+    alarm, hand_over = WatchdogTimer(), bench.bus.burst
 
     def stand_still_before(burst: Burst, now: float, **more: bool) -> None:
         if burst.can_id == RPDO1 and alarm.breaks_in:

@@ -9,7 +9,7 @@ import pytest
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
 from bridge.command import Action, Code, Identity, Source
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from tests.support.quick import OPERATIONAL, PRE_OPERATIONAL, STOPPED, Quick, quick_site, state_of
 
 START, STOP, ENTER, RESET, RESET_COMMUNICATION = 0x01, 0x02, 0x80, 0x81, 0x82

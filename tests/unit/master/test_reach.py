@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from bridge.canopen.nmt import NmtCommand
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.master.reach import Reach
 from bridge.text import render
 

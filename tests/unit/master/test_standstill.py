@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from bridge.master.standstill import Alarm, SignalAlarm, StoodStill
+from bridge.master.standstill import SignalAlarm, StoodStill, WatchdogTimer
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def alarm() -> Iterator[SignalAlarm]:
 
 
 def test_one_for_a_shared_process_never_rings() -> None:
-    alarm = Alarm()
+    alarm = WatchdogTimer()
     alarm.breaks_in = True
     alarm.set(1e-9)
     assert not alarm.rang

@@ -8,7 +8,7 @@ from typing import cast
 import pytest
 
 from bridge.config import NodeTable
-from bridge.config.fields import MandatoryMissing
+from bridge.config.field_types import MandatoryMissing
 from bridge.master.startup import StartGate
 from bridge.node.neighbours import Neighbour
 from tests.support import sites

@@ -8,8 +8,8 @@ import pytest
 
 from bridge.canopen.frame import Frame
 from bridge.command import Action
-from bridge.command.link import NodeState
-from bridge.node.boot.status import HINTS
+from bridge.command.drive_link import NodeState
+from bridge.node.boot.error_status import HINTS
 from bridge.text import render
 from tests.support.quick import OPERATIONAL, STOPPED, Quick, quick_site
 

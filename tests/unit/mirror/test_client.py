@@ -10,13 +10,13 @@ from typing import cast
 import pytest
 
 from bridge.command import Action, Code, Command, Do, Identity, Outcome, Plant, Request, Source, TakeControl
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Point, Quality
 from bridge.mirror import MirrorClient, MirrorPublisher, protocol
 from bridge.mirror import client as mirror_client
 from bridge.mirror.protocol import Answered, Changed, Delta, Snapshot
 from bridge.text import Text
-from bridge.zenohlink import IncomingQuery, Message
+from bridge.zenohlink import IncomingQuery, Sample
 from tests.support.views import view_of
 from tests.support.zenoh_site import READY, drive_says, epoch, make_plant, node_is
 
@@ -30,10 +30,10 @@ class Query:
 
     payload: bytes
     key: str = protocol.key_of(protocol.REQUESTS, "opcua")
-    sent: list[Message] = field(default_factory=list[Message])
+    sent: list[Sample] = field(default_factory=list[Sample])
     is_finished: bool = False
 
-    def send(self, messages: list[Message]) -> None:
+    def send(self, messages: list[Sample]) -> None:
         self.sent += messages
 
     def finish(self) -> None:
@@ -59,7 +59,7 @@ class Bus:
         self.count = len(self.plant.image.points)
         self.publisher._feed.take(self.count)
 
-    def _on_message(self, message: Message) -> bool:
+    def _on_message(self, message: Sample) -> bool:
         self.deltas.append(protocol.decode_delta(message.payload, self.count))
         return True
 
@@ -129,8 +129,8 @@ def read(value: int) -> tuple[Changed, ...]:
     return (Changed(0, value, Quality.GOOD, 1.0, ""),)
 
 
-def delta(sequence: int, value: int) -> Message:
-    return Message(protocol.DELTA, protocol.encode(Delta(INSTANCE, sequence, read(value))))
+def delta(sequence: int, value: int) -> Sample:
+    return Sample(protocol.DELTA, protocol.encode(Delta(INSTANCE, sequence, read(value))))
 
 
 @pytest.fixture
@@ -157,7 +157,7 @@ async def test_what_the_image_shows_already_is_answered_at_once(front: MirrorCli
 async def test_a_text_is_shown_in_words_and_known_as_what_it_is(front: MirrorClient) -> None:
     said = Text.of("node.lost")
     told = Delta(INSTANCE, 2, (Changed(0, said, Quality.GOOD, 1.0, ""),))
-    front._on_delta(Message(protocol.DELTA, protocol.encode(told)))
+    front._on_delta(Sample(protocol.DELTA, protocol.encode(told)))
     assert (front.image[0].value, front.image.said(0)) == ("node lost", said)
 
 

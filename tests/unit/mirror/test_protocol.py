@@ -18,8 +18,8 @@ from bridge.command import (
     Code,
     Do,
     Event,
+    EventKind,
     Identity,
-    Kind,
     Outcome,
     ReadParameter,
     Rejection,
@@ -120,7 +120,7 @@ def test_whatever_was_refused_can_be_told(
 @given(any_text, any_text, any_text | st.integers() | st.floats(allow_nan=False))
 def test_whatever_happens_can_be_told(source: str, message: str, value: str | int | float) -> None:
     told = Text.plain(message)
-    protocol.decode(Event, protocol.encode(Event(1.5, Kind.REFUSED, source, 300, told)))
+    protocol.decode(Event, protocol.encode(Event(1.5, EventKind.REFUSED, source, 300, told)))
     protocol.decode(Answered, protocol.encode(Answered(Outcome(Code.NOT_VALID, told), 1, 1)))
     delta = Delta(1, 1, (Changed(0, 5, Quality.GOOD, 0, ""), Changed(1, value, Quality.GOOD, 0, told)))
     back = protocol.decode_delta(protocol.encode(delta), 2)
@@ -174,8 +174,8 @@ def test_a_snapshot_brings_the_nature_of_every_point() -> None:
     assert protocol.decode_snapshot(protocol.encode(Snapshot(1, 2, (rich,), ()))).points == (rich,)
 
 
-@given(times, st.sampled_from(Kind), st.text(max_size=10), st.integers(1, 1000), said)
-def test_events_read_back(time: float, kind: Kind, source: str, severity: int, told: Said) -> None:
+@given(times, st.sampled_from(EventKind), st.text(max_size=10), st.integers(1, 1000), said)
+def test_events_read_back(time: float, kind: EventKind, source: str, severity: int, told: Said) -> None:
     event = Event(time, kind, source, severity, told)
     assert protocol.decode(Event, protocol.encode(event)) == event
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from bridge.canopen.frame import Frame
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from tests.support.quick import OPERATIONAL, Quick, QuickNode, quick_site
 
 

@@ -11,13 +11,13 @@ import pytest
 
 from bridge.canopen.frame import Frame
 from bridge.command import Outcome, Request, Start
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import load_site
 from bridge.mapping import load_family
 from bridge.sim.catalogue import SIMULATED, simulate_node
 from bridge.sim.cia402 import cia402_states
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.lenze.lenze_drive import DeviceState
 from bridge.sim.lenze.lenze_motec import LenzeMotec
 from bridge.sim.nord import nord_states
@@ -53,15 +53,15 @@ def is_running(node: object) -> bool:
     """Whether any drive of the node has its motor energised and takes the controller's setpoint."""
     match node:
         case NordTu4():
-            return any(drive.state is nord_states.State.ENABLED for drive in node.drives)
+            return any(drive.state is nord_states.NordState.ENABLED for drive in node.drives)
         case NordSingle():
-            return node.drive.state is nord_states.State.ENABLED
+            return node.drive.state is nord_states.NordState.ENABLED
         case Stoeber5000():
             return any(axis.state is AxisState.ENABLED for axis in node.axes)
         case LenzeMotec():
             return node.drive.state is DeviceState.OPERATION_ENABLED
         case Cia402Drive():
-            return node.axis.state is cia402_states.State.ENABLED
+            return node.axis.state is cia402_states.Cia402State.ENABLED
         case _:
             raise AssertionError(node)
 
@@ -310,7 +310,7 @@ def failing(folder: Path, mapping: str) -> Bench:
 
 def test_it_stays_stopped_between_attempts_and_is_woken_for_each(tmp_path: Path) -> None:
     bench = failing(tmp_path, "cia402/profile-velocity")
-    assert bench.node.slave.state is NmtState.STOPPED
+    assert bench.node.slave.state is SlaveState.STOPPED
     commands = nmt(bench)
     assert len(commands) > 6
     assert commands[:2] == [0x80, 0x02]
@@ -321,7 +321,7 @@ def test_it_stays_stopped_between_attempts_and_is_woken_for_each(tmp_path: Path)
 @pytest.mark.parametrize("mapping", ["lenze/8400-motec", "nord/sk-tu4-cao", "stoeber/5000"])
 def test_where_a_stopped_node_runs_on_it_is_reset_and_that_once(tmp_path: Path, mapping: str) -> None:
     bench = failing(tmp_path, mapping)
-    assert bench.node.slave.state is NmtState.STOPPED
+    assert bench.node.slave.state is SlaveState.STOPPED
     commands = nmt(bench)
     assert commands.count(0x81) == 1
     assert commands[-1] == 0x02

@@ -14,8 +14,8 @@ from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
-from bridge.sim.cia402.cia402_states import State
+from bridge.sim.cia402.cia402_settings import Cia402Mode, Cia402Settings
+from bridge.sim.cia402.cia402_states import Cia402State
 from tests.support.bench import PLC, Bench
 
 DRIVE = "axis/drive"
@@ -393,7 +393,7 @@ def test_a_silent_controller_lets_the_motor_coast(booted) -> None:
     start(bench)
     keep(bench, 1.0, velocity=600.0)
     bench.run(1.2)
-    assert bench.node.axis.state is State.SWITCH_ON_DISABLED
+    assert bench.node.axis.state is Cia402State.SWITCH_ON_DISABLED
     assert bench.node.axis.actual_rpm == 0
 
 
@@ -403,7 +403,7 @@ def test_configured_it_stops_when_the_bridge_falls_silent(booted) -> None:
     keep(bench, 1.0, velocity=600.0)
     bench.cut = True
     bench.hang(1.5)  # the bursts end after the dead-man time, then 300 ms, then the ramp
-    assert bench.node.axis.state is State.SWITCH_ON_DISABLED
+    assert bench.node.axis.state is Cia402State.SWITCH_ON_DISABLED
     assert bench.node.axis.actual_rpm == 0
     assert [frame.data[:2].hex() for frame in bench.sent(0x085)] == ["3081"]
 
@@ -414,13 +414,13 @@ def test_guarding_stops_it_too(booted) -> None:
     keep(bench, 1.0, velocity=600.0)
     bench.cut = True
     bench.hang(2.5)
-    assert bench.node.axis.state is State.FAULT
+    assert bench.node.axis.state is Cia402State.FAULT
 
 
 def test_the_mode_can_be_another_for_a_while(booted) -> None:
     """Homing before positioning: 6060h by hand, then the mode's bits."""
     bench = booted("profile-position", homing_method=37, home_offset=-7)
-    bench.node.settings.mode = Mode.HOMING
+    bench.node.settings.mode = Cia402Mode.HOMING
     bench.node.axis.set_mode()
     start(bench)
     assert bench.value("axis/drive/actual/mode") == 6
@@ -449,14 +449,14 @@ def test_a_start_after_a_quick_stop_enables_again(booted, option: int) -> None:
 def test_pp_a_position_that_the_drive_does_not_take_is_told_and_the_next_has_its_edge(booted) -> None:
     bench = booted("profile-position")
     start(bench)
-    bench.node.settings.mode = Mode.VELOCITY  # no bit 12 there
+    bench.node.settings.mode = Cia402Mode.VELOCITY  # no bit 12 there
     bench.node.axis.set_mode()
     bench.write(DRIVE, position=10_000)
     keep_alive(bench, 1.5)
     untaken = [event.message for event in bench.events if "has not taken" in event.message]
     assert untaken == ["the drive has not taken the position that was written: no answer within 1 s"]
     assert not word(bench.sent(0x205)[-1]) & 0x10
-    bench.node.settings.mode = Mode.PROFILE_POSITION
+    bench.node.settings.mode = Cia402Mode.PROFILE_POSITION
     bench.node.axis.set_mode()
     assert bench.write(DRIVE, position=20_000).code is Code.NOT_CONFIGURED, "the mode has to be seen first"
     keep_alive(bench, 1.5)

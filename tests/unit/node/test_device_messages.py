@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bridge.command import Kind
+from bridge.command import EventKind
 from bridge.northbound.gateway.nets import net_of
 from tests.support.devices import device_bench, encoder
 
@@ -16,7 +16,7 @@ def test_its_emergencies_are_events(tmp_path: Path) -> None:
     for code in ("30 81", "00 00"):
         node.emcy(bytes.fromhex(f"{code} 11 00 00 00 00 00"))
         bench.run(0.1)
-    told = [one for one in bench.events if one.kind is Kind.EMERGENCY]
+    told = [one for one in bench.events if one.kind is EventKind.EMERGENCY]
     assert [(one.source, one.severity) for one in told] == [("shaft", 700), ("shaft", 100)]
     assert told[0].message.startswith("emergency 8130h: ")
     assert told[1].message == "emergency 0000h: no fault"

@@ -10,7 +10,7 @@ from bridge.command import Action, Code, Outcome, Request, command_of
 from bridge.drive import DriveState
 from bridge.mapping import load_family
 from bridge.mapping.loader import mappings_dir
-from bridge.mapping.site import load_site_and_families
+from bridge.mapping.site_families import load_site_and_families
 from tests.support.bench import PLC, Bench
 from tests.support.docs import page
 from tests.support.pdo_node import PdoNode

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from bridge.canopen.emcy import Emergency
 from bridge.canopen.frame import Frame
-from bridge.command import Kind
+from bridge.command import EventKind
 from bridge.node.emergency_log import EmergencyLog
 from tests.support.bench import Bench, write_site
 
@@ -18,7 +18,7 @@ EMCY = 0x085
 
 
 def emergencies(bench: Bench) -> list[str]:
-    return [event.message for event in bench.events if event.kind is Kind.EMERGENCY]
+    return [event.message for event in bench.events if event.kind is EventKind.EMERGENCY]
 
 
 def test_the_last_eight_emergencies_can_be_read(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import load_site
 from bridge.mapping import load_family
 from bridge.mapping.loader import mapping_folders

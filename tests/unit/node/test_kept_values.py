@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Action
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from tests.support.quick import ENGINEER, Quick, QuickNode, quick_site
 
 CONFIGURE = '[[bus.node.configure]]\nobject = "2097:01"\ntype = "uint16"\nvalue = 500'

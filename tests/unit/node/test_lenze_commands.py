@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command import Action, Code, Identity, Kind, Outcome, Request, Role, Source, command_of
+from bridge.command import Action, Code, EventKind, Identity, Outcome, Request, Role, Source, command_of
 from bridge.config import load_site
 from bridge.mapping import load_family
 from bridge.sim.lenze.lenze_motec import LenzeMotec
@@ -95,4 +95,4 @@ def test_a_node_that_was_told_to_reset_is_brought_back(bench: Bench, ask: Callab
     assert ask(Action.WRITE_PARAMETER, parameter=RESET_NODE, value=1).ok
     bench.run(5.0)
     assert str(bench.value("conveyor/node/boot_status")).startswith("ok")
-    assert any(event.kind is Kind.NODE_BACK for event in bench.events)
+    assert any(event.kind is EventKind.NODE_BACK for event in bench.events)

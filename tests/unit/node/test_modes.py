@@ -13,7 +13,7 @@ from bridge.config import load_site
 from bridge.image import Quality, Reading
 from bridge.mapping import load_family
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
+from bridge.sim.cia402.cia402_settings import Cia402Mode, Cia402Settings
 from tests.support.bench import Bench
 from tests.support.nightly import examples
 
@@ -35,12 +35,12 @@ fieldbus_timeout_ms = 500
 [modbus]
 """
 OF_MODE = {
-    "velocity": (Mode.VELOCITY, "velocity", ()),
-    "profile-velocity": (Mode.PROFILE_VELOCITY, "velocity", ("standstill", "slippage")),
-    "profile-position": (Mode.PROFILE_POSITION, "position", ("following_error",)),
-    "homing": (Mode.HOMING, "", ("homing_attained", "homing_error")),
-    "cyclic-position": (Mode.CYCLIC_POSITION, "position", ("follows_command", "following_error")),
-    "cyclic-velocity": (Mode.CYCLIC_VELOCITY, "velocity", ("follows_command",)),
+    "velocity": (Cia402Mode.VELOCITY, "velocity", ()),
+    "profile-velocity": (Cia402Mode.PROFILE_VELOCITY, "velocity", ("standstill", "slippage")),
+    "profile-position": (Cia402Mode.PROFILE_POSITION, "position", ("following_error",)),
+    "homing": (Cia402Mode.HOMING, "", ("homing_attained", "homing_error")),
+    "cyclic-position": (Cia402Mode.CYCLIC_POSITION, "position", ("follows_command", "following_error")),
+    "cyclic-velocity": (Cia402Mode.CYCLIC_VELOCITY, "velocity", ("follows_command",)),
 }
 """By mapping: its mode, the setpoint and the bits that mean something in that mode only."""
 READ_S = 9.0
@@ -62,7 +62,7 @@ def point(bench: Bench, leaf: str) -> Reading:
     return bench.plant.image.read(f"{DRIVE}/{leaf}")
 
 
-def change(bench: Bench, mode: Mode) -> None:
+def change(bench: Bench, mode: Cia402Mode) -> None:
     """By another hand: at the drive's panel."""
     bench.node.settings.mode = mode
     bench.node.axis.set_mode()
@@ -80,7 +80,7 @@ def test_in_its_own_mode_everything_is_served(tmp_path: Path, mapping: str) -> N
 
 def test_in_another_mode_a_setpoint_is_refused_and_its_bits_are_not_served(tmp_path: Path) -> None:
     bench = booted(tmp_path, "profile-position")
-    change(bench, Mode.HOMING)
+    change(bench, Cia402Mode.HOMING)
     bench.run(READ_S)
     position = point(bench, "command/position")
     assert (position.quality, position.reason) == (
@@ -98,7 +98,7 @@ def test_in_another_mode_a_setpoint_is_refused_and_its_bits_are_not_served(tmp_p
     assert bench.ask(Action.DISABLE_VOLTAGE, DRIVE).ok
     changed = [event for event in bench.events if "has another meaning" in event.message]
     assert changed
-    change(bench, Mode.PROFILE_POSITION)
+    change(bench, Cia402Mode.PROFILE_POSITION)
     bench.run(READ_S)
     assert point(bench, "command/position").quality is Quality.GOOD
 
@@ -106,10 +106,10 @@ def test_in_another_mode_a_setpoint_is_refused_and_its_bits_are_not_served(tmp_p
 @settings(max_examples=examples(25), suppress_health_check=list(HealthCheck))
 @given(
     mapping=st.sampled_from(list(OF_MODE)),
-    modes=st.lists(st.sampled_from(list(Mode)), min_size=1, max_size=4),
+    modes=st.lists(st.sampled_from(list(Cia402Mode)), min_size=1, max_size=4),
 )
 def test_whatever_the_mode_nothing_is_good_that_means_something_else(
-    tmp_path_factory: pytest.TempPathFactory, mapping: str, modes: list[Mode]
+    tmp_path_factory: pytest.TempPathFactory, mapping: str, modes: list[Cia402Mode]
 ) -> None:
     bench = booted(tmp_path_factory.mktemp("site"), mapping)
     own, setpoint, bits = OF_MODE[mapping]
@@ -132,7 +132,7 @@ def test_a_mode_that_a_tpdo_tells_counts_at_once(tmp_path: Path, mapping: str) -
     own, setpoint, bits = OF_MODE[mapping]
     reached = ("target_reached",) if f"{DRIVE}/actual/target_reached" in bench.plant.image.index else ()
     assert all(point(bench, f"actual/{bit}").quality is Quality.GOOD for bit in (*bits, *reached))
-    change(bench, Mode.HOMING if own is not Mode.HOMING else Mode.VELOCITY)
+    change(bench, Cia402Mode.HOMING if own is not Cia402Mode.HOMING else Cia402Mode.VELOCITY)
     bench.run(0.15)
     for bit in (*bits, *reached):
         assert point(bench, f"actual/{bit}").quality is Quality.DISABLED, bit

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.sim.core.habit import Habit, Rule
 from bridge.text import render
 from tests.support.bench import Bench, write_site

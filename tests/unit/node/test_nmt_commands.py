@@ -8,7 +8,7 @@ import pytest
 
 from bridge.canopen.nmt import NmtCommand
 from bridge.command import Action, Code, Event, Identity, Outcome, Request, Role, Source
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import Do
 from bridge.node.nmt_commands import NMT, CommandedNode, answer, carry_out, refusal
 from bridge.text import Text, render

@@ -12,10 +12,10 @@ from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.nord.nord_single import NordSingle
 from bridge.sim.nord.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support.bench import Bench
 
@@ -134,7 +134,7 @@ def test_p105_is_read_from_the_drive_and_scales(make_single, mapping: str):
 def test_the_second_view_switches_its_tpdo_on(make_single):
     bench = make_single("nord/sk-tu3-cao", site={"drive": AMPERES})
     assert "1801h: COB-ID 285h, on" in status(bench)
-    assert bench.node.slave.state is NmtState.OPERATIONAL
+    assert bench.node.slave.state is SlaveState.OPERATIONAL
     start(bench, frequency=25.0)
     assert bench.sent(0x305)[-1].data.hex() == "7f04002000000000"
     assert len(bench.sent(0x285)[-1].data) == 8
@@ -186,7 +186,7 @@ def test_a_view_that_the_node_maps_otherwise_is_brought_into_order(make):
     node._communication.save()
     bench = make("nord/sk-tu3-cao", node)
     assert "1A01h = 3001:00/16 3003:01/16 3003:02/16 3003:03/16" in status(bench)
-    assert node.slave.state is NmtState.OPERATIONAL
+    assert node.slave.state is SlaveState.OPERATIONAL
 
 
 # RJ45
@@ -264,7 +264,7 @@ def test_a_fault_is_told_by_its_number_and_acknowledged(make_single, mapping: st
 def test_a_silent_bridge_is_stopped_by_p513(make_single, mapping: str):
     bench = make_single(mapping, p513_s=0.3)
     start(bench, frequency=25.0)
-    assert bench.node.drive.state is State.ENABLED
+    assert bench.node.drive.state is NordState.ENABLED
     bench.cut = True
     bench.run(0.4)
     assert (bench.node.drive.fault_tenths, bench.node.drive.output_hz) == (102, 0.0)
@@ -275,7 +275,7 @@ def test_the_link_of_a_tu3_is_told_as_10_8(make_single):
     start(bench, frequency=25.0)
     bench.node.drop_drive()
     hold(bench, 1.0, control_word=0x047F)
-    assert bench.node.drive.state is State.FAULT
+    assert bench.node.drive.state is NordState.FAULT
     assert bench.value(f"{DRIVE}/status/state") == DriveState.NOT_READY, "the interface has no status of it"
     bench.node.restore_drive()
     hold(bench, 2.0, control_word=0x047E)
@@ -291,7 +291,7 @@ def test_the_profile_is_turned_on_and_mapped(make_profile):
     bench = make_profile()
     assert bench.node.profile.is_on
     assert "20A8:01 = 1" in status(bench)
-    assert bench.node.slave.state is NmtState.OPERATIONAL
+    assert bench.node.slave.state is SlaveState.OPERATIONAL
     start(bench, velocity=-750.0)
     assert bench.sent(0x205)[-1].data.hex() == "7f0412fd"
     assert bench.node.drives[0].output_hz == -25.0
@@ -306,7 +306,7 @@ def test_the_profile_of_a_node_that_has_it_is_not_written_again(make_profile):
     bench.node.power_cycle()
     before = len(bench.log)
     bench.run(4.0)
-    assert bench.node.slave.state is NmtState.OPERATIONAL
+    assert bench.node.slave.state is SlaveState.OPERATIONAL
     assert downloads(bench, before) <= {"1710"}
 
 

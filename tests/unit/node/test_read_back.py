@@ -12,7 +12,7 @@ import pytest
 from bridge.command import Action
 from bridge.command.audit import AuditEntry
 from bridge.command.stop_check.state import LastStop
-from bridge.condition.findings import ImageReader, Rank, Trouble, of_node
+from bridge.condition.point_troubles import ImageReader, Rank, Trouble, of_node
 from bridge.image import Quality
 from bridge.project import load_project
 from bridge.sim.catalogue import simulate_description

@@ -11,8 +11,8 @@ from bridge.command import (
     Action,
     Code,
     Do,
+    EventKind,
     Identity,
-    Kind,
     Outcome,
     ReadParameter,
     Rejection,
@@ -79,7 +79,7 @@ def test_it_counts_once_and_is_one_event(bench: Bench, what: str) -> None:
     (outcome,) = outcomes
     assert not outcome.ok
     assert bench.number("bridge/refused_writes") == before + 1, outcome
-    assert len([event for event in bench.events if event.kind is Kind.REFUSED]) == 1
+    assert len([event for event in bench.events if event.kind is EventKind.REFUSED]) == 1
     target = REFUSED[what].target
     if target in bench.plant.drives:
         assert bench.number(f"{target}/supervision/refused_writes") == 1

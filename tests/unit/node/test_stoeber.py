@@ -13,7 +13,7 @@ from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from bridge.sim.stoeber.stoeber_axis import AxisState
 from tests.support.bench import PLC, Bench
@@ -83,7 +83,7 @@ def start(bench: Bench, rpm: float = 1500.0, drive: str = DRIVE_1) -> None:
 
 
 def test_the_boot_up_takes_the_mapping_as_the_drive_has_it(bench: Bench):
-    assert bench.node.slave.state is NmtState.OPERATIONAL
+    assert bench.node.slave.state is SlaveState.OPERATIONAL
     status = bench.value("lift/node/boot_status")
     assert "not" not in str(status), status
     assert bench.value("lift/drive/status/state") == DriveState.SWITCH_ON_INHIBITED, "by the quick stop"
@@ -125,7 +125,7 @@ def test_a_silent_bridge_is_stopped_by_life_guarding(bench: Bench):
     bench.run(1.0)
     assert bench.node.device.event == 52
     assert bench.node.axes[0].speed_rpm == 0
-    assert bench.node.slave.state is NmtState.PRE_OPERATIONAL
+    assert bench.node.slave.state is SlaveState.PRE_OPERATIONAL
 
 
 @pytest.mark.parametrize("action", [Action.STOP, Action.QUICK_STOP])
@@ -183,7 +183,7 @@ def test_a_mapping_that_is_there_already_is_not_written(make):
     """The drive's count is always 6, and reads 0 in the places that it does not use."""
     bench = make(drive=RPDO_MAPPING.format(bits=16))
     assert downloads(bench) == {"0c10", "0d10"}
-    assert bench.node.slave.state is NmtState.OPERATIONAL
+    assert bench.node.slave.state is SlaveState.OPERATIONAL
 
 
 def test_a_mapping_cannot_be_changed_and_the_boot_up_says_why(make):

@@ -18,10 +18,10 @@ from bridge.bustools.bystander import Standstill
 from bridge.canopen.sdo import SdoChannel
 from bridge.command import Action, Identity, Outcome, Request, Role, Source, WriteParameter
 from bridge.node.parameters.run import run
+from bridge.northbound.gateway.gateway_session import GatewaySession
 from bridge.northbound.gateway.nets import net_of
-from bridge.northbound.gateway.session import Session
-from bridge.parameter import DriveParameters, Ledger, ParameterError, Written
-from bridge.parameter.effect import Effect, Verdict, judge
+from bridge.parameter import DriveParameters, Ledger, ParameterError, ParameterWritten
+from bridge.parameter.write_effect import Effect, WriteVerdict, judge
 from tests.support.bench import Bench
 from tests.support.devices import IO_BLOCK, device_bench, io_block
 from tests.support.process import REPOSITORY
@@ -116,7 +116,7 @@ def by_gateway(identity: Identity) -> Way:
     def write(block: Block, name: str) -> None:
         bench = block.bench
         net = net_of(bench.network.bus, 1, bench.plant.catalogue.nodes.values(), Path("tap"))
-        session = Session(net, identity, bench.view.submit)
+        session = GatewaySession(net, identity, bench.view.submit)
         line = f"[1] 1 20 w 0x{name[:4]} 0x{name[5:]} u8 1\r\n"
         session.receive(line.encode(), bench.now)
         bench.run(0.3)
@@ -133,7 +133,7 @@ def by_command_line(block: Block, name: str) -> None:
     (outputs,) = device.commanded
     guard = Standstill(node.names, node.family, None, None, force=True, outputs=outputs.words)
     channel = SdoChannel(0x600 + 20, 0x580 + 20, 0.2)
-    results: list[Written | ParameterError] = []
+    results: list[ParameterWritten | ParameterError] = []
     entry = node.names.resolve(name).as_bytes
     steps = access.write(entry, "01", block.bench.now, guard.gate)
     run(steps, lambda _: channel, lambda: block.bench.now, results.append)
@@ -165,7 +165,7 @@ def test_an_output_is_reached_by_no_way_but_its_owners(tmp_path: Path, way: str,
         write(block, name)
         written = block.downloads(name) - before
         verdict = judge(effect, is_engineer=is_engineer, is_moving=moving)
-        if verdict is not Verdict.WRITTEN:
+        if verdict is not WriteVerdict.WRITTEN:
             assert not written, f"{name} is written by {way}: {verdict}"
         elif is_engineer or way == "zenoh":
             assert written == 1, f"{name} is not written by {way}"
@@ -192,11 +192,11 @@ _ARGUMENTS: Final = 5
 
 
 def _writes(tree: ast.AST) -> bool:
-    """Whether a module calls ``SdoChannel.write``, or makes a ``Write`` for a dialogue."""
+    """Whether a module calls ``SdoChannel.write``, or makes an ``SdoWrite`` for a dialogue."""
     for node in ast.walk(tree):
         match node:
             case ast.ImportFrom(module="bridge.canopen.dialogue"):
-                if any(one.name == "Write" for one in node.names):
+                if any(one.name == "SdoWrite" for one in node.names):
                     return True
             case ast.Call(func=ast.Attribute(attr="write")):
                 if len(node.args) + len(node.keywords) >= _ARGUMENTS:

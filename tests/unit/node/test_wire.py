@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bridge.drive.own_supervision import judge
+from bridge.drive.own_judgement import judge
 from bridge.master.network import Network
 from bridge.node.boot.actions import BootResult, DrivePlan, WordFacts
-from bridge.node.node import NodeCore
+from bridge.node.node_core import NodeCore
 from bridge.text import Text, render
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block
 from tests.support.nodes import device_plant

@@ -9,8 +9,8 @@ import pytest
 
 from bridge.command import Action, Identity, Outcome, Request, Source
 from bridge.northbound.modbus.device_unit import DeviceUnit
-from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, Refused
-from bridge.northbound.modbus.registers import ACKNOWLEDGE, KEEP_ALIVE, STOP, Table, Words32
+from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, ModbusException
+from bridge.northbound.modbus.registers import ACKNOWLEDGE, KEEP_ALIVE, STOP, RegisterTable, Words32
 from bridge.northbound.modbus.units import device_maps
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.zenoh.commands import BadCommand, Commands
@@ -44,21 +44,21 @@ class TestModbus:
     def test_the_map(self, bench: Bench) -> None:
         (device,) = device_maps(bench.plant.catalogue)
         places = {row.name: (row.table, row.address, row.type, row.access) for row in device.rows}
-        assert places["output/valves"] == (Table.HOLDING_REGISTER, 32, "uint16", "rw")
-        assert places["output/speed"] == (Table.HOLDING_REGISTER, 33, "float32", "rw")
-        assert places["output/lamp"] == (Table.HOLDING_REGISTER, 35, "int16", "rw")
-        assert places["output/valves/outlet"] == (Table.COIL, 1, "bool", "rw")
-        assert places["acknowledge"] == (Table.HOLDING_REGISTER, 11, "uint16", "rw")
+        assert places["output/valves"] == (RegisterTable.HOLDING_REGISTER, 32, "uint16", "rw")
+        assert places["output/speed"] == (RegisterTable.HOLDING_REGISTER, 33, "float32", "rw")
+        assert places["output/lamp"] == (RegisterTable.HOLDING_REGISTER, 35, "int16", "rw")
+        assert places["output/valves/outlet"] == (RegisterTable.COIL, 1, "bool", "rw")
+        assert places["acknowledge"] == (RegisterTable.HOLDING_REGISTER, 11, "uint16", "rw")
 
     def test_one_write_is_one_telegram(self, bench: Bench, unit: DeviceUnit) -> None:
         carried_out(bench, unit.plan_words(32, [0], PLC))
         (done,) = carried_out(bench, unit.plan_words(32, [3, 0x4120, 0, 0xFFFF], PLC))
         assert done.forwarded
-        assert unit.read_words(Table.HOLDING_REGISTER, 32, 4, PLC) == [3, 0x4120, 0, 0xFFFF]
+        assert unit.read_words(RegisterTable.HOLDING_REGISTER, 32, 4, PLC) == [3, 0x4120, 0, 0xFFFF]
         assert bench.node.number("6411:01") == 100
-        assert unit.read_bits(Table.COIL, 0, 2) == [True, True]
-        assert unit.read_words(Table.HOLDING_REGISTER, KEEP_ALIVE, 1, PLC) == [1]
-        known = unit.read_words(Table.INPUT_REGISTER, 10, 22, PLC)
+        assert unit.read_bits(RegisterTable.COIL, 0, 2) == [True, True]
+        assert unit.read_words(RegisterTable.HOLDING_REGISTER, KEEP_ALIVE, 1, PLC) == [1]
+        known = unit.read_words(RegisterTable.INPUT_REGISTER, 10, 22, PLC)
         assert (known[4], known[10], known[14]) == (2, 2, 2), "watchdog runs, owned by modbus, two telegrams"
 
     def test_coils_are_bits_of_outputs(self, bench: Bench, unit: DeviceUnit) -> None:
@@ -98,7 +98,7 @@ class TestModbus:
     def test_what_is_refused(
         self, unit: DeviceUnit, start: int, words: list[int], code: ExceptionCode
     ) -> None:
-        with pytest.raises(Refused) as told:
+        with pytest.raises(ModbusException) as told:
             unit.plan_words(start, words, PLC)
         assert told.value.code is code
 

@@ -10,7 +10,7 @@ import pytest
 
 from bridge.bustools.decode import Decoder
 from bridge.canopen.frame import Frame
-from bridge.northbound.modbus.registers import DriveMap, Table
+from bridge.northbound.modbus.registers import DriveMap, RegisterTable
 from bridge.northbound.opcua.nodes import ObjectNode, VariableKind, VariableNode, layout
 from bridge.northbound.zenoh.keys import KeySpace
 from tests.support.bench import PLC, Bench
@@ -59,10 +59,10 @@ def test_modbus_has_two_registers_of_the_right_type_for_each(bench: Bench) -> No
         for leaf in ("command/target", "command/mode", "command/valve_a", "actual/in_position")
     }
     assert shown == {
-        "command/target": (Table.HOLDING_REGISTER, "float32"),
-        "command/mode": (Table.HOLDING_REGISTER, "uint32"),
-        "command/valve_a": (Table.HOLDING_REGISTER, "uint32"),
-        "actual/in_position": (Table.INPUT_REGISTER, "uint32"),
+        "command/target": (RegisterTable.HOLDING_REGISTER, "float32"),
+        "command/mode": (RegisterTable.HOLDING_REGISTER, "uint32"),
+        "command/valve_a": (RegisterTable.HOLDING_REGISTER, "uint32"),
+        "actual/in_position": (RegisterTable.INPUT_REGISTER, "uint32"),
     }
     assert [rows[f"command/{word}"].address for word in ("speed", "target_low", "valves")] == [1, 2, 5]
 

@@ -6,16 +6,16 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.command import Event, Kind
+from bridge.command import Event, EventKind
 from bridge.mirror import MirrorClient, protocol
 from bridge.northbound.view import View
 from bridge.text import Text
-from bridge.zenohlink import Message
+from bridge.zenohlink import Sample
 from tests.support import sites
 from tests.support.views import view_of
 
 SITE = sites.site(sites.bus(sites.node(sites.drive("fu1", "modbus", 0))))
-TRIP = Event(10.0, Kind.WATCHDOG, "conveyor/fu1", 900, Text.plain("tripped"))
+TRIP = Event(10.0, EventKind.WATCHDOG, "conveyor/fu1", 900, Text.plain("tripped"))
 
 Tell = Callable[[Event], None]
 
@@ -27,7 +27,7 @@ def of_the_plant() -> tuple[View, Tell]:
 
 def of_a_front() -> tuple[View, Tell]:
     client = MirrorClient("unixsock-stream/none")
-    return client, lambda event: client._on_event(Message(protocol.EVENT, protocol.encode(event)))
+    return client, lambda event: client._on_event(Sample(protocol.EVENT, protocol.encode(event)))
 
 
 @pytest.fixture(params=[of_the_plant, of_a_front])

@@ -10,7 +10,7 @@ import pytest
 from bridge.image import Value
 from bridge.mapping.model import ObjectRef, Parameter
 from bridge.parameter import DriveParameters, Ledger, Names, ParameterError, Transfer, TransferFailed, Why
-from bridge.parameter.definition import Entry
+from bridge.parameter.definition import ParameterEntry
 from bridge.text import Text
 from tests.support import sites
 from tests.support.gates import ENGINEER_AT_REST
@@ -21,9 +21,9 @@ PLACE = ObjectRef(0x3FF0, 0)
 NO_OBJECT, TIME_OUT = 0x0602_0000, 0x0504_0000
 
 
-def entry(**more: object) -> Entry:
+def entry(**more: object) -> ParameterEntry:
     keys = {"name": "own", "title": "own", "data_type": "int16", "object": "3FF0:00"}
-    return Entry("own", PLACE, Parameter.model_validate({**keys, **more}))
+    return ParameterEntry("own", PLACE, Parameter.model_validate({**keys, **more}))
 
 
 OWN = entry()
@@ -64,10 +64,10 @@ class Drive:
             return b""
         return self.data
 
-    def writes(self, value: Value, one: Entry = OWN):
+    def writes(self, value: Value, one: ParameterEntry = OWN):
         return self.run(self.access.write(one, value, self.now, ENGINEER_AT_REST))
 
-    def reads(self, max_age_s: float = 0.0, one: Entry = OWN):
+    def reads(self, max_age_s: float = 0.0, one: ParameterEntry = OWN):
         return self.run(self.access.read(one, self.now, max_age_s))
 
 

@@ -29,7 +29,7 @@ from bridge.parameter import (
     backups,
 )
 from bridge.parameter.backup_file import BackupFile, read_backup
-from bridge.parameter.ledger import Saved
+from bridge.parameter.ledger import WriteRecord
 from bridge.sim.nord.nord_supervision import Presence
 from bridge.sim.nord.nord_tu4 import NordTu4
 from bridge.text import Text
@@ -138,7 +138,7 @@ def test_only_what_differs_is_restored_in_the_order_of_the_mapping(workshop: Wor
 
 def test_a_refusal_ends_it_and_says_what_was_done(workshop: Workshop) -> None:
     values: dict[str, Value] = {"P102.1": 1.0, "P104.1": 5.0, "P105.1": 60.0}
-    workshop.ledger.restore({("conveyor/fu1", "2068:01"): Saved(100_000)}, 0.0, workshop.now)
+    workshop.ledger.restore({("conveyor/fu1", "2068:01"): WriteRecord(100_000)}, 0.0, workshop.now)
     done = workshop.restore(values)
     assert [one.reading.entry.name for one in done.written] == ["P102.1"]
     assert (done.failed, done.left) == ("P104.1", ["P105.1"])

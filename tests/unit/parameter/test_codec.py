@@ -12,17 +12,17 @@ from hypothesis import strategies as st
 from bridge.canopen.datatypes import INTEGERS
 from bridge.image import Value
 from bridge.mapping.model import Parameter
-from bridge.parameter import Entry, ObjectRef, ParameterError, Why
+from bridge.parameter import ObjectRef, ParameterEntry, ParameterError, Why
 from bridge.parameter.codec import decode, encode_value, matches, parse, shown
 
 WHERE = ObjectRef(0x2066, 1)
-RAW = Entry("2066:01", WHERE)
+RAW = ParameterEntry("2066:01", WHERE)
 NUMBERS = [kind for kind in INTEGERS if kind != "bool"]
 
 
-def entry(data_type: str, **more: object) -> Entry:
+def entry(data_type: str, **more: object) -> ParameterEntry:
     content = {"name": "P1", "title": "one", "data_type": data_type, **more}
-    return Entry("P1", WHERE, Parameter.model_validate(content))
+    return ParameterEntry("P1", WHERE, Parameter.model_validate(content))
 
 
 def limits(kind: str) -> tuple[int, int]:
@@ -139,7 +139,9 @@ def test_an_object_that_no_file_describes_takes_the_length_it_has() -> None:
         (RAW, "12", 12),
     ],
 )
-def test_what_is_typed_is_read_as_the_parameter_takes_it(one: Entry, text: str, value: Value) -> None:
+def test_what_is_typed_is_read_as_the_parameter_takes_it(
+    one: ParameterEntry, text: str, value: Value
+) -> None:
     assert parse(one, text) == value
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.mapping.model import ObjectRef, Parameter
-from bridge.parameter.definition import Entry
+from bridge.parameter.definition import ParameterEntry
 
 PLACE = ObjectRef(0x2066, 2)
 P102 = Parameter.model_validate(
@@ -27,16 +27,16 @@ P102 = Parameter.model_validate(
     ("name", "leaf"), [("P102", "p102"), ("P102[2]", "p102_2"), ("P102[2].3", "p102_2_3")]
 )
 def test_a_name_becomes_a_point(name: str, leaf: str) -> None:
-    assert Entry(name, PLACE).leaf == leaf
+    assert ParameterEntry(name, PLACE).leaf == leaf
 
 
 def test_its_unit_is_that_of_its_definition() -> None:
-    assert Entry("P102", PLACE, P102).unit == "s"
-    assert Entry("2066:02", PLACE).unit == ""
+    assert ParameterEntry("P102", PLACE, P102).unit == "s"
+    assert ParameterEntry("2066:02", PLACE).unit == ""
 
 
 def test_as_bytes_it_has_no_scale_no_limits_and_no_texts_and_stays_protected() -> None:
-    entry = Entry("P102", PLACE, P102).as_bytes
+    entry = ParameterEntry("P102", PLACE, P102).as_bytes
     found = entry.definition
     assert found is not None
     assert (found.data_type, found.factor, found.low, found.high, found.unit) == (
@@ -52,6 +52,6 @@ def test_as_bytes_it_has_no_scale_no_limits_and_no_texts_and_stays_protected() -
 
 
 def test_an_object_that_no_file_describes_has_bytes_too() -> None:
-    entry = Entry("2345:00", ObjectRef(0x2345, 0)).as_bytes
+    entry = ParameterEntry("2345:00", ObjectRef(0x2345, 0)).as_bytes
     assert entry.definition is not None
     assert entry.definition.data_type == "bytes"

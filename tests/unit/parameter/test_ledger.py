@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.parameter import Ledger, ParameterError, Why
-from bridge.parameter.ledger import DAY_S, MOST_A_DAY, MOST_WRITES, WINDOW_S, Saved
+from bridge.parameter.ledger import DAY_S, MOST_A_DAY, MOST_WRITES, WINDOW_S, WriteRecord
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.text import Text
 
@@ -104,7 +104,7 @@ def test_a_folder_that_cannot_be_written_loses_no_count(tmp_path: Path) -> None:
 
 def test_a_clock_that_was_set_back_holds_nobody_up() -> None:
     ledger = Ledger()
-    ledger.restore({KEY: Saved(MOST_WRITES, (EPOCH_S + 1e6,) * MOST_WRITES)}, EPOCH_S, 5.0)
+    ledger.restore({KEY: WriteRecord(MOST_WRITES, (EPOCH_S + 1e6,) * MOST_WRITES)}, EPOCH_S, 5.0)
     ledger.check(KEY, "P102", 5.0)
     assert ledger.writes(KEY) == MOST_WRITES
 
@@ -130,6 +130,6 @@ def test_the_long_window_outlives_a_restart(tmp_path: Path) -> None:
 
 def test_nothing_is_written_beyond_what_the_eeprom_stands() -> None:
     ledger = Ledger()
-    ledger.restore({KEY: Saved(100_000)}, EPOCH_S, 5.0)
+    ledger.restore({KEY: WriteRecord(100_000)}, EPOCH_S, 5.0)
     with pytest.raises(ParameterError, match=r"exchange the drive, then remove 2066:01 of conveyor/fu1"):
         ledger.check(KEY, "P102", 5.0, 100_000)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.parameter.ledger import Ledger, Saved
+from bridge.parameter.ledger import Ledger, WriteRecord
 from bridge.parameter.ledger_file import NAME, LedgerFile
 
 KEY = ("conveyor/fu1", "2066:01")
@@ -17,7 +17,7 @@ def test_what_two_have_written_is_added_up(tmp_path: Path) -> None:
     one, other = LedgerFile(tmp_path), LedgerFile(tmp_path)
     one.merge({KEY: [100.0, 101.0]})
     totals = other.merge({KEY: [102.0], ("n", "1010:01"): [103.0]})
-    assert totals[KEY] == Saved(3, (100.0, 101.0, 102.0))
+    assert totals[KEY] == WriteRecord(3, (100.0, 101.0, 102.0))
     assert one.totals() == {KEY: 3, ("n", "1010:01"): 1}
 
 
@@ -55,7 +55,7 @@ def test_a_ledger_gives_what_it_has_counted_and_gets_what_others_have(tmp_path: 
     ledger.count(KEY, "P102", None, 5.0)
     LedgerFile(tmp_path).add(ledger, 1000.0, 6.0)
     assert ledger.writes(KEY) == 2
-    assert LedgerFile(tmp_path).merge({})[KEY] == Saved(2, (1000.0, 1005.0))
+    assert LedgerFile(tmp_path).merge({})[KEY] == WriteRecord(2, (1000.0, 1005.0))
     assert ledger.take_unsaved() == {}
 
 

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.parameter.effect import Effect
 from bridge.parameter.profiles import PROFILES, effect_of
+from bridge.parameter.write_effect import Effect
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,15 @@ from bridge.mapping import load_family
 from bridge.mapping.alias_places import aliases
 from bridge.mapping.aliases import COMMUNICATION
 from bridge.mapping.loader import family_names
-from bridge.parameter import DriveParameters, Entry, Ledger, Names, ObjectRef, ParameterError, backups
+from bridge.parameter import (
+    DriveParameters,
+    Ledger,
+    Names,
+    ObjectRef,
+    ParameterEntry,
+    ParameterError,
+    backups,
+)
 from bridge.parameter.definition import leaf_of
 from bridge.parameter.error import Why
 from bridge.sim.catalogue import simulate_node
@@ -139,7 +147,7 @@ def test_what_commands_watches_or_addresses_a_drive_is_an_engineers(mapping: str
 # every name, every spelling
 
 
-def protected(names: Names, mapping: str) -> Iterator[Entry]:
+def protected(names: Names, mapping: str) -> Iterator[ParameterEntry]:
     """Entries that nobody writes: by the vendor's names, by the file's list, and as objects."""
     family = load_family(mapping)
     for alias in aliases(family):
@@ -155,7 +163,7 @@ def protected(names: Names, mapping: str) -> Iterator[Entry]:
                 yield from (names.resolve(str(part)) for part in mapped.parts)
 
 
-def spellings(names: Names, entry: Entry) -> Iterator[str]:
+def spellings(names: Names, entry: ParameterEntry) -> Iterator[str]:
     index, sub = entry.address.index, entry.address.sub
     yield from (f"{index:04X}:{sub:02X}", f"{index:04x}:{sub:x}", f"0x{index:04X}:{sub:02X}")
     yield from (f"{index:04X}h:{sub:02X}h", f" {index:04X}:0x{sub:X} ")

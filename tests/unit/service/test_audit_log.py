@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Action, Do, Event, Identity, Plant, Request, Source, Write
-from bridge.command.audit import AuditEntry, Ending
+from bridge.command.audit import AuditEntry, AuditOutcome
 from bridge.config import Site
 from bridge.service.audit_file import AuditFile
 from bridge.service.audit_log import AuditLog, as_line
@@ -130,7 +130,7 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path: Path) -> None:
 
 def test_a_line_is_json_with_both_times() -> None:
     who = Identity(Source.OPCUA, "ann", address="10.0.0.7:5000")
-    ending = Ending("ok", "", forwarded=True)
+    ending = AuditOutcome("ok", "", forwarded=True)
     entry = AuditEntry(
         12.3456789, who, "conveyor/fu1", "write", ending, {"frequency": 0.0}, {"frequency": 25.0}
     )
@@ -152,7 +152,7 @@ def test_a_line_is_json_with_both_times() -> None:
 
 def test_a_line_for_several_leaves_out_in_what_they_differ() -> None:
     who = Identity(Source.OPCUA, "", address="10.0.0.9")
-    line = as_line(AuditEntry(1.0, who, "", "stop", Ending("unknown_target"), count=190), NOON_NS)
+    line = as_line(AuditEntry(1.0, who, "", "stop", AuditOutcome("unknown_target"), count=190), NOON_NS)
     assert json.loads(line).keys() == {
         "t",
         "mono",
@@ -168,7 +168,9 @@ def test_a_line_for_several_leaves_out_in_what_they_differ() -> None:
 @pytest.mark.parametrize("name", ["a\nb", "\x00", "ü" * 5000, "\ud800", '"}'])
 def test_whatever_a_client_calls_itself_it_is_one_line(name: str) -> None:
     who = Identity(Source.OPCUA, name)
-    line = as_line(AuditEntry(1.0, who, name, name, Ending("not_allowed", name), {}, {name: name}), NOON_NS)
+    line = as_line(
+        AuditEntry(1.0, who, name, name, AuditOutcome("not_allowed", name), {}, {name: name}), NOON_NS
+    )
     assert line.count(b"\n") == 1
     assert len(line) < 6000
     assert json.loads(line)["code"] == "not_allowed"
@@ -176,7 +178,9 @@ def test_whatever_a_client_calls_itself_it_is_one_line(name: str) -> None:
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 2**64 - 1, -(2**63), True, 1e308])
 def test_whatever_is_written_it_is_json(value: float) -> None:
-    line = as_line(AuditEntry(1.0, PLC, "a/b", "write", Ending("out_of_range"), {}, {"v": value}), NOON_NS)
+    line = as_line(
+        AuditEntry(1.0, PLC, "a/b", "write", AuditOutcome("out_of_range"), {}, {"v": value}), NOON_NS
+    )
     json.loads(line)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from bridge.can.virtual import VirtualWire
 from bridge.project import load_project
-from bridge.service.bus_process import Service
+from bridge.service.bus_process import BusProcess
 from tests.support import sites
 
 
@@ -21,7 +21,7 @@ async def test_what_it_says_when_it_ends(
     node = sites.node(sites.drive("fu1", "modbus", 20_000))
     path = sites.write(tmp_path, sites.bus(node), sites.modbus())
     wire = VirtualWire()
-    service = Service(load_project(path), lambda table: wire.end(table.name), fronts=())
+    service = BusProcess(load_project(path), lambda table: wire.end(table.name), fronts=())
     [network] = service._networks
     monkeypatch.setattr(type(network.mastership), "is_passive", property(lambda mastership: is_passive))
     with caplog.at_level(logging.INFO):

@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from bridge.command import Event, Kind
+from bridge.command import Event, EventKind
 from bridge.service.event_log import log_event
 
 
@@ -19,7 +19,7 @@ def test_an_event_has_a_level_by_its_severity(
 ) -> None:
     """OPC UA Part 5 §6.4.2: 1 … 1000."""
     with caplog.at_level(logging.INFO, "bridge.events"):
-        log_event(Event(10.0, Kind.WATCHDOG, "conveyor/fu1", severity, "tripped"))
+        log_event(Event(10.0, EventKind.WATCHDOG, "conveyor/fu1", severity, "tripped"))
     (record,) = caplog.records
     assert (record.levelname, record.getMessage()) == (level, "conveyor/fu1: tripped")
 
@@ -27,8 +27,8 @@ def test_an_event_has_a_level_by_its_severity(
 def test_a_trip_and_its_acknowledgement_do_not_hide_each_other(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO, "bridge.events"):
         for severity in (700, 300):
-            log_event(Event(10.0, Kind.WATCHDOG, "conveyor/fu1", severity, "x"))
-        log_event(Event(10.0, Kind.OWNER, "conveyor/fu1", 300, "x"))
+            log_event(Event(10.0, EventKind.WATCHDOG, "conveyor/fu1", severity, "x"))
+        log_event(Event(10.0, EventKind.OWNER, "conveyor/fu1", 300, "x"))
     kinds = [record.__dict__["line_kind"] for record in caplog.records]
     assert len(set(kinds)) == 3
     assert {record.__dict__["line_source"] for record in caplog.records} == {"conveyor/fu1"}

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from bridge.command import Event, Identity, Kind, Source
-from bridge.command.link import NodeState
+from bridge.command import Event, EventKind, Identity, Source
+from bridge.command.drive_link import NodeState
 from bridge.image import Quality
-from bridge.northbound.modbus.registers import Table
+from bridge.northbound.modbus.registers import RegisterTable
 from bridge.northbound.modbus.unit import BridgeUnit
 from bridge.northbound.modbus.units import units_of
 from bridge.northbound.zenoh.keys import event_json
@@ -71,11 +71,11 @@ def test_a_silent_bus_is_one_event_and_what_follows_names_it(
     box.lose("belt")
     box.lose("press")
     assert [one["kind"] for one in box.look()] == ["bus_silent"]
-    told = [event for event in box.events if event.kind is Kind.CAUSE]
+    told = [event for event in box.events if event.kind is EventKind.CAUSE]
     assert [(event.source, event.severity) for event in told] == [("can0", 900)]
     assert told[0].message.startswith("no node of can0 answers: cable at the box")
     box.look()
-    assert len([event for event in box.events if event.kind is Kind.CAUSE]) == 1
+    assert len([event for event in box.events if event.kind is EventKind.CAUSE]) == 1
     box.lose("belt")
     assert box.events[-1].cause == told[0].message
     log_event(box.events[-1])
@@ -91,7 +91,7 @@ def test_an_event_without_a_known_cause_names_none(box: Box) -> None:
 
 def test_an_unproven_stop_is_in_every_summary(box: Box) -> None:
     unit = BridgeUnit(units_of(box.plant.catalogue), view_of(box.plant))
-    (before,) = unit.read_words(Table.INPUT_REGISTER, 0, 1, PLC)
+    (before,) = unit.read_words(RegisterTable.INPUT_REGISTER, 0, 1, PLC)
     assert before >> 8 == 0
     name = "press/fu1/supervision/worst_case_bridge_ms"
     box.plant.set(name, 0, box.now, Quality.CONFIG_ERROR, "the drive runs on: P513 is 0 (off)")
@@ -99,5 +99,5 @@ def test_an_unproven_stop_is_in_every_summary(box: Box) -> None:
     assert (trouble["kind"], trouble["rank"]) == ("stop_unproven", "warning")
     assert box.value("bridge/stops_unproven") == "press/fu1"
     assert box.value("bridge/condition") == 1
-    (word,) = unit.read_words(Table.INPUT_REGISTER, 0, 1, PLC)
+    (word,) = unit.read_words(RegisterTable.INPUT_REGISTER, 0, 1, PLC)
     assert word >> 8 == 0b101, "a warning, and that one"

@@ -17,8 +17,8 @@ from bridge.cli.simulation import simulation
 from bridge.config import load_site
 from bridge.sim.core.canopen_slave import CanopenSlave
 from bridge.sim.core.dictionary import Dictionary, Number
-from bridge.sim.core.pdo import ActiveTpdo
-from bridge.sim.shell import Simulation
+from bridge.sim.core.pdo_timing import ActiveTpdo
+from bridge.sim.runner import Simulation
 from tests.support.virtual_loop import VirtualLoop
 
 NODES = (5, 6, 7, 8)

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bridge.canopen.frame import ERROR, EXTENDED, REMOTE, Frame
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
+from bridge.sim.cia402.cia402_settings import Cia402Mode, Cia402Settings
 from bridge.sim.lenze.lenze_drive import Reaction
 from bridge.sim.lenze.lenze_motec import LenzeMotec
 from bridge.sim.lenze.lenze_settings import LenzeCodes
@@ -154,7 +154,7 @@ ENABLING: Final = [Frame(0x605, bytes([0x2B, 0x40, 0x60, 0, word, 0, 0, 0])) for
 CONTROL_WORDS: Final = (0x00, 0x02, 0x06, 0x07, 0x0F, 0x1F, 0x3F, 0x5F, 0x7F, 0x80, 0x10F)
 
 
-def cia402(mode: Mode) -> Kind:
+def cia402(mode: Cia402Mode) -> Kind:
     def make() -> Cia402Drive:
         return Cia402Drive(5, Cia402Settings(mode=mode, heartbeat_consumer=0x7F00C8))
 
@@ -273,7 +273,7 @@ def stoeber(axes: int) -> Kind:
 
 
 KINDS: Final[Mapping[str, Kind]] = {
-    **{f"cia402 {mode.name.lower()}": cia402(mode) for mode in Mode},
+    **{f"cia402 {mode.name.lower()}": cia402(mode) for mode in Cia402Mode},
     "8400 motec": lenze(0),
     "8400 motec as a master": lenze(1),
     "tu4": tu4(),

@@ -14,7 +14,7 @@ import pytest
 
 from bridge.can.interface import ControllerState
 from bridge.canopen.nmt import NmtCommand, NmtState, command_name
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import Action
 from bridge.condition.causes import RULES
 from bridge.config import DriveTable, NodeTable

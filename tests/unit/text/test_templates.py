@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.text import LANGUAGES, Fact, Text, as_json, render
-from bridge.text.templates import Part, parse, source, templates
+from bridge.text.templates import TemplatePart, parse, source, templates
 
 SCRIPTS: Final = Path("bridge/northbound/page/static/js/texts")
 _RENDER: Final = """
@@ -102,7 +102,7 @@ def test_several_texts_are_joined_as_the_template_says() -> None:
 
 
 def test_braces_may_be_words() -> None:
-    assert parse("accepts = {{ a = {value} }}")[0] == Part("accepts = {", "", "", False)
+    assert parse("accepts = {{ a = {value} }}")[0] == TemplatePart("accepts = {", "", "", False)
     found = by_the_page(
         {"texts": [{"code": "a", "facts": {"value": 1}}], "templates": {"a": "{{ {value} }}"}}
     )

@@ -11,7 +11,7 @@ from asyncua import Client, ua
 
 from bridge.uaserver import decoding
 from bridge.uaserver.bound import BoundServer
-from bridge.uaserver.session import Server
+from bridge.uaserver.session import InnerServer
 from tests.support.opcua_application import Served, User, add_variable
 
 WORD = ua.NodeId("word", 1)
@@ -23,7 +23,7 @@ async def serving(application: Served) -> AsyncIterator[str]:
     bound = socket.create_server(("127.0.0.1", 0))
     bound.setblocking(False)
     url = f"opc.tcp://127.0.0.1:{bound.getsockname()[1]}"
-    inner = Server(no_security=True)
+    inner = InnerServer(no_security=True)
     inner.application = application
     server = BoundServer(inner, bound, None)
     server.set_endpoint(url)

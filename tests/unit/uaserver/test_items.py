@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from bridge.uaserver.eventfilter import EventFilter, Occurrence
 from bridge.uaserver.filters import ChangeFilter
-from bridge.uaserver.items import EventItem, Settings, ValueItem, event_settings, value_settings
+from bridge.uaserver.items import EventItem, ItemSettings, ValueItem, event_settings, value_settings
 from bridge.uaserver.reading import window
 from bridge.uaserver.where import Where
 
@@ -64,7 +64,7 @@ def test_who_asks_for_the_status_alone_gets_no_values() -> None:
 def make_item(
     size: int = 1, discard_oldest: bool = True, sampling_ms: float = 50, mode: Mode = Mode.Reporting
 ) -> ValueItem:
-    settings = Settings(77, sampling_ms, size, discard_oldest)
+    settings = ItemSettings(77, sampling_ms, size, discard_oldest)
     return ValueItem(1, TARGET, window(TARGET, ua.TimestampsToReturn.Both), settings, ChangeFilter(), mode)
 
 
@@ -112,7 +112,7 @@ def test_a_shorter_queue_keeps_what_the_client_chose(oldest: bool) -> None:
     item = make_item(5, oldest)
     for number in range(5):
         item.change(value(float(number)), float(number))
-    item.modify(Settings(77, 50, 2, oldest), ChangeFilter(), item.window)
+    item.modify(ItemSettings(77, 50, 2, oldest), ChangeFilter(), item.window)
     assert told(item) == ([(3.0, True), (4.0, False)] if oldest else [(0.0, False), (1.0, True)])
 
 
@@ -245,7 +245,7 @@ def heard(item: EventItem) -> list[int | str]:
 
 @given(st.integers(1, 5), st.integers(0, 12), st.booleans())
 def test_a_full_queue_of_events_says_what_it_lost(size: int, events: int, oldest: bool) -> None:
-    item = EventItem(1, NODE, Settings(7, 0, size, oldest), PASSES_ALL, Mode.Reporting)
+    item = EventItem(1, NODE, ItemSettings(7, 0, size, oldest), PASSES_ALL, Mode.Reporting)
     kept: deque[int] = deque()
     for number in range(events):
         item.hear(event(number))
@@ -259,7 +259,7 @@ def test_a_full_queue_of_events_says_what_it_lost(size: int, events: int, oldest
 
 
 def test_an_event_of_another_node_or_without_a_listener_is_not_heard() -> None:
-    item = EventItem(1, NODE, Settings(7, 0, 5, True), PASSES_ALL, Mode.Disabled)
+    item = EventItem(1, NODE, ItemSettings(7, 0, 5, True), PASSES_ALL, Mode.Disabled)
     assert not item.hear(event(1))
     item.set_mode(Mode.Reporting)
     assert not item.hear(Occurrence(ua.NodeId("another", 2), {}))
@@ -268,7 +268,7 @@ def test_an_event_of_another_node_or_without_a_listener_is_not_heard() -> None:
 
 def test_a_field_that_no_event_has_is_null() -> None:
     item = EventItem(
-        1, NODE, Settings(7, 0, 5, True), EventFilter([None, "emitter"], Where([]), None), Mode.Reporting
+        1, NODE, ItemSettings(7, 0, 5, True), EventFilter([None, "emitter"], Where([]), None), Mode.Reporting
     )
     item.hear(event(1))
     assert [field.Value for field in item.notification().EventFields] == [None, None]

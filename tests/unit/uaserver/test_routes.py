@@ -11,7 +11,7 @@ from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import struct_to_binary
 
 from bridge.uaserver.library import ServiceError
-from bridge.uaserver.routes import MOST_CALLS, MOST_OPERATIONS, ROUTES, Request, Route
+from bridge.uaserver.routes import MOST_CALLS, MOST_OPERATIONS, ROUTES, Route, ServiceRequest
 from bridge.uaserver.services import REFUSED, SERVICES, request_type
 
 Codes = ua.StatusCodes
@@ -38,7 +38,7 @@ def test_each_route_names_what_its_messages_have() -> None:
 
 async def carried_out(route: Route, params: object) -> list[Any]:
     sent: list[Any] = []
-    request = Request(None, Buffer(struct_to_binary(params)), sent.append, lambda: True)
+    request = ServiceRequest(None, Buffer(struct_to_binary(params)), sent.append, lambda: True)
     session: Any = SimpleNamespace()
     await route.carry_out(session, request)
     return sent

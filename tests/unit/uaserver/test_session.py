@@ -7,7 +7,7 @@ from asyncua import ua
 
 from bridge.uaserver.application import NOBODY
 from bridge.uaserver.library import ServiceError
-from bridge.uaserver.session import Server, Session
+from bridge.uaserver.session import InnerServer, Session
 from tests.support.opcua_application import Served, User, add_variable
 
 Ids, Codes = ua.AttributeIds, ua.StatusCodes
@@ -16,7 +16,7 @@ WORD, HIDDEN = ua.NodeId("word", 1), ua.NodeId("hidden", 1)
 
 class Rig:
     def __init__(self) -> None:
-        self.server = Server(no_security=True)
+        self.server = InnerServer(no_security=True)
         self.application = self.server.application = Served()
         self.space = self.server.aspace
         add_variable(self.space, WORD, 7, access=3)

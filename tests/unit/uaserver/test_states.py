@@ -6,7 +6,7 @@ import pytest
 from asyncua import ua
 
 from bridge.uaserver.services import request_type
-from bridge.uaserver.states import REFUSALS, Need, State, need_of
+from bridge.uaserver.states import REFUSALS, Need, RequestSession, need_of
 
 
 def test_each_service_needs_one_thing_of_a_session() -> None:
@@ -19,5 +19,5 @@ def test_each_service_needs_one_thing_of_a_session() -> None:
 @pytest.mark.parametrize("need", [Need.USE, Need.CLOSE])
 def test_a_session_that_is_not_there_is_not_called_one_that_is_not_activated(need: Need) -> None:
     """Clients make a new session after BadSessionIdInvalid alone."""
-    for state in (State.NONE, State.ENDED, State.MOVED, State.OTHER):
+    for state in (RequestSession.NONE, RequestSession.ENDED, RequestSession.MOVED, RequestSession.OTHER):
         assert REFUSALS[need][state] == ua.StatusCodes.BadSessionIdInvalid

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.uaserver.filters import ChangeFilter
-from bridge.uaserver.items import Settings, ValueItem
+from bridge.uaserver.items import ItemSettings, ValueItem
 from bridge.uaserver.library import ServiceError
 from bridge.uaserver.publishing import PublishRequest
 from bridge.uaserver.reading import window
@@ -46,7 +46,12 @@ class Rig:
         looked_at = window(TARGET, ua.TimestampsToReturn.Both)
         for number in range(items):
             item = ValueItem(
-                number, TARGET, looked_at, Settings(number, 50, queue, True), ChangeFilter(), Mode.Reporting
+                number,
+                TARGET,
+                looked_at,
+                ItemSettings(number, 50, queue, True),
+                ChangeFilter(),
+                Mode.Reporting,
             )
             self.items.append(item)
             self.subscription.add(item)

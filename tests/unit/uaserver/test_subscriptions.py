@@ -7,7 +7,7 @@ from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
 from bridge.uaserver.library import ServiceError
-from bridge.uaserver.shares import MOST_SUBSCRIPTIONS
+from bridge.uaserver.quotas import MOST_SUBSCRIPTIONS
 from bridge.uaserver.subscriptions import Subscriptions
 from tests.support.opcua_sessions import Session, User
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.witness.description import Description, Entry, Unreadable, describe
+from bridge.witness.description import DictionaryEntry, ObjectDictionary, Unreadable, describe
 
 EDS = """\
 [DeviceInfo]
@@ -35,14 +35,14 @@ DefaultValue=-0x10
 """
 
 
-def read(text: str = EDS, node_id: int = 5) -> Description:
+def read(text: str = EDS, node_id: int = 5) -> ObjectDictionary:
     return describe(text.encode(), node_id)
 
 
 def test_objects_and_their_elements_have_names_types_and_numbers() -> None:
     found = read().entries
-    assert found[0x2000, 0] == Entry("Mode", 2, -16, False)
-    assert found[0x1400, 1] == Entry("COB-ID", 7, 0x205, False)
+    assert found[0x2000, 0] == DictionaryEntry("Mode", 2, -16, False)
+    assert found[0x1400, 1] == DictionaryEntry("COB-ID", 7, 0x205, False)
     assert (0x6200, 0) not in found, "an object with elements has no number of its own"
 
 
@@ -107,8 +107,8 @@ XDD = """<?xml version="1.0"?>
 def test_an_xdd_says_the_same_with_hexadecimal_types() -> None:
     """CiA 311."""
     found = read(XDD).entries
-    assert found[0x6200, 1] == Entry("1 to 8", 5, 3, False)
-    assert found[0x6200, 10] == Entry("more", 6, 9, True)
+    assert found[0x6200, 1] == DictionaryEntry("1 to 8", 5, 3, False)
+    assert found[0x6200, 10] == DictionaryEntry("more", 6, 9, True)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from dataclasses import FrozenInstanceError
 
 import pytest
 
-from bridge.witness.findings import Alarm, Cause, Kind, Sight, Stop
+from bridge.witness.findings import Alarm, AlarmKind, Cause, Sight, Stop
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,10 @@ def test_a_stop_is_in_time_where_neither_of_its_times_is_beyond_its_bound(
 
 
 def test_findings_are_values() -> None:
-    alarm = Alarm("can0", Kind.INTRUDER, 10.0, "somebody")
-    assert len({alarm, Alarm("can0", Kind.INTRUDER, 10.0, "somebody"), Sight("can0", 10.0, "somebody")}) == 2
+    alarm = Alarm("can0", AlarmKind.INTRUDER, 10.0, "somebody")
+    assert (
+        len({alarm, Alarm("can0", AlarmKind.INTRUDER, 10.0, "somebody"), Sight("can0", 10.0, "somebody")})
+        == 2
+    )
     with pytest.raises(FrozenInstanceError):
         setattr(alarm, "source", "can1")  # noqa: B010

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from bridge.witness import numbers
-from bridge.witness.numbers import Numbers, Reading
+from bridge.witness.numbers import Numbers, UnitReading
 
 HOLDING, INPUTS = 3, 4
 
@@ -120,8 +120,8 @@ def test_a_reading_has_both_and_when_they_were_asked_for(wire: Wire) -> None:
     asks, one = connected(wire, (1,), (9,))
     one.arrives = [answer(1, HOLDING, 1500) + answer(1, INPUTS, 77) + answer(9, INPUTS, 5)]
     assert asks.receive(10.06) == [
-        Reading(1, 77, 1500, 10.05, 10.06),
-        Reading(9, 5, None, 10.05, 10.06),
+        UnitReading(1, 77, 1500, 10.05, 10.06),
+        UnitReading(9, 5, None, 10.05, 10.06),
     ]
     assert asks.receive(10.07) == []
 
@@ -178,7 +178,7 @@ def test_what_is_left_of_a_lost_connection_is_forgotten(wire: Wire) -> None:
     two = wire.sockets[1]
     assert two.sent
     two.arrives = [answer(1, INPUTS, 78)]
-    assert asks.receive(13.41) == [Reading(1, 78, None, 13.4, 13.41)]
+    assert asks.receive(13.41) == [UnitReading(1, 78, None, 13.4, 13.41)]
 
 
 def test_a_connection_that_is_refused_is_lost_at_once(wire: Wire) -> None:
@@ -246,7 +246,7 @@ def test_a_time_out_that_is_refused_is_told_no_longer(wire: Wire) -> None:
     asks.on_time(10.2)
     one.arrives = [refusal(1, HOLDING, 2), answer(1, INPUTS, 78)]
     asks.receive(10.21)
-    assert asks.receive(10.22) == [Reading(1, 78, None, 10.2, 10.22)]
+    assert asks.receive(10.22) == [UnitReading(1, 78, None, 10.2, 10.22)]
 
 
 def test_what_was_not_asked_for_gives_no_reading(wire: Wire) -> None:

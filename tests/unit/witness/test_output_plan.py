@@ -8,7 +8,7 @@ import pytest
 
 from bridge.command.output_words import OutputWords
 from bridge.config import load_site
-from bridge.drive.own_supervision import OwnVerdict
+from bridge.drive.own_judgement import OwnVerdict
 from bridge.lint import lint
 from bridge.lint.own import WorstCase
 from bridge.project import load_project

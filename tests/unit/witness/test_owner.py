@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.witness.owner import Owner
+from bridge.witness.owner import WatchedOwner
 
 
-def owner(timeout_ms: int = 200, beside_ms: int | None = 50) -> Owner:
+def owner(timeout_ms: int = 200, beside_ms: int | None = 50) -> WatchedOwner:
     """Asked every 50 ms; its last telegram came before 10.0 s."""
-    one = Owner("conveyor/fu1", timeout_ms, beside_ms)
+    one = WatchedOwner("conveyor/fu1", timeout_ms, beside_ms)
     one.on_number(7, 9.95, 10.0)
     return one
 
@@ -72,14 +72,14 @@ def test_where_nobody_tells_its_numbers_nothing_is_known() -> None:
 
 @pytest.mark.parametrize(("first", "last", "count"), [(7, 12, 5), (65_534, 3, 5), (7, 7, 0)])
 def test_telegrams_are_counted_beyond_the_end_of_their_numbers(first: int, last: int, count: int) -> None:
-    one = Owner("x", 200, 50)
+    one = WatchedOwner("x", 200, 50)
     one.on_number(first, 10.0, 10.01)
     one.on_number(last, 10.5, 10.51)
     assert one.telegrams() == (count, 10.01, 10.5)
 
 
 def test_only_the_last_seconds_are_counted() -> None:
-    one = Owner("x", 200, 50)
+    one = WatchedOwner("x", 200, 50)
     for second in range(10):
         one.on_number(second, float(second), second + 0.01)
     found = one.telegrams()

@@ -14,7 +14,15 @@ from bridge.lint import lint
 from bridge.mapping import load_family
 from bridge.mapping.loader import family_names
 from bridge.project import load_project
-from bridge.witness.plan import Speed, UnknownFamily, WatchedBus, WatchedDrive, WatchedOutputs, Word, plan
+from bridge.witness.plan import (
+    EnableWord,
+    Speed,
+    UnknownFamily,
+    WatchedBus,
+    WatchedDrive,
+    WatchedOutputs,
+    plan,
+)
 from tests.support import sites
 from tests.support.devices import DEVICES
 
@@ -294,7 +302,7 @@ def test_the_identifiers_of_the_site_file_count_where_it_has_them(tmp_path: Path
 
 
 def test_a_drive_is_held_to_what_is_known_of_its_times() -> None:
-    word = Word(0, 2, 0x0F, 0x0F)
+    word = EnableWord(0, 2, 0x0F, 0x0F)
     known = WatchedDrive("a/drive", 1, 0x205, 0x185, word, word, 200, 100, 500, 700)
     assert known.promise(has_numbers=True) == (
         "a/drive: dead controller: 300 ms, dead bridge: 500 ms, stop followed within 700 ms"

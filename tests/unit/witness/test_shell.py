@@ -9,14 +9,23 @@ from types import SimpleNamespace
 import pytest
 
 from bridge.witness import shell
-from bridge.witness.findings import Alarm, Finding, Kind
-from bridge.witness.numbers import Reading
+from bridge.witness.findings import Alarm, AlarmKind, Finding
+from bridge.witness.numbers import UnitReading
 from bridge.witness.output_plan import Values
-from bridge.witness.plan import WatchedBus, WatchedDrive, WatchedOutputs, Word
+from bridge.witness.plan import EnableWord, WatchedBus, WatchedDrive, WatchedOutputs
 from bridge.witness.shell import CannotListen, Witness
 
 FU1 = WatchedDrive(
-    "conveyor/fu1", 1, 0x205, 0x185, Word(0, 2, 0x0F, 0x0F), Word(0, 2, 0x7F, 0x37), 200, 40, 600, 1500
+    "conveyor/fu1",
+    1,
+    0x205,
+    0x185,
+    EnableWord(0, 2, 0x0F, 0x0F),
+    EnableWord(0, 2, 0x7F, 0x37),
+    200,
+    40,
+    600,
+    1500,
 )
 FU2 = replace(FU1, name="lift/fu1", unit_id=2)
 IO = WatchedOutputs("io", 3, 21, {0x215: Values(1, 0xFF, 0)}, timeout_ms=200, beside_ms=40)
@@ -34,7 +43,7 @@ class World:
         self.now = 100.0
         self.missing: set[str] = set()
         self.listeners: dict[str, Listener] = {}
-        self.readings: list[Reading] = []
+        self.readings: list[UnitReading] = []
         self.is_lost = False
         self.number: int | None = 9
         self.deadline = 1e9
@@ -54,7 +63,7 @@ class World:
     def next_deadline(self) -> float:
         return self.deadline
 
-    def receive(self, now: float) -> list[Reading]:
+    def receive(self, now: float) -> list[UnitReading]:
         self.order.append("answers")
         found, self.readings = self.readings, []
         return found
@@ -94,7 +103,7 @@ def world(monkeypatch: pytest.MonkeyPatch) -> World:
     def wait(read: list[int], write: list[int], error: list[int], timeout_s: float) -> None:
         world.waits.append((read, timeout_s))
 
-    monkeypatch.setattr(shell, "Listener", lambda channel, can_ids: Listener(world, channel, can_ids))
+    monkeypatch.setattr(shell, "CanSocket", lambda channel, can_ids: Listener(world, channel, can_ids))
     monkeypatch.setattr(shell, "select", SimpleNamespace(select=wait))
     monkeypatch.setattr(shell, "time", SimpleNamespace(monotonic=lambda: world.now))
     return world
@@ -166,7 +175,7 @@ def test_answers_are_taken_before_frames(world: World) -> None:
 def test_a_reading_reaches_its_owner(world: World, unit: int, name: str) -> None:
     told: list[Finding] = []
     witness = witnessing(world, told)
-    world.readings = [Reading(unit, 5, None, 100.0, 100.0)]
+    world.readings = [UnitReading(unit, 5, None, 100.0, 100.0)]
     turns(world, witness, 100.0)
     channel, can_id, data = {
         1: ("vcan0", 0x205, RUN),
@@ -174,11 +183,11 @@ def test_a_reading_reaches_its_owner(world: World, unit: int, name: str) -> None
         3: ("vcan1", 0x215, b"\x01"),
     }[unit]
     world.listeners[channel].came = [(can_id, data, 100.3)]
-    world.readings = [Reading(unit, 5, None, 100.4, 100.4)]
+    world.readings = [UnitReading(unit, 5, None, 100.4, 100.4)]
     turns(world, witness, 100.4, 100.5)
     (alarm,) = told
     assert isinstance(alarm, Alarm)
-    assert (alarm.source, alarm.kind) == (name, Kind.LATE)
+    assert (alarm.source, alarm.kind) == (name, AlarmKind.LATE)
 
 
 def test_lost_numbers_are_lost_to_every_bus(world: World) -> None:

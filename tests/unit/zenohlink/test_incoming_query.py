@@ -9,7 +9,7 @@ import zenoh
 
 from bridge.zenohlink.incoming_query import IncomingQuery, Lanes
 from bridge.zenohlink.lane import Lane
-from bridge.zenohlink.message import Message
+from bridge.zenohlink.message import Sample
 
 
 class Query:
@@ -66,7 +66,7 @@ def asked(line: Line, link: Link, query: Query) -> IncomingQuery:
 
 def test_all_replies_of_a_call_have_one_time_stamp() -> None:
     line, query = Line("stamp"), Query()
-    asked(line, Link(), query).send([Message("a", b"1"), Message("b", b"2", "text/plain", b"x")])
+    asked(line, Link(), query).send([Sample("a", b"1"), Sample("b", b"2", "text/plain", b"x")])
     assert query.replies == [
         ("a", b"1", None, None, "stamp"),
         ("b", b"2", "text/plain", b"x", "stamp"),
@@ -90,7 +90,7 @@ def test_a_long_answer_has_a_lane_of_its_own_which_its_end_ends() -> None:
     for end in ("finish", "fail"):
         line, link, query = Line(), Link(), Query()
         apart = asked(line, link, query).apart()
-        apart.send([Message("a", b"1")])
+        apart.send([Sample("a", b"1")])
         assert query.replies[0][-1] == "own"
         if end == "finish":
             apart.finish()
@@ -101,5 +101,5 @@ def test_a_long_answer_has_a_lane_of_its_own_which_its_end_ends() -> None:
 
 def test_in_a_session_that_has_been_closed_nothing_is_sent() -> None:
     query = Query()
-    asked(Line(zenoh.ZError("closed")), Link(), query).send([Message("a", b"1")])
+    asked(Line(zenoh.ZError("closed")), Link(), query).send([Sample("a", b"1")])
     assert query.replies == []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.zenohlink.message import Message, sentence
+from bridge.zenohlink.message import Sample, sentence
 
 
 @pytest.mark.parametrize(
@@ -23,6 +23,6 @@ def test_what_is_for_zenohs_authors_is_left_out(text: str, said: str) -> None:
 
 
 def test_a_message_has_no_more_than_key_and_payload_unless_it_says_so() -> None:
-    message = Message("a/b", b"1")
+    message = Sample("a/b", b"1")
     assert (message.encoding, message.attachment, message.source) == ("", None, "")
-    assert message == Message("a/b", b"1")
+    assert message == Sample("a/b", b"1")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.zenohlink.sockets import Connections
+from bridge.zenohlink.sockets import TcpConnections
 
 TEN_SECONDS = struct.pack("ii", 1, 10)
 
@@ -25,7 +25,7 @@ def files() -> set[str]:
 
 
 def test_every_tcp_connection_is_found_and_no_other_file_is_touched() -> None:
-    connections = Connections()
+    connections = TcpConnections()
     connections.settle()
     local, remote = socket.socketpair()
     with (
@@ -57,14 +57,14 @@ def test_an_ipv6_connection_is_named_as_zenoh_does() -> None:
         socket.create_connection(server.getsockname()[:2]) as client,
     ):
         client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, TEN_SECONDS)
-        assert Connections().settle() == [f"[::1]:{server.getsockname()[1]}"]
+        assert TcpConnections().settle() == [f"[::1]:{server.getsockname()[1]}"]
 
 
 def test_what_is_settled_is_not_looked_at_again_but_whoever_has_its_number_is(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Hundreds may be there, and the process that looks drives a bus."""
-    connections = Connections()
+    connections = TcpConnections()
     with socket.create_server(("127.0.0.1", 0)) as server:
         first = socket.create_connection(server.getsockname())
         first.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, TEN_SECONDS)
@@ -92,7 +92,7 @@ def test_no_copy_is_left_whatever_fails(monkeypatch: pytest.MonkeyPatch) -> None
 
     with socket.socket(socket.AF_UNIX), socket.socket(socket.AF_INET):
         before = len(list(Path("/proc/self/fd").iterdir()))
-        connections = Connections()
+        connections = TcpConnections()
         connections.settle()
         monkeypatch.setattr(socket, "socket", refuse)
         for _ in range(10):

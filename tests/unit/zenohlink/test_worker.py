@@ -6,7 +6,7 @@ import asyncio
 from functools import partial
 
 from bridge.northbound.zenoh.keys import KeySpace
-from bridge.zenohlink.worker import Inbox
+from bridge.zenohlink.worker import CallQueue
 
 FLOOD = 5000
 
@@ -20,7 +20,7 @@ async def until(came: list[str], count: int) -> None:
 
 
 async def test_who_floods_takes_no_room_of_another_share() -> None:
-    inbox = Inbox()
+    inbox = CallQueue()
     came: list[str] = []
     taken = sum(inbox.take_in(partial(came.append, "read"), "reads") for _ in range(FLOOD))
     assert 0 < taken < FLOOD
@@ -33,7 +33,7 @@ async def test_who_floods_takes_no_room_of_another_share() -> None:
 
 async def test_of_many_shares_none_waits_for_another_flood() -> None:
     """More than are handled in one go."""
-    inbox = Inbox()
+    inbox = CallQueue()
     came: list[str] = []
     shares = [f"@/controller/plc{number}" for number in range(50)]
     for share in shares:
@@ -45,7 +45,7 @@ async def test_of_many_shares_none_waits_for_another_flood() -> None:
 
 
 async def test_shares_are_not_made_without_end() -> None:
-    inbox = Inbox()
+    inbox = CallQueue()
     came: list[str] = []
     taken = sum(inbox.take_in(partial(came.append, "x"), f"@/controller/{number}") for number in range(FLOOD))
     assert taken < FLOOD

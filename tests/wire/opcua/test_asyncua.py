@@ -27,8 +27,8 @@ from tests.support.opcua_site import OPEN, break_off, connected, serving
 
 OVERRIDDEN = {
     "BoundServer": {"start"},
-    "Channel": {"select_policy"},
-    "Listener": {"_make_protocol", "start", "stop"},
+    "SecureChannel": {"select_policy"},
+    "TcpAcceptor": {"_make_protocol", "start", "stop"},
     "Processor": {
         "_process_message",
         "_session_watchdog_loop",
@@ -38,22 +38,22 @@ OVERRIDDEN = {
         "process_message",
         "send_response",
     },
-    "Server": {"create_session", "get_endpoints", "stop"},
+    "InnerServer": {"create_session", "get_endpoints", "stop"},
     "Session": {"_timeout_loop", "activate_session", "close_session", "create_session"},
-    "_Protocol": {"_process_one_msg", "connection_lost", "connection_made", "data_received"},
+    "_UaProtocol": {"_process_one_msg", "connection_lost", "connection_made", "data_received"},
 }
 """A name that asyncua no longer has would be no override any more, and nobody would call it."""
 
 BY_OURSELVES = {
     "BoundServer.start",
-    "Listener.start",
+    "TcpAcceptor.start",
     "Processor._process_message",
-    "Server.stop",
+    "InnerServer.stop",
     # by asyncio
-    "Listener._make_protocol",
-    "_Protocol.connection_lost",
-    "_Protocol.connection_made",
-    "_Protocol.data_received",
+    "TcpAcceptor._make_protocol",
+    "_UaProtocol.connection_lost",
+    "_UaProtocol.connection_made",
+    "_UaProtocol.data_received",
 }
 """What asyncua does not call itself; it is enough that it is called."""
 

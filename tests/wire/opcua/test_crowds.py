@@ -14,8 +14,8 @@ from asyncua import Client, ua
 from bridge.config import OpcUaTable, UserTable
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.passwords import hash_password
-from bridge.uaserver import admission, monitoring, shares
-from bridge.uaserver.admission import DEADLINE_S, Stage
+from bridge.uaserver import connection_limits, monitoring, quotas
+from bridge.uaserver.connection_limits import DEADLINE_S, ConnectionStage
 from tests.support.opcua_site import OPEN, break_off, connected, serving
 from tests.support.quiet import quiet_log
 
@@ -68,9 +68,11 @@ async def test_idle_sockets_keep_nobody_out(tmp_path: Path, says: bytes) -> None
 
 
 @pytest.mark.landing
-@pytest.mark.parametrize(("says", "stage"), [(b"", Stage.CONNECTED), (HELLO, Stage.GREETED)])
+@pytest.mark.parametrize(
+    ("says", "stage"), [(b"", ConnectionStage.CONNECTED), (HELLO, ConnectionStage.GREETED)]
+)
 async def test_who_comes_no_further_is_closed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, says: bytes, stage: Stage
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, says: bytes, stage: ConnectionStage
 ) -> None:
     monkeypatch.setitem(DEADLINE_S, stage, 0.2)
     async with serving(OPEN, tmp_path) as (server, _), idle(server, 3, says) as streams:
@@ -79,7 +81,7 @@ async def test_who_comes_no_further_is_closed(
 
 
 async def test_a_channel_without_a_session_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(DEADLINE_S, Stage.CHANNEL, 0.2)
+    monkeypatch.setitem(DEADLINE_S, ConnectionStage.CHANNEL, 0.2)
     async with serving(OPEN, tmp_path) as (server, _):
         client = Client(server.endpoint_url, timeout=2)
         await client.connect_socket()
@@ -96,7 +98,7 @@ async def test_a_channel_without_a_session_is_closed(tmp_path: Path, monkeypatch
 async def test_a_connection_whose_session_has_ended_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(DEADLINE_S, Stage.CHANNEL, 0.5)
+    monkeypatch.setitem(DEADLINE_S, ConnectionStage.CHANNEL, 0.5)
     async with serving(OPEN, tmp_path) as (server, _), connected(server) as client:
         await asyncio.sleep(1.5)
         await client.nodes.server_state.read_value()
@@ -107,7 +109,7 @@ async def test_a_connection_whose_session_has_ended_is_closed(
 
 
 async def test_one_address_has_its_share_of_sessions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(admission, "MOST_OF_ADDRESS", 4)
+    monkeypatch.setattr(connection_limits, "MOST_OF_ADDRESS", 4)
     async with serving(OPEN, tmp_path) as (server, _):
         clients = [Client(server.endpoint_url, timeout=2) for _ in range(4)]
         for client in clients:
@@ -155,8 +157,8 @@ class TestSubscriptions:
     async def test_one_session_and_one_address_have_their_share(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(shares, "MOST_OF_SESSION", 3)
-        monkeypatch.setattr(shares, "MOST_OF_ADDRESS", 5)
+        monkeypatch.setattr(quotas, "MOST_OF_SESSION", 3)
+        monkeypatch.setattr(quotas, "MOST_OF_ADDRESS", 5)
         async with serving(OPEN, tmp_path) as (server, _), connected(server) as greedy:
             for _ in range(3):
                 await greedy.create_subscription(1000, None)
@@ -173,7 +175,7 @@ class TestSubscriptions:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """A client that is started anew again and again has its old sessions still there."""
-        monkeypatch.setattr(shares, "MOST_OF_ADDRESS", 3)
+        monkeypatch.setattr(quotas, "MOST_OF_ADDRESS", 3)
         async with serving(OPEN, tmp_path) as (server, _):
             for _ in range(3):
                 crashed = Client(server.endpoint_url, timeout=2)
@@ -186,7 +188,7 @@ class TestSubscriptions:
     async def test_monitored_items_are_shared_out(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(shares, "MOST_ITEMS_OF_ADDRESS", 10)
+        monkeypatch.setattr(quotas, "MOST_ITEMS_OF_ADDRESS", 10)
         async with serving(OPEN, tmp_path) as (server, _), connected(server) as client:
             subscription = await client.create_subscription(1000, None)
             nodes = [client.nodes.server_state] * 10
@@ -199,7 +201,7 @@ class TestSubscriptions:
     async def test_requests_that_come_at_once_share_what_there_is(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(shares, "MOST_ITEMS_OF_ADDRESS", 150)
+        monkeypatch.setattr(quotas, "MOST_ITEMS_OF_ADDRESS", 150)
         async with serving(OPEN, tmp_path) as (server, _), connected(server) as one, connected(server) as two:
 
             async def watch(client: Client) -> int:
@@ -225,7 +227,7 @@ class TestSubscriptions:
     async def test_one_address_does_not_take_all_items_for_events(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(shares, "MOST_LISTENERS_OF_ADDRESS", 5)
+        monkeypatch.setattr(quotas, "MOST_LISTENERS_OF_ADDRESS", 5)
 
         def watch(number: int, fields: int) -> ua.MonitoringParameters:
             message = ua.SimpleAttributeOperand(

@@ -13,7 +13,7 @@ import pytest
 from asyncua import Client, ua
 
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.uaserver import admission, listener
+from bridge.uaserver import acceptor, connection_limits
 from bridge.uaserver.transport import MOST_BEFORE_SESSION
 from tests.support.opcua_site import OPEN, LocalView, break_off, connected, serving
 from tests.support.quiet import quiet_log
@@ -101,8 +101,8 @@ async def test_with_a_session_a_large_message_may_come(tmp_path: Path) -> None:
 
 @pytest.mark.landing
 async def test_all_together_hold_a_fixed_sum(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(admission, "MOST_HELD", 1_000_000)
-    monkeypatch.setattr(listener, "_UNWEIGHED", 100_000)
+    monkeypatch.setattr(connection_limits, "MOST_HELD", 1_000_000)
+    monkeypatch.setattr(acceptor, "_UNWEIGHED", 100_000)
     async with serving(OPEN, tmp_path) as (server, view), connected(server) as bystander:
         before = ended(view)
         async with session(server) as small, session(server) as large:
@@ -119,7 +119,7 @@ async def test_all_together_hold_a_fixed_sum(tmp_path: Path, monkeypatch: pytest
 async def test_answers_that_nobody_reads_are_part_of_the_sum(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(admission, "MOST_HELD", 1_000_000)
+    monkeypatch.setattr(connection_limits, "MOST_HELD", 1_000_000)
     async with serving(OPEN, tmp_path) as (server, view), connected(server) as bystander:
         before = ended(view)
         async with session(server) as client:

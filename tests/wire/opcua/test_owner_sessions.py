@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from asyncua import Client, ua
 
-from bridge.command import Event, Kind
+from bridge.command import Event, EventKind
 from tests.support.opcua_client import node
 from tests.support.opcua_site import OPEN, LocalView, namespace, serving
 
@@ -23,7 +23,7 @@ class Hall:
         self.events: list[Event] = []
         view.on_event(self.events.append)
 
-    def told(self, kind: Kind) -> list[str]:
+    def told(self, kind: EventKind) -> list[str]:
         return [event.message for event in self.events if event.kind is kind]
 
     def runs(self, drive: str = FU1) -> bool:
@@ -50,7 +50,7 @@ async def test_two_sessions_of_one_user_do_not_move_a_drive_in_turns(hall: Hall)
                 await write(other, SHUT_DOWN)
             assert hall.runs()
             await write(one, RUN)
-        (why,) = set(hall.told(Kind.REFUSED))
+        (why,) = set(hall.told(EventKind.REFUSED))
         words = why.split()
         assert words[:3] == ["write", "by", "opcua:anonymous"]
         assert why.count("opcua:anonymous session ") == 2
@@ -85,7 +85,7 @@ async def test_the_next_session_goes_on_where_the_first_one_has_ended(hall: Hall
         assert hall.runs()
     if is_killed:
         await one.disconnect()
-    assert not hall.told(Kind.REFUSED)
+    assert not hall.told(EventKind.REFUSED)
 
 
 async def test_a_lease_is_one_sessions(hall: Hall) -> None:

@@ -11,10 +11,10 @@ import pytest
 from asyncua import Client, ua
 
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.uaserver import admission, shares
+from bridge.uaserver import connection_limits, quotas
 from bridge.uaserver.routes import ROUTES
 from bridge.uaserver.session import Session
-from bridge.uaserver.states import REFUSALS, Need, State
+from bridge.uaserver.states import REFUSALS, Need, RequestSession
 from tests.support.opcua_raw import ask, item, monitored, sessions, told
 from tests.support.opcua_services import (
     LOAD,
@@ -91,19 +91,19 @@ async def channel(server: OpcUaServer) -> AsyncIterator[Channel]:
 
 
 @asynccontextmanager
-async def in_state(server: OpcUaServer, state: State) -> AsyncIterator[Channel]:
+async def in_state(server: OpcUaServer, state: RequestSession) -> AsyncIterator[Channel]:
     async with channel(server) as one, channel(server) as other:
-        if state is not State.NONE:
+        if state is not RequestSession.NONE:
             await one.create()
-        if state not in (State.NONE, State.CREATED):
+        if state not in (RequestSession.NONE, RequestSession.CREATED):
             await one.activate()
         match state:
-            case State.OTHER:
+            case RequestSession.OTHER:
                 await other.create()
                 one.token = other.token
-            case State.ENDED:
+            case RequestSession.ENDED:
                 await one.session().close_session()
-            case State.MOVED:
+            case RequestSession.MOVED:
                 other.token = one.token
                 await other.activate()
             case _:
@@ -120,8 +120,10 @@ def services() -> Iterator[tuple[Need, str]]:
         yield Need.USE, route.name
 
 
-@pytest.mark.parametrize("state", State)
-async def test_every_service_is_answered_as_the_table_says(server: OpcUaServer, state: State) -> None:
+@pytest.mark.parametrize("state", RequestSession)
+async def test_every_service_is_answered_as_the_table_says(
+    server: OpcUaServer, state: RequestSession
+) -> None:
     of_sessions = {code for codes in REFUSALS.values() for code in codes.values()}
     wrong: list[str] = []
     for need, service in services():
@@ -190,7 +192,7 @@ async def test_a_session_that_times_out_leaves_its_subscriptions_for_a_transfer(
 async def test_what_is_left_behind_takes_no_items_from_who_comes_again(
     server: OpcUaServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shares, "MOST_ITEMS_OF_ADDRESS", 3)
+    monkeypatch.setattr(quotas, "MOST_ITEMS_OF_ADDRESS", 3)
     async with logged_in(server, "anna") as before:
         number = await subscription(before)
         where = await point(before, LOAD)
@@ -207,8 +209,8 @@ async def test_there_is_a_channel_left_beside_all_sessions(
     server: OpcUaServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Who has lost its connection without the server's knowing comes back to its session on another one."""
-    monkeypatch.setattr(shares, "MOST_SESSIONS_OF_ADDRESS", 3)
-    monkeypatch.setattr(admission, "MOST_OF_ADDRESS", 4)
+    monkeypatch.setattr(quotas, "MOST_SESSIONS_OF_ADDRESS", 3)
+    monkeypatch.setattr(connection_limits, "MOST_OF_ADDRESS", 4)
     async with channel(server) as one, connected(server), connected(server), channel(server) as spare:
         await one.create()
         await one.activate()
@@ -222,7 +224,7 @@ async def test_there_is_a_channel_left_beside_all_sessions(
 async def test_a_session_without_a_connection_makes_room_for_a_new_one(
     server: OpcUaServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shares, "MOST_SESSIONS_OF_ADDRESS", 1)
+    monkeypatch.setattr(quotas, "MOST_SESSIONS_OF_ADDRESS", 1)
     async with channel(server) as before:
         await before.create()
         await before.activate()

@@ -13,8 +13,8 @@ from asyncua import Client, Node, ua
 from asyncua.common.subscription import Subscription
 
 from bridge.catalogue.points import site_points
-from bridge.command import Event, Kind
-from bridge.command.link import NodeState
+from bridge.command import Event, EventKind
+from bridge.command.drive_link import NodeState
 from bridge.image import Point, Quality
 from bridge.image.point import DataType
 from bridge.northbound.opcua.server import OpcUaServer
@@ -265,8 +265,8 @@ class TestEvents:
         await (await subscribe(client, told)).subscribe_events(client.nodes.server, kind)
         now = time.monotonic()
         for _ in range(1000):
-            view.plant.report(Event(now, Kind.REFUSED, "conveyor/fu1", 300, "refused"))
-        view.plant.report(Event(now, Kind.WATCHDOG, "conveyor/fu1", 900, "tripped"))
+            view.plant.report(Event(now, EventKind.REFUSED, "conveyor/fu1", 300, "refused"))
+        view.plant.report(Event(now, EventKind.WATCHDOG, "conveyor/fu1", 900, "tripped"))
         await asyncio.sleep(0.4)
         assert len(told.events) <= 30
         assert "tripped" in [event.Message.Text for event in told.events]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.mirror import MirrorPublisher
 from tests.support.views import view_of
 from tests.support.zenoh_site import ENABLED, drive_says, epoch, make_plant, node_is

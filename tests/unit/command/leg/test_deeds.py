@@ -10,12 +10,12 @@ from bridge.command import Action, Start
 from bridge.command.leg import deeds
 from bridge.command.leg.deeds import About, happen
 from bridge.command.leg.effect import LetGo, StartEnded
-from bridge.command.leg.forwarded import SENT_BEFORE, Stop
+from bridge.command.leg.forwarded import SENT_BEFORE, StopRule
 from bridge.command.leg.state import Stage
 from bridge.command.leg.table import TABLE, Deed, Stimulus
 from bridge.command.messages.request import Code, Outcome
 from bridge.drive import DriveState
-from tests.support.leg import DISABLE, Leg, running_nord, settings_of, turn_of
+from tests.support.leg import DISABLE, Leg, draft_of, running_nord, settings_of
 
 
 def test_every_deed_of_the_table_can_be_done() -> None:
@@ -32,22 +32,22 @@ def test_the_stage_and_the_deed_are_those_of_the_table(stage: Stage) -> None:
 
 
 def test_a_stop_by_a_command_is_sent_and_lets_go_of_what_is_held() -> None:
-    turn = turn_of(running_nord())
-    happen(turn, Stimulus.STOP, About(asked=Stop(lambda word: DISABLE)))
-    assert turn.sent.words[0] == DISABLE
-    assert turn.effects[0] == LetGo()
-    assert turn.is_asked
+    draft = draft_of(running_nord())
+    happen(draft, Stimulus.STOP, About(asked=StopRule(lambda word: DISABLE)))
+    assert draft.sent.words[0] == DISABLE
+    assert draft.effects[0] == LetGo()
+    assert draft.is_asked
 
 
 def test_a_start_that_is_led_nowhere_any_more_has_ended() -> None:
     leg = Leg(settings_of("nord/sk-tu4-cao"))
     leg.says(DriveState.READY)
     leg.asks(Start())
-    turn = turn_of(leg)
-    assert turn.start is not None
+    draft = draft_of(leg)
+    assert draft.start is not None
     ends = Outcome(Code.CANCELLED, "another owner")
-    happen(turn, Stimulus.LEFT, About(ends))
-    assert turn.start is None
-    assert turn.effects == [StartEnded(ends)]
-    happen(turn, Stimulus.LEFT, About(ends))
-    assert turn.effects == [StartEnded(ends)], "once"
+    happen(draft, Stimulus.LEFT, About(ends))
+    assert draft.start is None
+    assert draft.effects == [StartEnded(ends)]
+    happen(draft, Stimulus.LEFT, About(ends))
+    assert draft.effects == [StartEnded(ends)], "once"

@@ -9,25 +9,25 @@ from bridge.command.leg.due import judge
 from bridge.command.leg.effect import Tell, Tripped
 from bridge.command.leg.state import Owner, Stage
 from bridge.text import render
-from tests.support.leg import PLC, running_nord, turn_of
+from tests.support.leg import PLC, draft_of, running_nord
 
 
 @pytest.mark.parametrize(("at", "trips"), [(100.199, False), (100.2, True)])
 def test_a_watchdog_trips_at_its_deadline_and_says_when_it_was_due(at: float, trips: bool) -> None:
-    turn = turn_of(running_nord(), at)
-    judge(turn)
-    assert turn.is_tripped is trips
-    found = [effect for effect in turn.effects if isinstance(effect, Tripped)]
+    draft = draft_of(running_nord(), at)
+    judge(draft)
+    assert draft.is_tripped is trips
+    found = [effect for effect in draft.effects if isinstance(effect, Tripped)]
     assert found == ([Tripped(100.2, PLC, 200)] if trips else [])
-    assert turn.timer.is_overdue is trips
+    assert draft.timer.is_overdue is trips
 
 
 def test_a_lease_that_has_run_out_is_told_and_left() -> None:
-    turn = turn_of(running_nord(), 100.1)
-    turn.owner = Owner(PLC, lease_until=100.1)
-    judge(turn)
-    assert turn.owner.identity is None
-    assert [render(one.said) for one in turn.effects if isinstance(one, Tell)] == [
+    draft = draft_of(running_nord(), 100.1)
+    draft.owner = Owner(PLC, lease_until=100.1)
+    judge(draft)
+    assert draft.owner.identity is None
+    assert [render(one.said) for one in draft.effects if isinstance(one, Tell)] == [
         f"the lease of {PLC} ran out"
     ]
 

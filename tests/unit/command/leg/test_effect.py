@@ -7,7 +7,7 @@ from typing import get_args
 
 import pytest
 
-from bridge.command import Code, Kind, Outcome
+from bridge.command import Code, EventKind, Outcome
 from bridge.command.leg.effect import (
     Answer,
     Effect,
@@ -28,7 +28,7 @@ EFFECTS: tuple[Effect, ...] = (
     Tripped(100.2, None, 200),
     LetGo(),
     Ignored(),
-    Tell(Kind.OWNER, 300, "text"),
+    Tell(EventKind.OWNER, 300, "text"),
 )
 
 

@@ -14,9 +14,9 @@ from bridge.command.leg.event import (
     Connection,
     Event,
     NodeBack,
-    OwnWatch,
-    Report,
     StartAnew,
+    StatusReport,
+    StopsOnSilence,
     Time,
 )
 from bridge.command.leg.state import Way
@@ -24,13 +24,13 @@ from bridge.drive import DriveState
 
 PLC = Identity(Source.MODBUS, "192.168.1.10")
 EVENTS = (
-    Report(DriveState.OPERATION_ENABLED, False, ""),
+    StatusReport(DriveState.OPERATION_ENABLED, False, ""),
     ActualWords((0x0231, 0)),
     Time(),
     NodeBack(),
     StartAnew(),
     BridgeGap(),
-    OwnWatch(True),
+    StopsOnSilence(True),
     Connection(PLC, True),
     Way(is_open=True, why=""),
 )

@@ -64,7 +64,7 @@ def test_a_fault_before_the_drive_was_enabled_forgets_it(axis: Axis, state: Driv
 
 def test_a_fault_forgets_one_that_waits_for_the_acknowledge_bit_to_fall(axis: Axis):
     axis.write(RUN)
-    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
+    axis.says(DriveState.OPERATION_ENABLED, is_acknowledged=TAKEN)
     axis.write(position=PLACE)
     axis.says(DriveState.FAULT)
     axis.says(DriveState.READY)
@@ -75,7 +75,7 @@ def test_a_fault_forgets_one_that_waits_for_the_acknowledge_bit_to_fall(axis: Ax
 @pytest.mark.parametrize("word", [DISABLE, SHUTDOWN, 0x0002, 0x0000])
 def test_every_control_word_that_does_not_enable_forgets_it(axis: Axis, word: int):
     axis.write(RUN)
-    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
+    axis.says(DriveState.OPERATION_ENABLED, is_acknowledged=TAKEN)
     axis.write(position=PLACE)
     axis.write(word)
     axis.write(RUN)
@@ -104,7 +104,7 @@ def test_one_that_comes_to_a_drive_at_rest_does(axis: Axis):
 
 def test_leaving_operation_enabled_forgets_it(axis: Axis):
     axis.write(RUN)
-    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
+    axis.says(DriveState.OPERATION_ENABLED, is_acknowledged=TAKEN)
     axis.write(position=PLACE)
     axis.says(DriveState.QUICK_STOP_ACTIVE)
     axis.says(DriveState.OPERATION_ENABLED)
@@ -173,7 +173,7 @@ def test_one_that_is_taken_in_time_is_not_told(axis: Axis):
     axis.enable()
     axis.write(position=PLACE)
     axis.waits(0.5)
-    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
+    axis.says(DriveState.OPERATION_ENABLED, is_acknowledged=TAKEN)
     assert not told(axis.waits(5))
 
 
@@ -181,7 +181,7 @@ def test_one_that_is_taken_in_time_is_not_told(axis: Axis):
 def test_the_place_where_the_drive_was_before_a_stop_can_be_ordered_again(axis: Axis, way: str):
     axis.enable()
     axis.write(position=PLACE)
-    axis.says(DriveState.OPERATION_ENABLED, is_taken=TAKEN)
+    axis.says(DriveState.OPERATION_ENABLED, is_acknowledged=TAKEN)
     axis.says(DriveState.OPERATION_ENABLED)
     axis.write(position=PLACE)
     assert not axis.orders, "it is there, or on its way"

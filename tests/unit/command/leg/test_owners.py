@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Code, Identity, Kind, Role, Source, Start
+from bridge.command import Action, Code, EventKind, Identity, Role, Source, Start
+from bridge.command.drive_link import NodeState
 from bridge.command.leg import owners
 from bridge.command.leg.effect import StartEnded, Tell
-from bridge.command.link import NodeState
 from bridge.drive import DriveState
 from bridge.text import render
-from tests.support.leg import Leg, running_nord, settings_of, turn_of
+from tests.support.leg import Leg, draft_of, running_nord, settings_of
 from tests.support.rig import (
     ENABLE,
     ENGINEER,
@@ -30,7 +30,7 @@ class TestFixedSource:
     def test_the_first_valid_telegram_makes_its_sender_the_owner(self, rig: Rig):
         rig.write(SHUT_DOWN)
         assert rig.channel.owner == PLC
-        assert rig.told(Kind.OWNER) == ["controlled by modbus:192.168.1.10"]
+        assert rig.told(EventKind.OWNER) == ["controlled by modbus:192.168.1.10"]
 
     def test_another_connection_of_the_same_address_is_the_same_owner(self, running: Rig):
         again = Identity(Source.MODBUS, PLC.user, address="192.168.1.10:50123")
@@ -44,7 +44,7 @@ class TestFixedSource:
         assert not outcome.forwarded
         assert running.enables
         assert running.channel.refused_writes == 1
-        assert len(running.told(Kind.REFUSED)) == 1
+        assert len(running.told(EventKind.REFUSED)) == 1
 
     def test_a_silent_owner_is_replaced_by_the_same_protocol_alone(self, running: Rig):
         running.wait(0.2)
@@ -59,7 +59,7 @@ class TestFixedSource:
 
     def test_a_released_drive_is_free(self, running: Rig):
         running.ask(Action.RELEASE_CONTROL)
-        assert running.told(Kind.OWNER)[-1] == "released by modbus:192.168.1.10"
+        assert running.told(EventKind.OWNER)[-1] == "released by modbus:192.168.1.10"
         assert running.write(SHUT_DOWN, identity=OTHER_PLC).forwarded
 
     def test_a_reader_commands_nothing(self, rig: Rig):
@@ -121,7 +121,7 @@ class TestLease:
         assert not leased.enables
         assert leased.channel.owner is None
         assert leased.channel.trips == 0
-        assert "the lease of opcua:ann ran out" in leased.told(Kind.OWNER)
+        assert "the lease of opcua:ann ran out" in leased.told(EventKind.OWNER)
 
     @pytest.mark.parametrize("action", [Action.KEEP_ALIVE, Action.RESET_FAULT])
     def test_it_is_kept_by_going_on(self, leased: Rig, action: Action):
@@ -154,7 +154,7 @@ class TestLease:
 
     def test_that_it_was_broken_is_an_event(self, leased: Rig):
         leased.ask(Action.TAKE_CONTROL, ENGINEER, ttl_ms=1000)
-        assert leased.told(Kind.OWNER)[-2:] == [
+        assert leased.told(EventKind.OWNER)[-2:] == [
             "opcua:eve takes control away from opcua:ann",
             "controlled by opcua:eve",
         ]
@@ -162,7 +162,7 @@ class TestLease:
     def test_one_that_nobody_has_is_not_broken(self, rig: Rig):
         rig.ask(Action.TAKE_CONTROL, ENGINEER, ttl_ms=1000)
         rig.ask(Action.TAKE_CONTROL, ENGINEER, ttl_ms=1000)
-        assert rig.told(Kind.OWNER) == ["controlled by opcua:eve"]
+        assert rig.told(EventKind.OWNER) == ["controlled by opcua:eve"]
 
     def test_a_reader_gets_none(self, rig: Rig):
         assert rig.ask(Action.TAKE_CONTROL, OBSERVER, ttl_ms=1000).code is Code.NOT_ALLOWED
@@ -172,7 +172,7 @@ class TestLease:
         assert leased.channel.owner is None
         assert not leased.enables
         leased.wait(10)
-        assert not [message for message in leased.told(Kind.OWNER) if "ran out" in message]
+        assert not [message for message in leased.told(EventKind.OWNER) if "ran out" in message]
 
 
 class TestStops:
@@ -312,13 +312,13 @@ class TestAnOwnerThatNobodyWatches:
 
 
 def test_who_leaves_stops_its_drive_and_takes_its_time_out_along() -> None:
-    turn = turn_of(running_nord())
-    turn.timer = turn.timer._replace(timeout_ms=500)
-    owners.leave(turn)
-    assert turn.owner.identity is None
-    assert turn.timer.timeout_ms == 200
-    assert not turn.settings.words.enables(turn.word)
-    (told,) = turn.effects
+    draft = draft_of(running_nord())
+    draft.timer = draft.timer._replace(timeout_ms=500)
+    owners.leave(draft)
+    assert draft.owner.identity is None
+    assert draft.timer.timeout_ms == 200
+    assert not draft.settings.words.enables(draft.word)
+    (told,) = draft.effects
     assert isinstance(told, Tell)
     assert render(told.said) == "fieldbus_timeout_ms = 200 again, as in the site file"
 
@@ -328,9 +328,9 @@ def test_a_start_that_is_going_on_ends_when_its_owner_leaves() -> None:
     leg.says(DriveState.READY)
     leg.asks(Start())
     assert leg.state.start is not None
-    turn = turn_of(leg)
-    owners.leave(turn)
-    ended = [effect for effect in turn.effects if isinstance(effect, StartEnded)]
+    draft = draft_of(leg)
+    owners.leave(draft)
+    ended = [effect for effect in draft.effects if isinstance(effect, StartEnded)]
     said = [(one.outcome.code, one.outcome.message) for one in ended]
     assert said == [(Code.CANCELLED, "control of the drive has changed")]
-    assert turn.start is None
+    assert draft.start is None

@@ -8,7 +8,7 @@ from bridge.command.leg import reports
 from bridge.command.leg.event import ActualWords, StartAnew
 from bridge.command.leg.state import Motion
 from bridge.drive import DriveState
-from tests.support.leg import Leg, running_nord, settings_of, turn_of
+from tests.support.leg import Leg, draft_of, running_nord, settings_of
 
 
 @pytest.mark.parametrize(
@@ -21,10 +21,10 @@ from tests.support.leg import Leg, running_nord, settings_of, turn_of
     ],
 )
 def test_once_told_anew_nothing_that_was_sent_before_is_awaited(before: Motion, after: Motion) -> None:
-    turn = turn_of(running_nord())
-    turn.motion = before
-    reports.on_told_anew(turn)
-    assert turn.motion is after
+    draft = draft_of(running_nord())
+    draft.motion = before
+    reports.on_told_anew(draft)
+    assert draft.motion is after
 
 
 def test_motion_is_seen_and_ends() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.command.drive_link import NodeState
 from bridge.command.leg.outlook import next_deadline, watchdog_state
-from bridge.command.link import NodeState
 from bridge.drive import DriveState
 from bridge.mapping import load_family
 from tests.support.leg import Leg, settings_of
@@ -51,8 +51,8 @@ def test_a_position_goes_to_its_own_words_with_its_own_bit():
     assert leg.state.sent.words == (POSITION.enable | POSITION.handshake, 0x0001, 0x0002)
 
 
-@pytest.mark.parametrize(("answer", "is_taken"), [(0x0800, False), (0x1000, True), (0x2000, False)])
-def test_that_it_is_taken_is_bit_12_of_the_status_word(answer: int, is_taken: bool):
+@pytest.mark.parametrize(("answer", "is_acknowledged"), [(0x0800, False), (0x1000, True), (0x2000, False)])
+def test_that_it_is_taken_is_bit_12_of_the_status_word(answer: int, is_acknowledged: bool):
     """CiA 402-2, profile position: 6041h, "set-point acknowledge"."""
     rig = Rig(words=POSITION)
     rig.node(NodeState.OPERATIONAL)
@@ -62,4 +62,4 @@ def test_that_it_is_taken_is_bit_12_of_the_status_word(answer: int, is_taken: bo
     rig.drive_says(POSITION.enabled)
     assert rig.sent == POSITION.enable | POSITION.handshake
     rig.drive_says(POSITION.enabled | answer)
-    assert (rig.sent == POSITION.enable) is is_taken
+    assert (rig.sent == POSITION.enable) is is_acknowledged

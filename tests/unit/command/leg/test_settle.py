@@ -6,7 +6,7 @@ from bridge.command.leg.event import Time
 from bridge.command.leg.settle import look_at_way
 from bridge.command.leg.state import Motion, Stage
 from bridge.drive import DriveState
-from tests.support.leg import RUN, SHUT, SHUT_DOWN, Leg, running_nord, settings_of, told, turn_of
+from tests.support.leg import RUN, SHUT, SHUT_DOWN, Leg, draft_of, running_nord, settings_of, told
 
 
 def test_motion_begins_with_the_first_enabling_word() -> None:
@@ -19,13 +19,13 @@ def test_motion_begins_with_the_first_enabling_word() -> None:
 
 def test_a_way_that_is_closed_closes_the_leg_and_one_that_opens_interlocks_it() -> None:
     leg = running_nord()
-    turn = turn_of(leg)
-    turn.way = SHUT
-    look_at_way(turn)
-    assert turn.stage is Stage.CLOSED
-    turn.way = leg.state.way
-    look_at_way(turn)
-    assert turn.stage is Stage.INTERLOCKED
+    draft = draft_of(leg)
+    draft.way = SHUT
+    look_at_way(draft)
+    assert draft.stage is Stage.CLOSED
+    draft.way = leg.state.way
+    look_at_way(draft)
+    assert draft.stage is Stage.INTERLOCKED
 
 
 def test_a_position_that_is_not_taken_in_time_is_told() -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Action, Code, Kind
-from bridge.command.link import NodeState
+from bridge.command import Action, Code, EventKind
+from bridge.command.drive_link import NodeState
 from bridge.drive import DriveState
 from tests.support.rig import (
     ACKNOWLEDGE,
@@ -142,7 +142,7 @@ class TestRunning:
         assert running.channel.trips == 1
         assert running.channel.current_fault == 10.3
         assert running.channel.fault_text.startswith("E010/10.3 ")
-        (message,) = running.told(Kind.WATCHDOG)
+        (message,) = running.told(EventKind.WATCHDOG)
         assert "modbus:192.168.1.10 was silent for 200 ms" in message
 
     def test_a_lost_node_does_not_stop_the_timer(self, running: Rig):

@@ -10,7 +10,7 @@ from bridge.command.leg.settle import settle
 from bridge.command.leg.state import Stage
 from bridge.command.messages.request import Command, Do, Request
 from bridge.drive import DriveState
-from tests.support.leg import PLC, SHUT_DOWN, Leg, running_nord, settings_of, turn_of
+from tests.support.leg import PLC, SHUT_DOWN, Leg, draft_of, running_nord, settings_of
 
 READER = Identity(Source.OPCUA, "reader", Role.OBSERVER)
 
@@ -25,12 +25,12 @@ def test_a_request_is_answered_once(action: Action) -> None:
 def test_an_acknowledge_leaves_the_trip_behind_the_interlock() -> None:
     leg = running_nord()
     leg.trips()
-    turn = turn_of(leg)
-    step._handle(turn, Request(PLC, "n/d", Do(Action.RESET_FAULT)))
-    settle(turn)
-    assert turn.stage is Stage.INTERLOCKED
-    assert not turn.is_enabling
-    assert turn.pulse_until is not None
+    draft = draft_of(leg)
+    step._handle(draft, Request(PLC, "n/d", Do(Action.RESET_FAULT)))
+    settle(draft)
+    assert draft.stage is Stage.INTERLOCKED
+    assert not draft.is_enabling
+    assert draft.pulse_until is not None
 
 
 def test_an_edge_in_the_owners_word_makes_no_pulse_of_the_bridges_own() -> None:

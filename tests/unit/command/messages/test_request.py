@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.command import Action, Code, Identity, Outcome, ReadParameter, Role, Source, command_of
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.northbound.zenoh.keys import outcome_json
 from tests.support.docs import page
 from tests.support.rig import READY, Rig

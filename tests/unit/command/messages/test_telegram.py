@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.command import Code
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.command.messages.telegram import Refusal
 from bridge.image import Value
 from tests.support.rig import ENABLE, HALF_SPEED, PLC, SHUT_DOWN, Rig

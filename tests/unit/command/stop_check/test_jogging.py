@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, Verdict
+from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopVerdict
 from tests.support.judge import Judge
 from tests.support.nightly import examples
 
@@ -78,7 +78,7 @@ class Jogged:
         self.follow = Judge()
         self.said = Says.NOTHING
         self.tpdo_at = 0.0
-        self.verdicts: list[Verdict] = []
+        self.verdicts: list[StopVerdict] = []
         self.follow.on_node(is_there=True)
         self.send(Sent.ENABLES, 1.0)
 
@@ -107,7 +107,7 @@ class Jogged:
             self.send(Sent.ENABLES, run_s)
 
     @property
-    def ignored(self) -> list[Verdict]:
+    def ignored(self) -> list[StopVerdict]:
         return [verdict for verdict in self.verdicts if verdict.outcome is LastStop.IGNORED]
 
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.command.stop_check.drive import DriveStopCheck
-from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, Verdict
+from bridge.command.stop_check.drive_check import DriveStopCheck
+from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopVerdict
 from bridge.drive import OwnJudgement, OwnVerdict
-from bridge.drive.own_supervision import Watch
+from bridge.drive.own_judgement import DriveWatch
 from tests.support.judge import Judge
 from tests.support.nightly import examples
 from tests.support.rig import Rig
@@ -28,7 +28,7 @@ class Judged:
         self.now = 100.0
         self.heard_at: float | None = None
         self.pause_s = pause_s
-        self.verdicts: list[Verdict] = []
+        self.verdicts: list[StopVerdict] = []
         self.follow.on_node(is_there=True)
 
     def send(self, sent: Sent) -> None:
@@ -459,7 +459,7 @@ class Bus:
     last: float | None = None
     shown: Says = Says.NOTHING
     inbox: list[tuple[float, Says]] = field(default_factory=list[tuple[float, Says]])
-    verdicts: list[Verdict] = field(default_factory=list[Verdict])
+    verdicts: list[StopVerdict] = field(default_factory=list[StopVerdict])
 
     def __post_init__(self) -> None:
         self.follow.on_node(is_there=True)
@@ -499,7 +499,7 @@ class Bus:
             self.follow.on_output(word)
 
     @property
-    def ignored(self) -> list[Verdict]:
+    def ignored(self) -> list[StopVerdict]:
         return [verdict for verdict in self.verdicts if verdict.outcome is LastStop.IGNORED]
 
 
@@ -578,8 +578,8 @@ def test_a_drive_that_somebody_else_enables_is_named(
 
 def test_of_a_drive_that_watches_our_heartbeat_too_silence_ends_its_process_data_alone() -> None:
     stops = OwnVerdict.STOPS
-    heartbeat = Watch("heartbeat", "heartbeat", "", 300.0, "", stops, silent_ms=100)
-    process_data = Watch("RPDO1", "process_data", "", 3000.0, "", stops, silent_ms=100)
+    heartbeat = DriveWatch("heartbeat", "heartbeat", "", 300.0, "", stops, silent_ms=100)
+    process_data = DriveWatch("RPDO1", "process_data", "", 3000.0, "", stops, silent_ms=100)
     following = DriveStopCheck(Rig().channel)
     bounds = following._bounds(10, OwnJudgement((heartbeat, process_data)))
     assert bounds.silence_s == pytest.approx(3.0 + bounds.ramp_s)

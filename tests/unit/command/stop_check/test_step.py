@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command.stop_check.state import LastStop, Says, Sent, Verdict
+from bridge.command.stop_check.state import LastStop, Says, Sent, StopVerdict
 from tests.support.judge import Judge
 from tests.support.stop_play import BOUNDS, PAUSE_S, STEP_S, UNWATCHED, Deed, Play, Script, Told, told
 
@@ -55,7 +55,7 @@ def test_a_drive_that_runs_on_is_named_by_its_first_telegram_at_the_end_of_the_b
 ) -> None:
     told(script, [(IGNORED, ignored_at)])
     [verdict] = Play().run(script).verdicts
-    assert verdict == Verdict(IGNORED, LastStop.FORWARDED, since=1.0, at=ignored_at)
+    assert verdict == StopVerdict(IGNORED, LastStop.FORWARDED, since=1.0, at=ignored_at)
 
 
 def test_silence_that_nobody_watches_has_no_bound_but_the_next_word_has() -> None:
@@ -385,7 +385,7 @@ def test_a_pause_begins_the_bound_anew_while_the_stop_is_changing() -> None:
     assert judge.awaits_sending
     assert judge.on_time(1.75 - STEP_S, 1.75 - STEP_S, PAUSE_S) == []
     [verdict] = judge.on_time(1.75, 1.75, PAUSE_S)
-    assert verdict == Verdict(IGNORED, LastStop.FORWARDED, since=1.25, at=1.75)
+    assert verdict == StopVerdict(IGNORED, LastStop.FORWARDED, since=1.25, at=1.75)
 
 
 def test_who_is_cut_off_while_the_stop_is_changing_is_judged_on() -> None:

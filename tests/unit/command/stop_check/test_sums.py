@@ -6,14 +6,14 @@ from math import inf
 
 import pytest
 
-from bridge.command.stop_check.sums import StopTime, Unfollowed
+from bridge.command.stop_check.sums import IgnoredTime, Unfollowed
 
 OFF_S, RAMP_S = 0.5, 32.0
 LIMIT_S = RAMP_S / 4
 
 
-def counted(*telegrams: tuple[float, float | None], begins_at: float = 1.0) -> StopTime:
-    time = StopTime().begin(begins_at)
+def counted(*telegrams: tuple[float, float | None], begins_at: float = 1.0) -> IgnoredTime:
+    time = IgnoredTime().begin(begins_at)
     for at, speed in telegrams:
         time = time.seen(at, speed)
     return time
@@ -26,7 +26,7 @@ def test_time_counts_from_when_telegrams_tell_of_the_stop() -> None:
 
 
 def test_the_first_telegram_of_a_stop_has_nothing_to_be_compared_with() -> None:
-    assert counted((1.5, 100.0)) == StopTime(begins_at=1.0, seen_at=1.5, speed=100.0)
+    assert counted((1.5, 100.0)) == IgnoredTime(begins_at=1.0, seen_at=1.5, speed=100.0)
 
 
 def test_without_a_stop_nothing_counts() -> None:
@@ -68,7 +68,7 @@ def test_speeds_of_two_stops_are_not_compared() -> None:
 def test_a_speed_before_the_stop_is_of_use_where_it_was_steady(
     before: list[float], time_s: float, lost: float
 ) -> None:
-    time = StopTime()
+    time = IgnoredTime()
     for place, speed in enumerate(before):
         time = time.seen(place / 64, speed)
     time = time.begin(1.0).seen(1.5, 48.0)
@@ -77,7 +77,7 @@ def test_a_speed_before_the_stop_is_of_use_where_it_was_steady(
 
 @pytest.mark.parametrize("speed", [0.0, -100.0])
 def test_who_stands_or_turns_round_has_obeyed(speed: float) -> None:
-    assert counted((1.0, 100.0), (2.0, 100.0), (2.5, speed)) == StopTime(begins_at=1.0)
+    assert counted((1.0, 100.0), (2.0, 100.0), (2.5, speed)) == IgnoredTime(begins_at=1.0)
 
 
 def test_after_obeying_the_same_stop_may_count_again() -> None:
@@ -85,7 +85,7 @@ def test_after_obeying_the_same_stop_may_count_again() -> None:
     assert (time.time_s, time.stops) == (0.5, 1)
 
 
-def judged(time: Unfollowed, at: float, speed: float | None) -> tuple[Unfollowed, StopTime | None]:
+def judged(time: Unfollowed, at: float, speed: float | None) -> tuple[Unfollowed, IgnoredTime | None]:
     return time.seen(at, speed, off_s=OFF_S, ramp_s=RAMP_S)
 
 
@@ -99,7 +99,9 @@ def test_who_stays_on_after_a_word_that_takes_the_voltage_is_named_at_the_short_
     assert found is None
     time, found = judged(time, 1.5, None)
     assert found is not None and found.time_s == OFF_S
-    assert time == Unfollowed(StopTime(begins_at=1.0), StopTime(begins_at=1.0)), "and the count begins anew"
+    assert time == Unfollowed(IgnoredTime(begins_at=1.0), IgnoredTime(begins_at=1.0)), (
+        "and the count begins anew"
+    )
 
 
 def test_a_stop_that_leaves_the_voltage_on_is_not_judged_without_a_speed() -> None:
@@ -120,7 +122,7 @@ def test_after_a_quarter_of_the_slowest_ramp_a_quarter_of_its_loss_is_asked_for(
     assert found is None
     time, found = judged(time, 1.0 + LIMIT_S, 1024.0 * (1.0 - lost))
     assert (found is not None) is is_named
-    assert time.fast == StopTime(begins_at=1.0), "either way the count begins anew"
+    assert time.fast == IgnoredTime(begins_at=1.0), "either way the count begins anew"
 
 
 def test_where_the_bounds_are_the_same_the_whole_of_it_is_the_least() -> None:

@@ -12,8 +12,8 @@ from unittest.mock import patch
 import pytest
 
 from bridge.command.stop_check import step as judge
-from bridge.command.stop_check.state import LastStop, Place
-from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Finding, News, PlaceDeed
+from bridge.command.stop_check.state import LastStop, StopPlace
+from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Evidence, News, PlaceDeed
 from tests.support import stop_rules
 from tests.support.nightly import by_night_of
 from tests.support.stop_profiles import ON_CHANGE, PROFILES
@@ -120,8 +120,8 @@ def _given(mark: Any, row: Any) -> dict[str, Any]:
 
 
 def test_every_place_and_every_outcome_has_each_event() -> None:
-    assert PLACE_TABLE.keys() == {(place, news) for place in Place for news in News}
-    assert OUTCOME_TABLE.keys() == {(outcome, finding) for outcome in LastStop for finding in Finding}
+    assert PLACE_TABLE.keys() == {(place, news) for place in StopPlace for news in News}
+    assert OUTCOME_TABLE.keys() == {(outcome, finding) for outcome in LastStop for finding in Evidence}
 
 
 def test_a_drive_that_is_not_told_to_stop_is_not_judged() -> None:

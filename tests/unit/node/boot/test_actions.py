@@ -7,9 +7,9 @@ import pytest
 from bridge.canopen.sdo import SdoError
 from bridge.node.boot.actions import (
     BootResult,
+    BootStep,
     DeviceErrors,
     DrivePlan,
-    Step,
     go_on_without,
     number,
     same,
@@ -17,7 +17,7 @@ from bridge.node.boot.actions import (
     wish,
     write_number,
 )
-from bridge.node.boot.status import BootError
+from bridge.node.boot.error_status import BootError
 from bridge.text import Text, render
 from tests.support.answering import Answering
 
@@ -29,8 +29,8 @@ PDOS = Text.of("boot_step.pdos")
 
 
 def test_a_step_names_the_key_that_asks_for_it() -> None:
-    assert render(Step(PDOS, "J").said) == "reading the process data mapping"
-    said = Step(PDOS, "J", needed_by="drive").said
+    assert render(BootStep(PDOS, "J").said) == "reading the process data mapping"
+    said = BootStep(PDOS, "J", needed_by="drive").said
     assert render(said) == "reading the process data mapping (needed by drive)"
 
 

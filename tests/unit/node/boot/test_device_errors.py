@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Identity, Kind, Outcome, Request, Role, Source, Start
-from bridge.command.link import NodeState
+from bridge.command import Action, EventKind, Identity, Outcome, Request, Role, Source, Start
+from bridge.command.drive_link import NodeState
 from bridge.mapping import load_family
 from bridge.node.boot import BootMemory
 from bridge.sim.catalogue import simulate_node
@@ -90,7 +90,7 @@ def test_it_is_back_by_itself_after_one_reset(tmp_path: Path) -> None:
     assert len(bench.told(f"the node says: {SAID}")) == 1
     assert len(bench.told("reset communication by the bridge, once")) == 1
     [kind] = [event.kind for event in bench.events if "reset communication by the bridge" in event.message]
-    assert kind is Kind.CONFIGURATION, "nobody has taken the drive"
+    assert kind is EventKind.CONFIGURATION, "nobody has taken the drive"
 
 
 def test_one_that_goes_on_refusing_is_reset_once(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command.node import Node
-from bridge.mapping.fields import ObjectRef
+from bridge.mapping.entry_types import ObjectRef
 from bridge.node.boot.actions import BootResult, SignalPlan
 from bridge.node.boot.device_pdos import plan_device
 from bridge.text import render

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from bridge.command.node import Node
-from bridge.command.output_words import OutputWords, Place
+from bridge.command.output_words import OutputPlace, OutputWords
 from bridge.command.outputs import Outputs
 from bridge.config import SafeValue
-from bridge.drive.own_supervision import OwnJudgement, OwnVerdict, Watch
-from bridge.mapping.device import Output
+from bridge.drive.own_judgement import DriveWatch, OwnJudgement, OwnVerdict
+from bridge.mapping.device_signals import Output
 from bridge.node.boot.actions import BootResult
 from bridge.node.boot.device_watch import (
     judge_outputs,
@@ -26,7 +26,7 @@ from tests.support.devices import IO_BLOCK, OUTPUTS
 from tests.support.nodes import device_plant
 
 
-def place(index: str, kind: str, on_expiry: SafeValue = 0, *, has_errors: bool = True) -> Place:
+def place(index: str, kind: str, on_expiry: SafeValue = 0, *, has_errors: bool = True) -> OutputPlace:
     keys: dict[str, object] = {"name": "valves", "object": index, "data_type": kind, "on_expiry": on_expiry}
     if has_errors:
         keys |= {"error_mode": "6206:01", "error_value": "6207:01"}
@@ -53,7 +53,7 @@ DIGITAL, ANALOGUE = place("6200:01", "uint8"), place("6411:01", "int16", 5)
     ],
 )
 def test_an_output_is_safe_where_mode_and_value_say_so(
-    one: Place, safe: int, mode: int | None, value: int | None, why: str
+    one: OutputPlace, safe: int, mode: int | None, value: int | None, why: str
 ) -> None:
     """CiA 401: an error mode of 1 takes the error value; digital ones have a bit each."""
     assert render(why_not_safe(one, safe, mode, value)) == why
@@ -78,8 +78,8 @@ def test_it_is_judged_by_what_the_node_holds() -> None:
 
 
 def test_a_node_that_notices_and_keeps_its_outputs_runs_on() -> None:
-    stops = Watch("heartbeat", "heartbeat", "1016:01", 300.0, "stops", OwnVerdict.STOPS, silent_ms=100)
-    link = Watch("link", "link", "x", None, "", None)
+    stops = DriveWatch("heartbeat", "heartbeat", "1016:01", 300.0, "stops", OwnVerdict.STOPS, silent_ms=100)
+    link = DriveWatch("link", "link", "x", None, "", None)
     own = OwnJudgement((stops, link))
     assert own.verdict is OwnVerdict.STOPS
     kept = keeps_outputs(own, "valves keeps its value")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from bridge.base.errors import FileFaults
-from bridge.command.link import NodeState
-from bridge.node.boot.status import HINTS
+from bridge.command.drive_link import NodeState
+from bridge.node.boot.error_status import HINTS
 from bridge.text import render
 from tests.support.quick import Quick, quick_site
 

@@ -7,9 +7,9 @@ import struct
 import pytest
 
 from bridge.config.download import Download
+from bridge.node.boot.error_status import BootError
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_downloads import download_pdo, is_pdo, pdo_parameter
-from bridge.node.boot.status import BootError
 from tests.support.answering import Answering
 
 OFF = 0x8000_0000

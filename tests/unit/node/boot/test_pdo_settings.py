@@ -6,7 +6,7 @@ import struct
 from pathlib import Path
 
 from bridge.canopen.frame import Frame
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Quality
 from tests.support.bench import Bench, write_site
 

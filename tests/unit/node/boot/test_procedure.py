@@ -8,9 +8,9 @@ import pytest
 
 from bridge.canopen import abort
 from bridge.canopen.frame import Frame
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Quality
-from bridge.node.boot.status import HINTS
+from bridge.node.boot.error_status import HINTS
 from bridge.text import render
 from tests.support.bench import BEGIN_S, Bench, write_site
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.nmt import NmtCommand
-from bridge.node.boot.actions import BootResult, Nmt
+from bridge.node.boot.actions import BootResult, SendNmt
+from bridge.node.boot.error_status import BootError
 from bridge.node.boot.sdo_servers import open_sdo_servers
-from bridge.node.boot.status import BootError
 from bridge.text import render
 from tests.support.answering import Answering
 from tests.support.nodes import node_of
@@ -43,7 +43,7 @@ def test_one_that_is_open_as_wanted_is_not_touched() -> None:
     node = Answering({(0x1202, 1): number(0x445), (0x1202, 2): number(0x3C5)})
     assert opened(node).notes == []
     assert node.writes == []
-    assert Nmt(NmtCommand.STOP) not in node.said
+    assert SendNmt(NmtCommand.STOP) not in node.said
 
 
 def test_an_identifier_in_use_is_switched_off_before_it_changes() -> None:

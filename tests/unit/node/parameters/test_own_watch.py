@@ -5,7 +5,7 @@ from __future__ import annotations
 from bridge.image import Value
 from bridge.mapping.own_places import place_of, settable
 from bridge.node.parameters.own_watch import OwnWatch
-from bridge.parameter import Entry
+from bridge.parameter import ParameterEntry
 from bridge.text import render
 from tests.support import sites
 from tests.support.nodes import node_of
@@ -23,7 +23,7 @@ class Case:
         entry = settable(sites.family(SK54X))
         assert entry is not None
         self.off = entry.off[0]
-        self.entry: Entry = self.node.names.at(place_of(sites.family(SK54X), entry).ref)
+        self.entry: ParameterEntry = self.node.names.at(place_of(sites.family(SK54X), entry).ref)
 
     def why_kept(self, value: Value) -> str:
         return self.watch.why_kept(self.drive, self.entry, value)

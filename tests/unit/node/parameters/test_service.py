@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.command import Action, Code, Identity, Kind, Outcome, Request, Role, Source, command_of
+from bridge.command import Action, Code, EventKind, Identity, Outcome, Request, Role, Source, command_of
 from bridge.drive import DriveState, OwnJudgement
 from bridge.image import Quality
-from bridge.parameter.ledger import MOST_WRITES, Saved
+from bridge.parameter.ledger import MOST_WRITES, WriteRecord
 from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.support.bench import Bench, write_site
 
@@ -146,7 +146,7 @@ def test_a_parameter_is_written_and_read_back(parameters: Parameters) -> None:
     (frame,) = parameters.downloads(0x2066)
     assert frame.data == bytes.fromhex("2B 66 20 01 67 00 00 00")
     assert parameters.point("p102") == (1.03, Quality.GOOD)
-    told = [event.message for event in parameters.bench.events if event.kind is Kind.CONFIGURATION]
+    told = [event.message for event in parameters.bench.events if event.kind is EventKind.CONFIGURATION]
     assert "P102 = 1.03 s (was 2 s), by opcua:eve" in told
 
 
@@ -162,7 +162,7 @@ def test_who_is_no_engineer_writes_nothing(parameters: Parameters, identity: Ide
     for action, more in ((WRITE, {"parameter": "P102", "value": 1.0}), (SAVE, {})):
         assert parameters.ask(action, identity, **more).code is Code.NOT_ALLOWED
     assert not parameters.downloads(0x2066)
-    assert parameters.bench.events[-1].kind is Kind.REFUSED
+    assert parameters.bench.events[-1].kind is EventKind.REFUSED
 
 
 def test_a_client_of_a_protocol_without_roles_may_be_let(parameters: Parameters) -> None:
@@ -289,7 +289,7 @@ def test_parameters_of_the_interface_go_to_the_eeprom_when_they_are_saved(parame
 
 def test_a_warning_comes_with_each_tenth(parameters: Parameters) -> None:
     ledger = parameters.bench.plant.eeprom_writes
-    ledger.restore({("conveyor/fu1", "2066:01"): Saved(9_999)}, 0.0, 0.0)
+    ledger.restore({("conveyor/fu1", "2066:01"): WriteRecord(9_999)}, 0.0, 0.0)
     assert parameters.write("P102", 1.0).ok
     told = [event.message for event in parameters.bench.events if event.severity == 600]
     assert told == ["P102 of conveyor/fu1 was written 10000 times: its EEPROM endures 100000 writes"]

@@ -14,8 +14,8 @@ from bridge.canopen.sdo import Result, SdoError
 from bridge.command import Identity, ReadParameter, Request, Source
 from bridge.mapping import Family, load_family
 from bridge.mapping.model import SdoServer
-from bridge.mapping.site import load_site_and_families
-from bridge.node.boot import BootError, BootResult, Nmt, Read, Step, Write
+from bridge.mapping.site_families import load_site_and_families
+from bridge.node.boot import BootError, BootResult, BootStep, SdoRead, SdoWrite, SendNmt
 from bridge.node.boot.sdo_servers import open_sdo_servers
 from tests.support import sites
 from tests.support.bench import Bench, write_site
@@ -182,15 +182,15 @@ class Opening:
                 return
             answer = None
             match action:
-                case Read(index, sub):
+                case SdoRead(index, sub):
                     answer = self.objects[index, sub].to_bytes(4, "little")
-                case Write(index, sub, data):
+                case SdoWrite(index, sub, data):
                     self.writes.append(f"{index:04X}:{sub} {data[::-1].hex().upper()}")
                     if (index, sub) in self.objects and self.objects[index, sub] >= 0:
                         self.keep(index, sub, int.from_bytes(data, "little"))
-                case Nmt(command):
+                case SendNmt(command):
                     self.nmt.append(command)
-                case Step():
+                case BootStep():
                     pass
                 case _:
                     raise AssertionError(action)

@@ -8,7 +8,7 @@ import pytest
 
 from bridge.canopen.frame import Frame
 from bridge.canopen.pdo import PdoCodec, PdoEntry
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Quality
 from bridge.node.boot import PdoPlan, SignalPlan
 from bridge.node.process.inputs import connect_inputs

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from bridge import __version__
+from bridge.northbound.gateway.gateway_session import Net
 from bridge.northbound.gateway.nets import net_of
-from bridge.northbound.gateway.session import Net
 from tests.support import sites
 
 

@@ -16,7 +16,7 @@ from bridge.base.errors import OperationFailed, Unavailable
 from bridge.command import Code, Outcome, Reply, Request, Role
 from bridge.northbound.gateway.server import MOST_CLIENTS, GatewayServer
 from bridge.northbound.view import View
-from tests.unit.northbound.gateway.test_session import NET
+from tests.unit.northbound.gateway.test_gateway_session import NET
 
 
 class Bridge:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.northbound.gateway.syntax import Refused, parse, split_sequence
+from bridge.northbound.gateway.syntax import BadLine, parse, split_sequence
 
 
 @given(st.text())
@@ -13,5 +13,5 @@ def test_no_line_raises_anything_but_a_refusal(text: str) -> None:
     try:
         _, rest = split_sequence(text)
         parse(rest)
-    except Refused:
+    except BadLine:
         pass

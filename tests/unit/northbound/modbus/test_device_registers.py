@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.northbound.modbus.device_registers import DeviceMap
-from bridge.northbound.modbus.registers import Row, Table
+from bridge.northbound.modbus.registers import RegisterTable, Row
 from tests.support.devices import ENCODER, IO_BLOCK, OUTPUTS
 from tests.support.nodes import device_plant
 
@@ -17,13 +17,13 @@ def map_of(folder: Path, mapping: str = ENCODER, more: str = "") -> DeviceMap:
     return DeviceMap(plant.catalogue.devices["shaft"])
 
 
-def rows(one: DeviceMap, table: Table) -> dict[int, Row]:
+def rows(one: DeviceMap, table: RegisterTable) -> dict[int, Row]:
     return {row.address: row for row in one.rows if row.table is table}
 
 
 def test_inputs_begin_at_32_in_the_order_of_the_mapping(tmp_path: Path) -> None:
     """docs/reference: an integer that is not scaled has the registers of its type, all else is a float32."""
-    found = rows(map_of(tmp_path), Table.INPUT_REGISTER)
+    found = rows(map_of(tmp_path), RegisterTable.INPUT_REGISTER)
     named = {address: (row.name, row.type) for address, row in found.items() if address >= 32}
     assert named == {
         32: ("input/position", "float32"),
@@ -34,7 +34,7 @@ def test_inputs_begin_at_32_in_the_order_of_the_mapping(tmp_path: Path) -> None:
 
 
 def test_named_bits_are_discrete_inputs(tmp_path: Path) -> None:
-    found = rows(map_of(tmp_path), Table.DISCRETE_INPUT)
+    found = rows(map_of(tmp_path), RegisterTable.DISCRETE_INPUT)
     assert [found[place].name for place in (0, 1)] == [
         "input/alarms/position_error",
         "input/alarms/commissioning",
@@ -43,13 +43,13 @@ def test_named_bits_are_discrete_inputs(tmp_path: Path) -> None:
 
 def test_what_has_no_outputs_has_nothing_to_write(tmp_path: Path) -> None:
     one = map_of(tmp_path)
-    assert rows(one, Table.COIL) == {}
-    assert all(address >= 1000 for address in rows(one, Table.HOLDING_REGISTER))
-    assert 14 not in rows(one, Table.INPUT_REGISTER), "no watchdog"
+    assert rows(one, RegisterTable.COIL) == {}
+    assert all(address >= 1000 for address in rows(one, RegisterTable.HOLDING_REGISTER))
+    assert 14 not in rows(one, RegisterTable.INPUT_REGISTER), "no watchdog"
 
 
 def test_outputs_are_commanded_where_drives_are(tmp_path: Path) -> None:
-    found = rows(map_of(tmp_path, IO_BLOCK, OUTPUTS), Table.HOLDING_REGISTER)
+    found = rows(map_of(tmp_path, IO_BLOCK, OUTPUTS), RegisterTable.HOLDING_REGISTER)
     assert [found[address].name for address in (10, 11, 13)] == ["keep_alive", "acknowledge", "stop"]
     assert [found[address].name for address in (32, 33, 35)] == [
         "output/valves",
@@ -65,6 +65,6 @@ def test_no_two_rows_overlap(tmp_path: Path, mapping: str, more: str) -> None:
         (row.table, address) for row in one.rows for address in range(row.address, row.address + row.size)
     ]
     assert len(taken) == len(set(taken))
-    for table in (Table.INPUT_REGISTER, Table.HOLDING_REGISTER):
+    for table in (RegisterTable.INPUT_REGISTER, RegisterTable.HOLDING_REGISTER):
         ends = [row.address + row.size for row in one.rows if row.table is table and 32 <= row.address < 1000]
         assert one.end(table) == max(ends, default=32)

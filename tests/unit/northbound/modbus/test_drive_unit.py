@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Code, Event, Identity, Kind, Outcome, PlantView, Reply, Request, Write
+from bridge.command import Code, Event, EventKind, Identity, Outcome, PlantView, Reply, Request, Write
 from tests.support.modbus_site import (
     ENABLED,
     OTHER_PLC,
@@ -167,7 +167,7 @@ def test_refusals_by_the_drives_channel_are_told(rig: Rig):
     events: list[Event] = []
     rig.plant.on_event(events.append)
     rig.write(0, 0x047E, *[0] * 11, 500)
-    assert [event.kind for event in events] == [Kind.REFUSED]
+    assert [event.kind for event in events] == [EventKind.REFUSED]
 
 
 def test_keep_alive_feeds_the_watchdog_and_zero_releases(rig: Rig):

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.command import Plant
-from bridge.command.link import FurtherTpdo, NodeState
+from bridge.command.drive_link import FurtherTpdo, NodeState
 from bridge.image import Quality
 from bridge.mapping import family_names
 from bridge.mapping.model import ProcessValue

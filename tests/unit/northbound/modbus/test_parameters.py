@@ -10,7 +10,7 @@ import pytest
 
 from bridge.command import Identity, Role, Source
 from bridge.northbound.modbus.pdu import ExceptionCode
-from bridge.northbound.modbus.registers import PARAMETERS, Table
+from bridge.northbound.modbus.registers import PARAMETERS, RegisterTable
 from bridge.northbound.modbus.units import drive_maps
 from bridge.sim.nord.nord_supervision import Presence
 from tests.support.bench import Bench, write_site
@@ -60,7 +60,7 @@ def test_writable_parameters_stand_from_register_1000_on(station: Station) -> No
     shown = [row.name for row in station.map.inputs]
     assert shown.index("parameter/p102") > shown.index("actual/frequency")
     assert {row.type for row in rows} == {"float32", "int32"}
-    assert all(row.table is Table.HOLDING_REGISTER for row in rows)
+    assert all(row.table is RegisterTable.HOLDING_REGISTER for row in rows)
 
 
 def test_a_write_is_answered_when_the_drive_has_answered(station: Station) -> None:

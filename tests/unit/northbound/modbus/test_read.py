@@ -7,10 +7,10 @@ import struct
 import pytest
 
 from bridge.command import Identification
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.config import WordOrder
 from bridge.drive import OwnJudgement
-from bridge.northbound.modbus.registers import DriveMap, Table, Words32
+from bridge.northbound.modbus.registers import DriveMap, RegisterTable, Words32
 from bridge.northbound.modbus.units import drive_maps, units_of
 from tests.support.modbus_site import (
     ENABLED,
@@ -225,7 +225,7 @@ def test_the_list_is_complete_and_without_overlap():
     plant = make_plant()
     assert [m.unit_id for m in drive_maps(plant.catalogue)] == [1, 2, 9]
     for drive_map in drive_maps(plant.catalogue):
-        for table in Table:
+        for table in RegisterTable:
             used = [
                 a for r in drive_map.rows if r.table is table for a in range(r.address, r.address + r.size)
             ]
@@ -246,10 +246,10 @@ def test_every_listed_register_can_be_read():
     rig.drive("fu2").on_identification(Identification(1, 2, 3, 4, "x"), rig.now)
     rig.drive("fu2").on_own_supervision(OwnJudgement(accepted="a test of registers"), rig.now)
     functions = {
-        Table.COIL: 1,
-        Table.DISCRETE_INPUT: 2,
-        Table.HOLDING_REGISTER: 3,
-        Table.INPUT_REGISTER: 4,
+        RegisterTable.COIL: 1,
+        RegisterTable.DISCRETE_INPUT: 2,
+        RegisterTable.HOLDING_REGISTER: 3,
+        RegisterTable.INPUT_REGISTER: 4,
     }
     for row in DriveMap(rig.drive("fu2").spec).rows:
         if row.name in ("actual/position", "command/position"):

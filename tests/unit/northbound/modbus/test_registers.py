@@ -9,7 +9,7 @@ from typing import Final
 import pytest
 
 from bridge.command import Drive, Plant
-from bridge.command.link import NodeState
+from bridge.command.drive_link import NodeState
 from bridge.image import Quality
 from bridge.mapping import family_names
 from bridge.northbound.modbus.dispatch import Dispatcher
@@ -19,8 +19,8 @@ from bridge.northbound.modbus.registers import (
     MOST_PARAMETERS,
     PARAMETERS,
     VALUE_FLAGS,
+    RegisterTable,
     Row,
-    Table,
 )
 from bridge.northbound.modbus.units import device_maps, drive_maps, units_of
 from tests.support import sites
@@ -223,5 +223,5 @@ class TestMirror:
     def test_it_is_behind_all_other_registers(self, mapping: str) -> None:
         assert PARAMETERS + 2 * MOST_PARAMETERS <= MIRROR
         for drive_map in drive_maps(family_plant(mapping).catalogue):
-            holding = [row for row in drive_map.rows if row.table is Table.HOLDING_REGISTER]
+            holding = [row for row in drive_map.rows if row.table is RegisterTable.HOLDING_REGISTER]
             assert max(row.address + row.size for row in holding) <= MIRROR

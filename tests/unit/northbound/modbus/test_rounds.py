@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
+from bridge.northbound.modbus.connection import Conversation
 from bridge.northbound.modbus.rounds import LONE_SLICE, SLICE, Rounds
-from bridge.northbound.modbus.session import Conversation
 from tests.support.modbus_site import PLC, READY, Rig
 
 

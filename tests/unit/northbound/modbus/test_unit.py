@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command.link import NodeState
-from bridge.northbound.modbus.registers import Table
+from bridge.command.drive_link import NodeState
+from bridge.northbound.modbus.registers import RegisterTable
 from bridge.northbound.modbus.unit import BridgeUnit
 from bridge.northbound.modbus.units import units_of
 from tests.support import sites
@@ -72,7 +72,7 @@ def test_a_node_that_is_out_of_service_says_nothing_of_the_module():
     node_goes(plant, plant.nodes["conveyor"], NodeState.OPERATIONAL, 100.0)
     node_goes(plant, plant.nodes["spare"], NodeState.DISABLED, 100.0)
     unit = BridgeUnit(units_of(plant.catalogue), view_of(plant, lambda: 100.0))
-    (state,) = unit.read_words(Table.INPUT_REGISTER, 0, 1, PLC)
+    (state,) = unit.read_words(RegisterTable.INPUT_REGISTER, 0, 1, PLC)
     assert state == 0x02, "operational, and nothing else"
 
 

@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from bridge.command import Code, Event, Kind
+from bridge.command import Code, Event, EventKind
 from bridge.command.audit import AuditEntry
 from bridge.text import Text, render
 from tests.support.modbus_site import READY, Rig
@@ -27,7 +27,7 @@ class Told:
 
     @property
     def refusals(self) -> list[str]:
-        return [event.message for event in self.events if event.kind is Kind.REFUSED]
+        return [event.message for event in self.events if event.kind is EventKind.REFUSED]
 
 
 def test_a_write_to_a_unit_that_does_not_exist_names_those_that_do() -> None:
@@ -67,7 +67,7 @@ def test_a_read_of_a_unit_that_does_not_exist_is_in_the_log(caplog: pytest.LogCa
 def test_the_page_says_it_in_german(unit: int) -> None:
     told = Told()
     told.rig.write(0, 0x047E, unit=unit)
-    (said,) = [event.said for event in told.events if event.kind is Kind.REFUSED]
+    (said,) = [event.said for event in told.events if event.kind is EventKind.REFUSED]
     assert isinstance(said, Text)
     assert isinstance(dict(said.facts)["why"], Text)
     assert render(said, "de").startswith(f"Schreiben an 'unit {unit}' von modbus:10.0.0.5 abgelehnt: ")

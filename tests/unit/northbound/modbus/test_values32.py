@@ -7,15 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.image import DataType, Image, Point, Quality, Value
-from bridge.northbound.modbus.pdu import ExceptionCode, Refused
-from bridge.northbound.modbus.registers import Row, Table, Words32
+from bridge.northbound.modbus.pdu import ExceptionCode, ModbusException
+from bridge.northbound.modbus.registers import RegisterTable, Row, Words32
 from bridge.northbound.modbus.values32 import Values32, value_of, words_of
 
 BIG = Words32("ABCD")
 
 
 def row(kind: str, name: str = "x") -> Row:
-    return Row(Table.INPUT_REGISTER, 32, name, kind, "r")
+    return Row(RegisterTable.INPUT_REGISTER, 32, name, kind, "r")
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_one_that_is_not_there_reads_as_0_beside_others_and_alone_it_is_refused(
     case = Case()
     case.set("a", 7)
     assert case.values.read(32, 38) == [0, 7, 0, 0, 0, 0]
-    with pytest.raises(Refused) as caught:
+    with pytest.raises(ModbusException) as caught:
         case.values.read(34, 38)
     assert caught.value.code is ExceptionCode.NOT_RESPONDING
     assert case.values.read(34, 38, beside=True) == [0, 0, 0, 0]
@@ -73,7 +73,7 @@ def test_one_that_is_not_there_reads_as_0_beside_others_and_alone_it_is_refused(
 def test_what_is_not_configured_is_refused_as_that() -> None:
     case = Case()
     case.set("b", 0, Quality.CONFIG_ERROR)
-    with pytest.raises(Refused) as caught:
+    with pytest.raises(ModbusException) as caught:
         case.values.read(34, 36)
     assert caught.value.code is ExceptionCode.PATH_UNAVAILABLE
 

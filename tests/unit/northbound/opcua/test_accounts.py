@@ -9,7 +9,7 @@ from asyncua.common.utils import ServiceError
 from bridge.base.errors import FileFaults
 from bridge.command import Role
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua.accounts import Users, security_policies
+from bridge.northbound.opcua.accounts import Accounts, security_policies
 from bridge.northbound.passwords import hash_password, verify_password
 
 Policy = ua.SecurityPolicyType
@@ -32,7 +32,7 @@ class TestPasswords:
 
     async def test_a_user_has_the_role_of_the_site_file(self) -> None:
         line = hash_password("swordfish")
-        users = Users(OpcUaTable(user=[UserTable(name="eva", role="engineer", password_hash=line)]))
+        users = Accounts(OpcUaTable(user=[UserTable(name="eva", role="engineer", password_hash=line)]))
         assert (await users.login("eva", "swordfish", "10.0.0.1")).role is Role.ENGINEER
         for name, password in (("eva", "x"), ("admin", "swordfish"), ("eva", "x" * 100_000)):
             with pytest.raises(ServiceError):
@@ -41,11 +41,11 @@ class TestPasswords:
 
     @pytest.mark.parametrize(("setting", "role"), [("observer", Role.OBSERVER), ("operator", Role.OPERATOR)])
     def test_anonymous_is_what_the_site_file_says(self, setting: str, role: Role) -> None:
-        users = Users(OpcUaTable.model_validate({"anonymous": setting}))
+        users = Accounts(OpcUaTable.model_validate({"anonymous": setting}))
         assert users.anonymous("10.0.0.1").role is role
         assert ua.AnonymousIdentityToken in users.tokens
         with pytest.raises(ServiceError):
-            Users(OpcUaTable()).anonymous("10.0.0.1")
+            Accounts(OpcUaTable()).anonymous("10.0.0.1")
 
     def test_all_faulty_users_are_named_at_once(self) -> None:
         line = hash_password("x")
@@ -55,7 +55,7 @@ class TestPasswords:
             UserTable(name="anonymous", role="observer", password_hash=line),
         ]
         with pytest.raises(FileFaults) as raised:
-            Users(OpcUaTable(user=tables))
+            Accounts(OpcUaTable(user=tables))
         assert [fault.key for fault in raised.value.faults] == [
             "opcua.user[1].name",
             "opcua.user[1].password_hash",

@@ -8,8 +8,7 @@ from typing import cast
 
 from asyncua import ua
 
-from bridge.command import Event
-from bridge.command import Kind as EventKind
+from bridge.command import Event, EventKind
 from bridge.northbound.opcua.events import EventSender
 from bridge.uaserver.eventfilter import Occurrence
 from bridge.uaserver.subscriptions import Subscriptions

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from bridge.image import DataType, Image, Point
 from bridge.northbound.opcua.nodes import layout
-from bridge.northbound.opcua.point_values import PointValue, Watched
+from bridge.northbound.opcua.point_values import PointValue, WatchedVariable
 
 POINTS = [Point(name="bridge/word", data_type=DataType.UINT16, bits=("low", "", "third"))]
 
 
 def test_each_look_is_at_the_image_and_a_bit_is_its_own() -> None:
-    image, watched = Image(POINTS), dict[int, dict[int, Watched]]()
+    image, watched = Image(POINTS), dict[int, dict[int, WatchedVariable]]()
     (word,) = layout(image.points)[2].variables
     whole, bit = (PointValue(image, lambda at: 0, node, watched) for node in (word, word.bits[1]))
     for value in (4, 3):
@@ -20,7 +20,7 @@ def test_each_look_is_at_the_image_and_a_bit_is_its_own() -> None:
 
 
 def test_who_watches_is_kept_however_often_it_is_made() -> None:
-    image, watched = Image(POINTS), dict[int, dict[int, Watched]]()
+    image, watched = Image(POINTS), dict[int, dict[int, WatchedVariable]]()
     (word,) = layout(image.points)[2].variables
     first, second = (PointValue(image, lambda at: 0, word, watched) for _ in range(2))
     first.datachange_callbacks[1] = print

@@ -11,7 +11,7 @@ from bridge.config import load_site
 from bridge.drive import DriveState
 from bridge.image import Quality
 from bridge.mapping import load_family
-from bridge.northbound.page.describe import described
+from bridge.northbound.page.site_description import described
 from bridge.sim.catalogue import simulate_node
 from tests.support import sites
 from tests.support.bench import Bench

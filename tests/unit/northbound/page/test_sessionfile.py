@@ -9,28 +9,28 @@ import pytest
 
 from bridge.command import Role
 from bridge.northbound.page.sessionfile import SessionFile, credential_of
-from bridge.northbound.page.sessions import IDLE_S, KEEP_EVERY_S, Session, Sessions
+from bridge.northbound.page.sessions import IDLE_S, KEEP_EVERY_S, PageSession, PageSessions
 
 ANN = {"ann": credential_of("operator", "$scrypt$1")}
 
 
-def kept(sessions: Sessions, now: float = 0.0) -> list[Session]:
+def kept(sessions: PageSessions, now: float = 0.0) -> list[PageSession]:
     found = sessions.take_changed(now)
     assert found is not None
     return found
 
 
-def begun(folder: Path, credentials: dict[str, str] = ANN) -> tuple[Session, Path]:
-    sessions = Sessions()
+def begun(folder: Path, credentials: dict[str, str] = ANN) -> tuple[PageSession, Path]:
+    sessions = PageSessions()
     session = sessions.begin("ann", Role.OPERATOR, 100.0, "10.0.0.1")
     file = folder / "page.sessions"
     SessionFile(file, credentials).save(kept(sessions, 100.0))
     return session, file
 
 
-def after(file: Path, credentials: dict[str, str] = ANN, now: float = 200.0) -> Sessions:
+def after(file: Path, credentials: dict[str, str] = ANN, now: float = 200.0) -> PageSessions:
     """Sessions of the next front."""
-    sessions = Sessions()
+    sessions = PageSessions()
     sessions.restore(SessionFile(file, credentials).load(now))
     return sessions
 
@@ -80,7 +80,7 @@ def test_times_of_another_clock_are_not_believed(tmp_path: Path) -> None:
 
 
 def test_what_has_not_changed_is_kept_once_a_minute() -> None:
-    sessions = Sessions()
+    sessions = PageSessions()
     session = sessions.begin("ann", Role.OPERATOR, 0.0)
     assert kept(sessions, 1.0) == [session]
     assert sessions.take_changed(2.0) is None

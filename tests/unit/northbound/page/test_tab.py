@@ -10,7 +10,7 @@ import pytest
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from bridge.command import Role
-from bridge.northbound.page.sessions import Session
+from bridge.northbound.page.sessions import PageSession
 from bridge.northbound.page.tab import TOO_SLOW, Tab, close
 from bridge.northbound.view import View
 from tests.support import sites
@@ -47,7 +47,7 @@ class Socket:
 class Case:
     def __init__(self) -> None:
         self.socket = Socket()
-        session = cast("Session", SimpleNamespace(user="ann", role=Role.OPERATOR))
+        session = cast("PageSession", SimpleNamespace(user="ann", role=Role.OPERATOR))
         view: Any = view_of(sites.plant_of(SITE))
         self.tab = Tab(cast("WebSocket", self.socket), session, cast("View", view), 1234.4)
         self.heard: list[str] = []

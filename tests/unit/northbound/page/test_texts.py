@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Code
-from bridge.condition.findings import Rank
+from bridge.condition.point_troubles import Rank
 from bridge.image import DataType, Point
 from bridge.mapping import family_names, load_family
 from tests.support import sites

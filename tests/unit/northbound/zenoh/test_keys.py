@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.command import Code, Event, Kind, Outcome
+from bridge.command import Code, Event, EventKind, Outcome
 from bridge.image import Columns, DataType, Point, Quality, Reading
 from bridge.northbound.zenoh.keys import KeySpace, event_json, outcome_json
 from bridge.text import Text
@@ -130,7 +130,7 @@ def test_outcomes() -> None:
 
 
 def test_events() -> None:
-    event = Event(5.0, Kind.WATCHDOG, "conveyor/fu1", 900, "silent")
+    event = Event(5.0, EventKind.WATCHDOG, "conveyor/fu1", 900, "silent")
     assert KEYS.event_key(event) == "drives/hall3/@/event/watchdog"
     assert json.loads(event_json(event, 1_500_000_000)) == {
         "t": 1.5,
@@ -139,7 +139,7 @@ def test_events() -> None:
         "severity": 900,
         "message": "silent",
     }
-    says = Event(5.0, Kind.BUS, "conveyor", 200, Text.of("node.is_lost", node="conveyor"))
+    says = Event(5.0, EventKind.BUS, "conveyor", 200, Text.of("node.is_lost", node="conveyor"))
     told = json.loads(event_json(says, 1_500_000_000))
     assert told["message"] == "conveyor is lost"
     assert (told["code"], told["facts"]) == ("node.is_lost", {"node": "conveyor"})

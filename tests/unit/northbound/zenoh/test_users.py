@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from bridge.base.errors import Unavailable
 from bridge.config import ZenohTable
-from bridge.northbound.zenoh.access import access_control
+from bridge.northbound.zenoh.access_control import access_control
 from bridge.northbound.zenoh.keys import KeySpace
 from bridge.northbound.zenoh.users import Users, read_users
 from tests.support.zenoh_site import make_plant

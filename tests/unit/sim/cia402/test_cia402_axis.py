@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from bridge.sim.cia402.cia402_axis import FOLLOWING_ERROR, INIT_S, Cia402Axis
-from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
-from bridge.sim.cia402.cia402_states import State
+from bridge.sim.cia402.cia402_settings import Cia402Mode, Cia402Settings
+from bridge.sim.cia402.cia402_states import Cia402State
 
 
 class Rig:
@@ -24,7 +24,7 @@ class Rig:
             self.now += 0.01
             self.axis.advance(self.now)
 
-    def words(self, *words: int) -> State:
+    def words(self, *words: int) -> Cia402State:
         for word in words:
             self.axis.command(word)
             self.axis.obey()
@@ -34,18 +34,18 @@ class Rig:
 def test_it_is_ready_after_a_while_and_enabled_step_by_step() -> None:
     axis = Rig().axis
     axis.power_on(500.0)
-    assert (axis.state, axis.next_deadline()) == (State.NOT_READY, 500.0 + INIT_S)
+    assert (axis.state, axis.next_deadline()) == (Cia402State.NOT_READY, 500.0 + INIT_S)
     rig = Rig()
-    assert rig.axis.state is State.SWITCH_ON_DISABLED
-    assert rig.words(6, 7, 15) is State.ENABLED
+    assert rig.axis.state is Cia402State.SWITCH_ON_DISABLED
+    assert rig.words(6, 7, 15) is Cia402State.ENABLED
     assert rig.axis.status_word & 0x6F == 0x27
 
 
 def test_a_control_word_takes_effect_after_its_set_points() -> None:
-    rig = Rig(mode=Mode.PROFILE_VELOCITY)
+    rig = Rig(mode=Cia402Mode.PROFILE_VELOCITY)
     rig.words(6, 7)
     rig.axis.command(15)
-    assert rig.axis.state is State.SWITCHED_ON
+    assert rig.axis.state is Cia402State.SWITCHED_ON
     assert rig.axis.control_word == 15
     rig.axis.targets.velocity = 5000
     rig.axis.obey()
@@ -58,21 +58,23 @@ def test_a_fault_is_told_and_acknowledged_by_an_edge() -> None:
     rig.words(6, 7, 15)
     rig.axis.fail(0x2310)
     rig.run(0.1)
-    assert (rig.axis.state, rig.axis.error_code) == (State.FAULT, 0x2310)
-    assert rig.words(0x00, 0x80) is State.SWITCH_ON_DISABLED
+    assert (rig.axis.state, rig.axis.error_code) == (Cia402State.FAULT, 0x2310)
+    assert rig.words(0x00, 0x80) is Cia402State.SWITCH_ON_DISABLED
     assert (rig.told, rig.axis.error_code) == ([0x2310, 0], 0)
 
 
 @pytest.mark.parametrize(
     ("option", "state", "is_fault"),
     [
-        (0, State.ENABLED, False),
-        (1, State.FAULT, True),
-        (2, State.SWITCH_ON_DISABLED, False),
-        (3, State.SWITCH_ON_DISABLED, False),
+        (0, Cia402State.ENABLED, False),
+        (1, Cia402State.FAULT, True),
+        (2, Cia402State.SWITCH_ON_DISABLED, False),
+        (3, Cia402State.SWITCH_ON_DISABLED, False),
     ],
 )
-def test_6007h_says_what_becomes_of_it_without_a_master(option: int, state: State, is_fault: bool) -> None:
+def test_6007h_says_what_becomes_of_it_without_a_master(
+    option: int, state: Cia402State, is_fault: bool
+) -> None:
     rig = Rig(abort_connection=option)
     rig.words(6, 7, 15)
     assert rig.axis.abort_connection(0x8130) is is_fault
@@ -81,7 +83,7 @@ def test_6007h_says_what_becomes_of_it_without_a_master(option: int, state: Stat
 
 
 def test_a_target_too_far_away_is_a_following_error() -> None:
-    rig = Rig(mode=Mode.CYCLIC_POSITION, following_window=10, following_ms=10)
+    rig = Rig(mode=Cia402Mode.CYCLIC_POSITION, following_window=10, following_ms=10)
     rig.words(6, 7, 15)
     rig.axis.targets.position = 1_000_000_000
     rig.axis.on_target_position()
@@ -90,7 +92,7 @@ def test_a_target_too_far_away_is_a_following_error() -> None:
 
 
 def test_at_rest_it_has_no_deadline_and_turning_it_has_one() -> None:
-    rig = Rig(mode=Mode.PROFILE_VELOCITY)
+    rig = Rig(mode=Cia402Mode.PROFILE_VELOCITY)
     rig.words(6, 7, 15)
     assert rig.axis.next_deadline() is None
     rig.axis.targets.velocity = 100_000

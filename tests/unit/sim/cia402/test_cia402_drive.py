@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
-from bridge.sim.cia402.cia402_states import State
+from bridge.sim.cia402.cia402_settings import Cia402Mode, Cia402Settings
+from bridge.sim.cia402.cia402_states import Cia402State
 
 MASTER = 0x77F
 STATUS_ENTRIES = (0x60410010, 0x60640020)
@@ -21,7 +21,7 @@ def control(word: int, target: int | None = None, size: int = 4) -> bytes:
 def make(bench_of):
     """A bench with a drive in this mode at node 5; RPDO1 carries the control word and ``target``."""
 
-    def make(mode: Mode, target: int = 0, *, operational: bool = True, kind: int = 255, **settings):
+    def make(mode: Cia402Mode, target: int = 0, *, operational: bool = True, kind: int = 255, **settings):
         bench = bench_of(Cia402Drive(5, Cia402Settings(mode=mode, **settings)))
         bench.run(0.2)
         remap(bench, 0x1400, [0x60400010, *([target] if target else [])], kind)
@@ -45,14 +45,14 @@ def remap(bench, communication: int, entries: list[int], kind: int) -> None:
     assert bench.write(communication, 1, cob_id, 4) == "60"
 
 
-def state(bench) -> State:
+def state(bench) -> Cia402State:
     return bench.node.axis.state
 
 
 def enable(bench, *target: int, bits: int = 0, size: int = 4) -> None:
     for word in (0x06, 0x07, 0x0F | bits):
         bench.put(0x205, control(word, *target, size=size))
-    assert state(bench) is State.ENABLED
+    assert state(bench) is Cia402State.ENABLED
 
 
 def emcys(bench) -> list[str]:
@@ -67,15 +67,15 @@ def status(bench) -> int:
 
 
 def test_it_says_what_it_is(make):
-    bench = make(Mode.NONE, operational=False)
+    bench = make(Cia402Mode.NONE, operational=False)
     assert bench.read(0x1000, 0) & 0xFFFF == 0x0192
     assert bench.read(0x6502, 0) == 0b1_1010_0111
-    assert state(bench) is State.SWITCH_ON_DISABLED
+    assert state(bench) is Cia402State.SWITCH_ON_DISABLED
     assert status(bench) & 0x6F == 0x40
 
 
 def test_the_name_comes_in_segments_and_in_a_block(make):
-    bench = make(Mode.NONE)
+    bench = make(Cia402Mode.NONE)
     assert bench.sdo("4008100000000000")[:2] == "41"
     assert bench.sdo("6000000000000000") == "00 43 69 41 20 34 30 32"
     assert bench.sdo("A40810007F000000")[:2] == "C6"
@@ -97,12 +97,12 @@ def test_the_name_comes_in_segments_and_in_a_block(make):
     ],
 )
 def test_a_value_out_of_range_is_refused(make, index: int, sub: int, value: int, size: int):
-    bench = make(Mode.NONE)
+    bench = make(Cia402Mode.NONE)
     assert bench.write(index, sub, value, size) == "06090030"
 
 
 def test_what_is_read_only_is_refused(make):
-    bench = make(Mode.NONE)
+    bench = make(Cia402Mode.NONE)
     assert bench.write(0x6041, 0, 0, 2) == "06010002"
     assert bench.write(0x6061, 0, 1, 1) == "06010002"
     assert bench.write(0x6999, 0, 1, 1) == "06020000"
@@ -110,7 +110,7 @@ def test_what_is_read_only_is_refused(make):
 
 
 def test_only_what_was_saved_outlasts_the_mains(make):
-    bench = make(Mode.NONE)
+    bench = make(Cia402Mode.NONE)
     assert bench.write(0x6083, 0, 1234, 4) == "60"
     bench.node.power_cycle()
     bench.run(0.2)
@@ -127,10 +127,10 @@ def test_only_what_was_saved_outlasts_the_mains(make):
 
 
 def test_it_can_be_commanded_by_sdo_too(make):
-    bench = make(Mode.PROFILE_VELOCITY)
+    bench = make(Cia402Mode.PROFILE_VELOCITY)
     for word in (6, 7, 15):
         assert bench.write(0x6040, 0, word, 2) == "60"
-    assert state(bench) is State.ENABLED
+    assert state(bench) is Cia402State.ENABLED
     bench.write(0x60FF, 0, 10_000, 4)
     bench.run(0.1)
     assert bench.read(0x606C, 0) == 10_000
@@ -140,7 +140,7 @@ def test_it_can_be_commanded_by_sdo_too(make):
 
 
 def test_vl_runs_on_its_ramp_within_its_limits(make):
-    bench = make(Mode.VELOCITY, 0x60420010, vl_limits=[100, 1500], vl_acceleration=[1500, 1])
+    bench = make(Cia402Mode.VELOCITY, 0x60420010, vl_limits=[100, 1500], vl_acceleration=[1500, 1])
     enable(bench, 1000, bits=0x70, size=2)
     bench.run(0.3)
     assert bench.read(0x6044, 0) == pytest.approx(450, abs=20)
@@ -156,7 +156,7 @@ def test_vl_runs_on_its_ramp_within_its_limits(make):
 
 
 def test_vl_bits_4_to_6_decide_what_the_ramp_does(make):
-    bench = make(Mode.VELOCITY, 0x60420010)
+    bench = make(Cia402Mode.VELOCITY, 0x60420010)
     enable(bench, 1000, bits=0x70, size=2)
     bench.run(0.4)
     bench.put(0x205, control(0x5F, 1000, size=2))  # locked
@@ -169,7 +169,7 @@ def test_vl_bits_4_to_6_decide_what_the_ramp_does(make):
 
 
 def test_pv_says_when_it_is_there_and_when_it_stands(make):
-    bench = make(Mode.PROFILE_VELOCITY, 0x60FF0020, acceleration=100_000)
+    bench = make(Cia402Mode.PROFILE_VELOCITY, 0x60FF0020, acceleration=100_000)
     enable(bench, 50_000)
     assert status(bench) & 0x1400 == 0x1000
     bench.run(0.25)
@@ -179,9 +179,11 @@ def test_pv_says_when_it_is_there_and_when_it_stands(make):
     assert status(bench) & 0x1400 == 0x0400
 
 
-@pytest.mark.parametrize(("word", "after"), [(0x0007, State.SWITCHED_ON), (0x010F, State.ENABLED)])
-def test_disable_and_halt_brake_on_the_ramp(make, word: int, after: State):
-    bench = make(Mode.PROFILE_VELOCITY, 0x60FF0020, deceleration=100_000)
+@pytest.mark.parametrize(
+    ("word", "after"), [(0x0007, Cia402State.SWITCHED_ON), (0x010F, Cia402State.ENABLED)]
+)
+def test_disable_and_halt_brake_on_the_ramp(make, word: int, after: Cia402State):
+    bench = make(Cia402Mode.PROFILE_VELOCITY, 0x60FF0020, deceleration=100_000)
     enable(bench, 50_000)
     bench.run(0.5)
     bench.put(0x205, control(word, 50_000))
@@ -192,23 +194,23 @@ def test_disable_and_halt_brake_on_the_ramp(make, word: int, after: State):
 
 
 def test_the_quick_stop_brakes_harder_and_ends_in_switch_on_disabled(make):
-    bench = make(Mode.PROFILE_VELOCITY, 0x60FF0020, quick_stop_deceleration=500_000)
+    bench = make(Cia402Mode.PROFILE_VELOCITY, 0x60FF0020, quick_stop_deceleration=500_000)
     enable(bench, 50_000)
     bench.run(0.5)
     bench.put(0x205, control(0x0002, 50_000))
-    assert state(bench) is State.QUICK_STOP_ACTIVE
+    assert state(bench) is Cia402State.QUICK_STOP_ACTIVE
     bench.run(0.05)
     assert bench.read(0x606C, 0) == pytest.approx(25_000, abs=3000)
     bench.run(0.2)
-    assert (bench.read(0x606C, 0), state(bench)) == (0, State.SWITCH_ON_DISABLED)
+    assert (bench.read(0x606C, 0), state(bench)) == (0, Cia402State.SWITCH_ON_DISABLED)
 
 
 def test_without_voltage_it_coasts(make):
-    bench = make(Mode.PROFILE_VELOCITY, 0x60FF0020)
+    bench = make(Cia402Mode.PROFILE_VELOCITY, 0x60FF0020)
     enable(bench, 300_000)
     bench.run(1.0)
     bench.put(0x205, control(0, 300_000))
-    assert state(bench) is State.SWITCH_ON_DISABLED
+    assert state(bench) is Cia402State.SWITCH_ON_DISABLED
     bench.run(0.2)
     assert 0 < bench.read(0x606C, 0) < 300_000
     bench.run(1.0)
@@ -219,7 +221,7 @@ def test_without_voltage_it_coasts(make):
 
 
 def test_pp_takes_a_setpoint_at_the_edge_and_not_before(make):
-    bench = make(Mode.PROFILE_POSITION, 0x607A0020)
+    bench = make(Cia402Mode.PROFILE_POSITION, 0x607A0020)
     enable(bench, 20_000)
     bench.run(0.5)
     assert bench.read(0x6064, 0) == 0
@@ -233,7 +235,7 @@ def test_pp_takes_a_setpoint_at_the_edge_and_not_before(make):
 
 
 def test_pp_keeps_its_speed_and_never_passes_its_goal(make):
-    bench = make(Mode.PROFILE_POSITION, 0x607A0020, profile_velocity=50_000)
+    bench = make(Cia402Mode.PROFILE_POSITION, 0x607A0020, profile_velocity=50_000)
     enable(bench, 0)
     bench.put(0x205, control(0x1F, 100_000))
     seen, speeds = [], []
@@ -247,7 +249,7 @@ def test_pp_keeps_its_speed_and_never_passes_its_goal(make):
 
 
 def test_pp_one_setpoint_may_wait(make):
-    bench = make(Mode.PROFILE_POSITION, 0x607A0020)
+    bench = make(Cia402Mode.PROFILE_POSITION, 0x607A0020)
     enable(bench, 0)
     for position in (20_000, 40_000, 60_000):
         bench.put(0x205, control(0x1F, position))
@@ -258,7 +260,7 @@ def test_pp_one_setpoint_may_wait(make):
 
 
 def test_pp_relative(make):
-    bench = make(Mode.PROFILE_POSITION, 0x607A0020)
+    bench = make(Cia402Mode.PROFILE_POSITION, 0x607A0020)
     enable(bench, 0)
     for _ in range(3):
         bench.put(0x205, control(0x5F, -5000))
@@ -268,7 +270,7 @@ def test_pp_relative(make):
 
 
 def test_pp_halt_interrupts_and_goes_on(make):
-    bench = make(Mode.PROFILE_POSITION, 0x607A0020)
+    bench = make(Cia402Mode.PROFILE_POSITION, 0x607A0020)
     enable(bench, 0)
     bench.put(0x205, control(0x1F, 100_000))
     bench.run(0.4)
@@ -282,7 +284,7 @@ def test_pp_halt_interrupts_and_goes_on(make):
 
 
 def test_pp_within_the_software_limits(make):
-    bench = make(Mode.PROFILE_POSITION, 0x607A0020, position_limits=[-1000, 1000])
+    bench = make(Cia402Mode.PROFILE_POSITION, 0x607A0020, position_limits=[-1000, 1000])
     enable(bench, 0)
     bench.put(0x205, control(0x1F, 5000))
     bench.run(1.0)
@@ -302,7 +304,7 @@ def test_pp_within_the_software_limits(make):
     ],
 )
 def test_hm_finds_its_place(make, method: int, from_: int, to: int):
-    bench = make(Mode.HOMING, homing_method=method, home_offset=7)
+    bench = make(Cia402Mode.HOMING, homing_method=method, home_offset=7)
     bench.node.axis.motor.position = from_
     enable(bench)
     assert status(bench) & 0x3400 == 0x0400, "not started"
@@ -317,7 +319,7 @@ def test_hm_finds_its_place(make, method: int, from_: int, to: int):
 
 @pytest.mark.parametrize(("position", "inputs"), [(-100_001, 1), (-100_000, 1), (0, 0), (100_000, 2)])
 def test_60fd_tells_the_limit_switches(make, position: int, inputs: int):
-    bench = make(Mode.HOMING)
+    bench = make(Cia402Mode.HOMING)
     bench.node.axis.motor.position = position
     assert bench.read(0x60FD, 0) == inputs
     bench.node.axis.homing.switches = False
@@ -325,7 +327,7 @@ def test_60fd_tells_the_limit_switches(make, position: int, inputs: int):
 
 
 def test_hm_is_interrupted_when_bit_4_falls(make):
-    bench = make(Mode.HOMING, homing_method=17)
+    bench = make(Cia402Mode.HOMING, homing_method=17)
     enable(bench)
     bench.put(0x205, control(0x1F))
     bench.run(0.5)
@@ -336,7 +338,7 @@ def test_hm_is_interrupted_when_bit_4_falls(make):
 
 
 def test_csp_goes_to_each_target_within_the_cycle(make):
-    bench = make(Mode.CYCLIC_POSITION, 0x607A0020, kind=1, interpolation=[10, -3])
+    bench = make(Cia402Mode.CYCLIC_POSITION, 0x607A0020, kind=1, interpolation=[10, -3])
     for word in (0x06, 0x07, 0x0F):
         bench.put(0x205, control(word, 0))
         bench.sync()
@@ -352,20 +354,20 @@ def test_csp_goes_to_each_target_within_the_cycle(make):
 
 
 def test_csp_without_sync_takes_nothing(make):
-    bench = make(Mode.CYCLIC_POSITION, 0x607A0020, kind=1)
+    bench = make(Cia402Mode.CYCLIC_POSITION, 0x607A0020, kind=1)
     bench.put(0x205, control(0x06, 0))
     bench.run(0.1)
-    assert state(bench) is State.SWITCH_ON_DISABLED
+    assert state(bench) is Cia402State.SWITCH_ON_DISABLED
     bench.sync()
-    assert state(bench) is State.READY
+    assert state(bench) is Cia402State.READY
 
 
 def test_csp_too_far_behind_is_a_fault(make):
-    bench = make(Mode.CYCLIC_POSITION, 0x607A0020, following_window=1000)
+    bench = make(Cia402Mode.CYCLIC_POSITION, 0x607A0020, following_window=1000)
     enable(bench, 0)
     bench.put(0x205, control(0x0F, 400_000))
     bench.run(0.5)
-    assert (state(bench), bench.read(0x603F, 0)) == (State.FAULT, 0x8611)
+    assert (state(bench), bench.read(0x603F, 0)) == (Cia402State.FAULT, 0x8611)
     assert emcys(bench) == ["11 86 21 00 00 00 00 00"]
 
 
@@ -373,30 +375,30 @@ def test_csp_too_far_behind_is_a_fault(make):
 
 
 def test_a_fault_brakes_and_is_reset_by_the_edge(make):
-    bench = make(Mode.PROFILE_VELOCITY, 0x60FF0020)
+    bench = make(Cia402Mode.PROFILE_VELOCITY, 0x60FF0020)
     enable(bench, 100_000)
     bench.run(1.0)
     bench.node.fail(0x4310)
     bench.run(0.01)
-    assert state(bench) is State.FAULT_REACTION
+    assert state(bench) is Cia402State.FAULT_REACTION
     bench.run(0.5)
-    assert (state(bench), bench.read(0x606C, 0), bench.read(0x603F, 0)) == (State.FAULT, 0, 0x4310)
+    assert (state(bench), bench.read(0x606C, 0), bench.read(0x603F, 0)) == (Cia402State.FAULT, 0, 0x4310)
     assert (bench.read(0x1001, 0), bench.read(0x1003, 1)) == (0x09, 0x4310)
     bench.put(0x205, control(0x80, 0))
-    assert state(bench) is State.SWITCH_ON_DISABLED
+    assert state(bench) is Cia402State.SWITCH_ON_DISABLED
     assert emcys(bench) == ["10 43 09 00 00 00 00 00", "00 00 00 00 00 00 00 00"]
     assert bench.read(0x1001, 0) == 0
 
 
 def test_a_lasting_fault_waits_until_it_is_mended(make):
-    bench = make(Mode.NONE)
+    bench = make(Cia402Mode.NONE)
     bench.node.fail(0x3210, lasting=True)
     bench.put(0x205, control(0x80))
-    assert state(bench) is State.FAULT
+    assert state(bench) is Cia402State.FAULT
     bench.node.mend()
     bench.put(0x205, control(0x00))
     bench.put(0x205, control(0x80))
-    assert state(bench) is State.SWITCH_ON_DISABLED
+    assert state(bench) is Cia402State.SWITCH_ON_DISABLED
 
 
 def test_there_is_no_fault_without_a_code():
@@ -410,15 +412,15 @@ def test_there_is_no_fault_without_a_code():
 @pytest.mark.parametrize(
     ("option", "after"),
     [
-        (0, State.ENABLED),
-        (1, State.FAULT),
-        (2, State.SWITCH_ON_DISABLED),
-        (3, State.SWITCH_ON_DISABLED),
+        (0, Cia402State.ENABLED),
+        (1, Cia402State.FAULT),
+        (2, Cia402State.SWITCH_ON_DISABLED),
+        (3, Cia402State.SWITCH_ON_DISABLED),
     ],
 )
 @pytest.mark.parametrize("by", ["heartbeat", "guarding"])
-def test_a_silent_master_has_the_reaction_of_6007h(make, option: int, after: State, by: str):
-    bench = make(Mode.PROFILE_VELOCITY, 0x60FF0020, abort_connection=option, acceleration=1_000_000)
+def test_a_silent_master_has_the_reaction_of_6007h(make, option: int, after: Cia402State, by: str):
+    bench = make(Cia402Mode.PROFILE_VELOCITY, 0x60FF0020, abort_connection=option, acceleration=1_000_000)
     if by == "heartbeat":
         bench.write(0x1016, 1, 0x7F << 16 | 300, 4)
     else:
@@ -430,7 +432,7 @@ def test_a_silent_master_has_the_reaction_of_6007h(make, option: int, after: Sta
     else:
         bench.guard()
     bench.run(0.299)
-    assert (state(bench), emcys(bench)) == (State.ENABLED, [])
+    assert (state(bench), emcys(bench)) == (Cia402State.ENABLED, [])
     bench.run(0.5)
     assert state(bench) is after
     assert emcys(bench) == ["30 81 11 00 00 00 00 00"]
@@ -444,7 +446,7 @@ def test_a_silent_master_has_the_reaction_of_6007h(make, option: int, after: Sta
 
 
 def test_a_master_that_was_never_heard_is_not_missed(make):
-    bench = make(Mode.NONE)
+    bench = make(Cia402Mode.NONE)
     bench.write(0x1016, 1, 0x7F << 16 | 300, 4)
     bench.run(3.0)
     assert emcys(bench) == []
@@ -453,19 +455,19 @@ def test_a_master_that_was_never_heard_is_not_missed(make):
 
 @pytest.mark.parametrize("command", [2, 0x82])
 def test_a_stop_of_the_node_stops_the_drive(make, command: int):
-    bench = make(Mode.PROFILE_VELOCITY, 0x60FF0020, abort_connection=3)
+    bench = make(Cia402Mode.PROFILE_VELOCITY, 0x60FF0020, abort_connection=3)
     enable(bench, 50_000)
     bench.run(0.5)
     bench.nmt(command)
     bench.run(0.5)
     assert bench.node.axis.motor.stands_still
-    assert state(bench) is State.SWITCH_ON_DISABLED
+    assert state(bench) is Cia402State.SWITCH_ON_DISABLED
 
 
 def test_a_reset_of_the_node_begins_anew(make):
-    bench = make(Mode.PROFILE_VELOCITY, 0x60FF0020)
+    bench = make(Cia402Mode.PROFILE_VELOCITY, 0x60FF0020)
     enable(bench, 50_000)
     bench.nmt(0x81)
-    assert state(bench) is State.NOT_READY
+    assert state(bench) is Cia402State.NOT_READY
     bench.run(0.2)
-    assert (state(bench), bench.read(0x1600, 0)) == (State.SWITCH_ON_DISABLED, 1)
+    assert (state(bench), bench.read(0x1600, 0)) == (Cia402State.SWITCH_ON_DISABLED, 1)

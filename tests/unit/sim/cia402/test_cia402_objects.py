@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.cia402.cia402_settings import INCREMENTS, Mode
+from bridge.sim.cia402.cia402_settings import INCREMENTS, Cia402Mode
 
 OUT_OF_RANGE, READ_ONLY = "06090030", "06010002"
 
@@ -22,7 +22,7 @@ def test_it_is_a_servo_drive_with_this_profile(drive):
     assert (drive.read(0x608F, 1), drive.read(0x608F, 2)) == (INCREMENTS, 1)
 
 
-@pytest.mark.parametrize("mode", Mode)
+@pytest.mark.parametrize("mode", Cia402Mode)
 def test_a_mode_that_there_is_can_be_chosen(drive, mode):
     assert drive.write(0x6060, 0, mode, 1) == "60"
     assert drive.read(0x6061, 0) == mode

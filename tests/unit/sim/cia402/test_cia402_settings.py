@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.cia402.cia402_settings import SUPPORTED_MODES, Cia402Settings, Mode, factory_communication
+from bridge.sim.cia402.cia402_settings import (
+    SUPPORTED_MODES,
+    Cia402Mode,
+    Cia402Settings,
+    factory_communication,
+)
 
 
 def test_each_mode_has_its_bit_in_6502h() -> None:
-    assert {mode for mode in Mode if mode and SUPPORTED_MODES >> mode - 1 & 1} == set(Mode) - {Mode.NONE}
+    assert {mode for mode in Cia402Mode if mode and SUPPORTED_MODES >> mode - 1 & 1} == set(Cia402Mode) - {
+        Cia402Mode.NONE
+    }
 
 
 @pytest.mark.parametrize(

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
 from bridge.sim.core.communication_objects import DeviceIdentity, add_communication
+from bridge.sim.core.communication_settings import CobId, CommunicationSettings, SdoSettings, SlaveRules
 from bridge.sim.core.dictionary import Dictionary, Number
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.settings import CobId, CommunicationSettings, SdoSettings, SlaveRules
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.store import Store
 
 IDENTITY = DeviceIdentity(0x0002_0192, 0x38, 7, 1, 4711, "SK", "1.0", "2.1")

@@ -12,7 +12,7 @@ import pytest
 
 from bridge.canopen.frame import REMOTE, Frame
 from bridge.sim.cia402.cia402_drive import Cia402Drive
-from bridge.sim.cia402.cia402_settings import Cia402Settings, Mode
+from bridge.sim.cia402.cia402_settings import Cia402Mode, Cia402Settings
 from bridge.sim.lenze.lenze_motec import LenzeMotec
 from bridge.sim.lenze.lenze_settings import LenzeCodes
 from bridge.sim.nord.nord_single import NordSingle
@@ -88,7 +88,7 @@ def without_ramps() -> NordTu4:
     return mapped(node, 0x3001_0110, 0x3003_0110, 0x3000_0110, 0x3002_0210)
 
 
-def servo(mode: Mode, layout: str, *settings: tuple[int, int]) -> Family:
+def servo(mode: Cia402Mode, layout: str, *settings: tuple[int, int]) -> Family:
     def make() -> Cia402Drive:
         node = Cia402Drive(5, Cia402Settings(mode=mode, heartbeat_consumer=0x7F07D0))
         return mapped(node, 0x6041_0010, 0x6064_0020, rpdo=(0x6040_0010, TARGETS[mode]))
@@ -114,7 +114,11 @@ def master() -> LenzeCodes:
     return LenzeCodes(5, master=1, times_ms=[100, 50, 0, 0, 20], sync_ms=15, sync_producer=True)
 
 
-TARGETS = {Mode.VELOCITY: 0x6042_0010, Mode.PROFILE_POSITION: 0x607A_0020, Mode.CYCLIC_VELOCITY: 0x60FF_0020}
+TARGETS = {
+    Cia402Mode.VELOCITY: 0x6042_0010,
+    Cia402Mode.PROFILE_POSITION: 0x607A_0020,
+    Cia402Mode.CYCLIC_VELOCITY: 0x60FF_0020,
+}
 FAMILIES = {
     "tu4": nord(lambda: NordTu4(5, p151_ms=100)),
     "tu4, without ramps": nord(without_ramps),
@@ -126,9 +130,9 @@ FAMILIES = {
     "motec, master": motec(master),
     "stoeber": stoeber(1),
     "stoeber, four axes": stoeber(4),
-    "velocity": servo(Mode.VELOCITY, "<Hh", (0x7F, 500), (0x7F, 900), (0x3F, 900)),
-    "position": servo(Mode.PROFILE_POSITION, "<Hi", (0x1F, 90_000), (0x0F, 0), (0x3F, -20_000)),
-    "cyclic": servo(Mode.CYCLIC_VELOCITY, "<Hi", (0x0F, 20_000), (0x0F, -9_000)),
+    "velocity": servo(Cia402Mode.VELOCITY, "<Hh", (0x7F, 500), (0x7F, 900), (0x3F, 900)),
+    "position": servo(Cia402Mode.PROFILE_POSITION, "<Hi", (0x1F, 90_000), (0x0F, 0), (0x3F, -20_000)),
+    "cyclic": servo(Cia402Mode.CYCLIC_VELOCITY, "<Hi", (0x0F, 20_000), (0x0F, -9_000)),
 }
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
-from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Number, constant
-from bridge.sim.core.pdo_objects import PdoObjects, check_cob_id, check_length
-from bridge.sim.core.settings import CobId, CommunicationSettings, PdoSettings, SlaveRules
+from bridge.sim.core.communication_settings import CobId, CommunicationSettings, PdoSettings, SlaveRules
+from bridge.sim.core.dictionary import Cell, Dictionary, IntegerType, Number, constant
+from bridge.sim.core.pdo_objects import PdoConfigurator, check_cob_id, check_length
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.store import Store
 
 OFF = 0x8000_0000
@@ -25,11 +25,11 @@ class Rig:
                 tpdo=[PdoSettings(0x185, entries=[0] * 4)],
             )
         )
-        word, status = Cell(), constant(DataType.UNSIGNED16, 0)
-        self.objects.add(0x6040, 0, Number(DataType.UNSIGNED16, word.get, word.set, in_rpdo=True))
-        self.objects.add(0x6041, 0, Number(DataType.UNSIGNED16, status.read, in_tpdo=True))
-        self.objects.add(0x607A, 0, Number(DataType.INTEGER32, word.get, word.set, in_rpdo=True))
-        PdoObjects(self.objects, self.store, SlaveRules(), lambda: self.state_is_right).add()
+        word, status = Cell(), constant(IntegerType.UNSIGNED16, 0)
+        self.objects.add(0x6040, 0, Number(IntegerType.UNSIGNED16, word.get, word.set, in_rpdo=True))
+        self.objects.add(0x6041, 0, Number(IntegerType.UNSIGNED16, status.read, in_tpdo=True))
+        self.objects.add(0x607A, 0, Number(IntegerType.INTEGER32, word.get, word.set, in_rpdo=True))
+        PdoConfigurator(self.objects, self.store, SlaveRules(), lambda: self.state_is_right).add()
 
     def write(self, index: int, sub: int, value: int) -> int:
         """The abort code, 0 where it was taken."""

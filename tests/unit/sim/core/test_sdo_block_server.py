@@ -8,9 +8,9 @@ import canopen
 import pytest
 from canopen.sdo import SdoAbortedError, SdoClient
 
-from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Domain, Number
+from bridge.sim.core.dictionary import Cell, Dictionary, Domain, IntegerType, Number
 from bridge.sim.core.sdo_block_server import checksum
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 
 DATA = bytes(range(256)) * 5
 
@@ -21,8 +21,8 @@ class Store:
         self.cell = Cell(7)
         objects = Dictionary()
         objects.add(0x1F20, 0, Domain(4096, lambda: self.data, self.set))
-        objects.add(0x2000, 0, Number(DataType.UNSIGNED32, self.cell.get, self.cell.set))
-        self.server = SdoServer(objects, segments)
+        objects.add(0x2000, 0, Number(IntegerType.UNSIGNED32, self.cell.get, self.cell.set))
+        self.server = SimulatedSdoServer(objects, segments)
 
     def set(self, data: bytes) -> None:
         self.data = data

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Number, Text
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.dictionary import Cell, Dictionary, IntegerType, Number, VisibleString
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 
 
-def ask(server: SdoServer, request: str) -> str:
+def ask(server: SimulatedSdoServer, request: str) -> str:
     return " / ".join(answer.hex(" ").upper() for answer in server.on_request(bytes.fromhex(request)))
 
 
@@ -77,8 +77,8 @@ def test_a_request_of_less_than_eight_bytes_is_not_heard(bench):
 def test_a_segmented_download_writes_once_it_is_complete():
     cell = Cell()
     objects = Dictionary()
-    objects.add(0x2000, 1, Number(DataType.UNSIGNED32, cell.get, cell.set))
-    server = SdoServer(objects)
+    objects.add(0x2000, 1, Number(IntegerType.UNSIGNED32, cell.get, cell.set))
+    server = SimulatedSdoServer(objects)
     assert ask(server, "21 00 20 01 04 00 00 00") == "60 00 20 01 00 00 00 00"
     assert ask(server, "0A 11 22 00 00 00 00 00") == "20 00 00 00 00 00 00 00"
     assert cell.value == 0
@@ -99,17 +99,17 @@ def test_a_segmented_download_writes_once_it_is_complete():
 def test_a_faulty_segmented_download_changes_nothing(frames, code):
     cell = Cell(7)
     objects = Dictionary()
-    objects.add(0x2000, 1, Number(DataType.UNSIGNED32, cell.get, cell.set))
-    server = SdoServer(objects)
+    objects.add(0x2000, 1, Number(IntegerType.UNSIGNED32, cell.get, cell.set))
+    server = SimulatedSdoServer(objects)
     assert [ask(server, frame) for frame in frames][-1] == f"80 00 20 01 {code}"
     assert cell.value == 7
 
 
 def test_reading_a_write_only_object_is_refused():
     objects = Dictionary()
-    objects.add(0x2000, 0, Number(DataType.UNSIGNED8, None, Cell().set))
-    objects.add(0x2001, 0, Text(""))
-    server = SdoServer(objects)
+    objects.add(0x2000, 0, Number(IntegerType.UNSIGNED8, None, Cell().set))
+    objects.add(0x2001, 0, VisibleString(""))
+    server = SimulatedSdoServer(objects)
     assert ask(server, "40 00 20 00 00 00 00 00") == "80 00 20 00 01 00 01 06"
     assert ask(server, "40 01 20 00 00 00 00 00") == "41 01 20 00 00 00 00 00", "an empty string has a size"
     assert ask(server, "60 00 00 00 00 00 00 00") == "0F 00 00 00 00 00 00 00"

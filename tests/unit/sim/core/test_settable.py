@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 
 from bridge.base.errors import OperationFailed
-from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Number, Text, constant
+from bridge.sim.core.dictionary import Cell, Dictionary, IntegerType, Number, VisibleString, constant
 from bridge.sim.core.settable import put_in, settable
 
 
 def objects() -> Dictionary:
     made, cell = Dictionary(), Cell()
-    made.add(0x6083, 0, Number(DataType.UNSIGNED32, cell.get, cell.set, high=100))
-    made.add(0x6064, 0, constant(DataType.INTEGER32, 0))
-    made.add(0x1008, 0, Text("drive"))
+    made.add(0x6083, 0, Number(IntegerType.UNSIGNED32, cell.get, cell.set, high=100))
+    made.add(0x6064, 0, constant(IntegerType.INTEGER32, 0))
+    made.add(0x1008, 0, VisibleString("drive"))
     return made
 
 

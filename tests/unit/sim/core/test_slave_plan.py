@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Number
-from bridge.sim.core.pdo import Tpdo
-from bridge.sim.core.sdo_server import SdoServer
-from bridge.sim.core.settings import CobId, CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.core.communication_settings import CobId, CommunicationSettings, PdoSettings, SdoSettings
+from bridge.sim.core.dictionary import Cell, Dictionary, IntegerType, Number
+from bridge.sim.core.pdo_timing import Tpdo
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 from bridge.sim.core.slave_plan import SlavePlan
 
 
-def plan() -> tuple[SlavePlan, list[SdoServer]]:
+def plan() -> tuple[SlavePlan, list[SimulatedSdoServer]]:
     objects, cell = Dictionary(), Cell(0x1234)
-    objects.add(0x6041, 0, Number(DataType.UNSIGNED16, cell.get, cell.set))
+    objects.add(0x6041, 0, Number(IntegerType.UNSIGNED16, cell.get, cell.set))
     word = [0x6041_0010]
     channels = [SdoSettings.at(0x605, 0x585), SdoSettings.at(0x625, 0x5A5, enabled=False)]
     settings = CommunicationSettings(
@@ -24,7 +24,7 @@ def plan() -> tuple[SlavePlan, list[SdoServer]]:
             PdoSettings(0x385),
         ],
     )
-    servers = [SdoServer(objects), SdoServer(objects)]
+    servers = [SimulatedSdoServer(objects), SimulatedSdoServer(objects)]
     tpdos = [Tpdo() for _ in settings.tpdo]
     return SlavePlan(settings, (0, 0x705), servers, channels, tpdos, lambda number: objects), servers
 

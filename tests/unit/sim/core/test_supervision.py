@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from bridge.sim.core.supervision import FAILED, NO_RESPONSE, Cycle, HeartbeatConsumer, Watch
+from bridge.sim.core.supervision import FAILED, NO_RESPONSE, Cycle, HeartbeatWatch, SignWatch
 
 
 def test_a_watch_begins_with_the_first_sign_and_trips_once() -> None:
-    watch = Watch(lambda: 0.5)
+    watch = SignWatch(lambda: 0.5)
     assert watch.next_deadline() is None
     assert not watch.expired(100.0)
     watch.start(1.0)
@@ -18,13 +18,13 @@ def test_a_watch_begins_with_the_first_sign_and_trips_once() -> None:
 
 
 def test_with_0_nothing_is_watched() -> None:
-    watch = Watch(lambda: 0.0)
+    watch = SignWatch(lambda: 0.0)
     watch.start(1.0)
     assert (watch.next_deadline(), watch.expired(1e9)) == (None, False)
 
 
 def test_a_consumer_tells_a_producer_that_was_never_there_from_one_that_failed() -> None:
-    consumer = HeartbeatConsumer(lambda: 127, lambda: 200)
+    consumer = HeartbeatWatch(lambda: 127, lambda: 200)
     assert (consumer.node, consumer.status) == (127, NO_RESPONSE)
     assert not consumer.on_heartbeat(b"\x85", 1.0)
     assert consumer.status == 5

@@ -10,9 +10,9 @@ from bridge.canopen.frame import Frame
 from bridge.cli.simulation import simulated_nodes
 from bridge.config import read_site
 from bridge.mapping import Family
-from bridge.mapping.site import load_site_and_families
-from bridge.sim.core.device import SimulatedDevice
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.mapping.site_families import load_site_and_families
+from bridge.sim.core.nmt_slave import SlaveState
+from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.generic.generic_node import GenericNode
 from tests.support import sites
 from tests.support.devices import DEVICES, ENCODER, IO_BLOCK
@@ -31,7 +31,7 @@ def played(folder: Path, mapping: str) -> GenericNode:
     assert isinstance(node, GenericNode)
     node.start(0.0)
     node.on_frame(_START, 0.0)
-    assert node.slave.state is NmtState.OPERATIONAL
+    assert node.slave.state is SlaveState.OPERATIONAL
     node.take_frames()
     return node
 
@@ -126,10 +126,10 @@ def test_outputs_have_their_error_values_when_the_node_is_stopped(tmp_path: Path
 
 @pytest.mark.parametrize(
     ("behaviour", "state"),
-    [(0, NmtState.PRE_OPERATIONAL), (1, NmtState.OPERATIONAL), (2, NmtState.STOPPED)],
+    [(0, SlaveState.PRE_OPERATIONAL), (1, SlaveState.OPERATIONAL), (2, SlaveState.STOPPED)],
 )
 def test_without_its_master_the_node_does_what_1029h_says(
-    tmp_path: Path, behaviour: int, state: NmtState
+    tmp_path: Path, behaviour: int, state: SlaveState
 ) -> None:
     node = described(tmp_path, "io16.eds")
     _given(node)

@@ -6,7 +6,7 @@ import pytest
 
 from bridge.mapping import family_names, load_family
 from bridge.mapping.model import IdentityRule
-from bridge.sim.core.dictionary import DataType
+from bridge.sim.core.dictionary import IntegerType
 from bridge.sim.generic.generic_family import identity_of, pattern, plan_of_family
 
 
@@ -30,6 +30,6 @@ def test_it_is_taken_for_one_of_the_family() -> None:
 
 def test_a_value_is_its_bit_pattern() -> None:
     assert pattern("real32", 1.0) == 0x3F80_0000
-    assert DataType.INTEGER16.encode(pattern("int16", -2)) == b"\xfe\xff"
+    assert IntegerType.INTEGER16.encode(pattern("int16", -2)) == b"\xfe\xff"
     with pytest.raises(ValueError, match=r"uint8|256"):
         pattern("uint8", 256)

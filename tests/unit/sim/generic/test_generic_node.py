@@ -17,7 +17,7 @@ from bridge.mapping.loader import mapping_folders
 from bridge.sim.catalogue import SIMULATED, simulate_family
 from bridge.sim.cia402.cia402_drive import Cia402Drive
 from bridge.sim.core.dictionary import Number
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.generic.generic_family import plan_of_family
 from bridge.sim.generic.generic_node import GenericNode
 from tests.support import sites
@@ -92,7 +92,7 @@ def test_every_mapping_can_be_played(tmp_path: Path, mapping: str) -> None:
     simulated = GenericNode(5, plan_of_family(family, 5))
     bench = Bench(site, family=family, mapping=mapping, node=simulated)
     bench.run(2.0)
-    assert simulated.slave.state is NmtState.OPERATIONAL, bench.value("conveyor/node/boot_status")
+    assert simulated.slave.state is SlaveState.OPERATIONAL, bench.value("conveyor/node/boot_status")
     (drive,) = bench.plant.drives.values()
     assert bench.plant.image.read(f"{drive.name}/status/status_word").quality is Quality.GOOD
 

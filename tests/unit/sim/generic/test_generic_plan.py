@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from bridge.sim.core.communication_objects import DeviceIdentity
-from bridge.sim.core.dictionary import DataType
-from bridge.sim.core.settings import CobId
-from bridge.sim.generic.generic_plan import LEAST_ENTRIES, BytesPlan, Copy, NodePlan, NumberPlan, PdoPlan
+from bridge.sim.core.communication_settings import CobId
+from bridge.sim.core.dictionary import IntegerType
+from bridge.sim.generic.generic_plan import LEAST_ENTRIES, BytesPlan, Copy, GenericPdo, NodePlan, NumberPlan
 
 IDENTITY = DeviceIdentity(0, 1, 2, 3, 4, "x", "1", "1")
 
 
 def plan() -> NodePlan:
-    objects = (NumberPlan((0x6083, 0), DataType.UNSIGNED32, 7), BytesPlan((0x1008, 0), b"x"))
-    rpdo = (PdoPlan(3, CobId(0x405), (0x6040_0010,)),)
+    objects = (NumberPlan((0x6083, 0), IntegerType.UNSIGNED32, 7), BytesPlan((0x1008, 0), b"x"))
+    rpdo = (GenericPdo(3, CobId(0x405), (0x6040_0010,)),)
     return NodePlan(IDENTITY, objects, rpdo)
 
 
 def test_commissioned_it_has_other_numbers_and_the_rest_is_the_same() -> None:
     made = plan().with_numbers({(0x6083, 0): 9, (0x1008, 0): 5})
-    assert made.objects == (NumberPlan((0x6083, 0), DataType.UNSIGNED32, 9), BytesPlan((0x1008, 0), b"x"))
+    assert made.objects == (NumberPlan((0x6083, 0), IntegerType.UNSIGNED32, 9), BytesPlan((0x1008, 0), b"x"))
     assert plan().objects[0].value == 7
 
 

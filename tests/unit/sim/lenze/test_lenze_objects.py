@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
 from bridge.sim.core.dictionary import Dictionary, Number
 from bridge.sim.core.emcy_producer import EmcyProducer
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.store import Store
 from bridge.sim.lenze.lenze_objects import VENDOR_ID, LenzeObjects
 from bridge.sim.lenze.lenze_settings import RULES, LenzeCodes, communication

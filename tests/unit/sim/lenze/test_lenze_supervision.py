@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from bridge.sim.core.communication_settings import CobId, CommunicationSettings, SlaveRules
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.settings import CobId, CommunicationSettings, SlaveRules
 from bridge.sim.core.store import Store
 from bridge.sim.lenze.lenze_supervision import HEARTBEAT_LOST, SUPPLY_FAILED, ErrorReporter
 

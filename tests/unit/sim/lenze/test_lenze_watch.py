@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.core.store import Store
 from bridge.sim.lenze.lenze_drive import LenzeDrive
 from bridge.sim.lenze.lenze_settings import RULES, LenzeCodes, communication
-from bridge.sim.lenze.lenze_supervision import Watched
-from bridge.sim.lenze.lenze_watch import BUS_OFF, BusWatch
+from bridge.sim.lenze.lenze_supervision import LenzeError
+from bridge.sim.lenze.lenze_watch import BUS_OFF, LenzeWatch
 
 
 class Rig:
@@ -16,7 +16,7 @@ class Rig:
         self.codes = LenzeCodes(5, **codes)
         self.drive = LenzeDrive(lambda: self.codes)
         self.emcy = EmcyProducer(Store(lambda: communication(self.codes, (4, 4))), RULES)
-        self.watch = BusWatch(lambda: self.codes, self.drive, self.emcy)
+        self.watch = LenzeWatch(lambda: self.codes, self.drive, self.emcy)
 
     def sent(self) -> list[int]:
         return [int.from_bytes(frame[:2], "little") for frame in self.emcy.due(1e9)]
@@ -25,14 +25,14 @@ class Rig:
 def test_an_rpdo_must_come_again_while_the_node_is_operational() -> None:
     rig = Rig(rpdo_time_ms=[100, 3000], rpdo_reactions=[1, 0])
     assert rig.watch.next_deadline() is None
-    rig.watch.nmt_changed(NmtState.OPERATIONAL, 1.0)
+    rig.watch.nmt_changed(SlaveState.OPERATIONAL, 1.0)
     assert rig.watch.next_deadline() == 1.1
     rig.watch.on_rpdo(0, 1.05)
     assert not rig.watch.expire(1.1)
     assert rig.drive.errors == []
     rig.watch.expire(1.2)
-    assert rig.drive.errors == [Watched.RPDO1_LATE]
-    rig.watch.nmt_changed(NmtState.PRE_OPERATIONAL, 1.3)
+    assert rig.drive.errors == [LenzeError.RPDO1_LATE]
+    rig.watch.nmt_changed(SlaveState.PRE_OPERATIONAL, 1.3)
     assert rig.watch.next_deadline() is None
 
 
@@ -41,7 +41,7 @@ def test_a_lost_heartbeat_is_told_and_leaves_operational() -> None:
     assert rig.watch.node == 127
     rig.watch.on_heartbeat(b"\x05", 1.0)
     assert rig.watch.expire(1.2)
-    assert (rig.sent(), rig.drive.errors) == ([0x8130], [Watched.HEARTBEAT])
+    assert (rig.sent(), rig.drive.errors) == ([0x8130], [LenzeError.HEARTBEAT])
     rig.watch.on_heartbeat(b"\x05", 2.0)
     assert (rig.sent(), rig.watch.node_status) == ([0], 5)
 
@@ -54,7 +54,7 @@ def test_lengths_bus_and_supply_have_their_messages() -> None:
     rig.watch.bus_error(BUS_OFF)
     rig.watch.supply(there=False)
     assert rig.sent() == [0x8210, 0, 0x8100, 0, 0x3100]
-    assert set(rig.drive.errors) == {Watched.FAULTY_TELEGRAM, Watched.BUS_OFF}
+    assert set(rig.drive.errors) == {LenzeError.FAULTY_TELEGRAM, LenzeError.BUS_OFF}
 
 
 def test_one_identifier_for_two_pdos_is_a_collision() -> None:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_parameters import PARAMETERS
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 
 
 class Driver:
@@ -30,30 +30,30 @@ class Driver:
         self.drive.on_telegram(high << 8 | low_byte, setpoints)
         return self
 
-    def to(self, state: State) -> Driver:
+    def to(self, state: NordState) -> Driver:
         """The usual way into a state."""
-        if state is State.NOT_READY:
+        if state is NordState.NOT_READY:
             return self
         self.wait(0.3)
         words = {
-            State.SWITCH_ON_INHIBITED: (),
-            State.READY: (0x7E,),
-            State.SWITCHED_ON: (0x7E, 0x77),
-            State.ENABLED: (0x7E, 0x7F),
-            State.QUICK_STOP: (0x7E, 0x7F),
-            State.FAULT_REACTION: (0x7E,),
-            State.FAULT: (0x7E,),
+            NordState.SWITCH_ON_INHIBITED: (),
+            NordState.READY: (0x7E,),
+            NordState.SWITCHED_ON: (0x7E, 0x77),
+            NordState.ENABLED: (0x7E, 0x7F),
+            NordState.QUICK_STOP: (0x7E, 0x7F),
+            NordState.FAULT_REACTION: (0x7E,),
+            NordState.FAULT: (0x7E,),
         }
         for word in words[state]:
             self.send(word, 0x2000)
-        if state in (State.ENABLED, State.QUICK_STOP):
+        if state in (NordState.ENABLED, NordState.QUICK_STOP):
             self.wait(0.5)
-        if state is State.QUICK_STOP:
+        if state is NordState.QUICK_STOP:
             self.drive.parameters.commission(426, 2.0)
             self.send(0x7B)
-        if state in (State.FAULT_REACTION, State.FAULT):
+        if state in (NordState.FAULT_REACTION, NordState.FAULT):
             self.drive.trip(30)
-        if state is State.FAULT:
+        if state is NordState.FAULT:
             self.wait(0.1)
         assert self.drive.state is state
         return self
@@ -97,20 +97,20 @@ def test_the_typical_answer_to_047e_is_0b31(driver):
 @pytest.mark.parametrize(
     ("number", "source", "words", "target"),
     [
-        (2, State.SWITCH_ON_INHIBITED, [0x06], State.READY),
-        (3, State.READY, [0x07], State.SWITCHED_ON),
-        (4, State.SWITCHED_ON, [0x7F], State.ENABLED),
-        (5, State.ENABLED, [0x77], State.SWITCHED_ON),
-        (6, State.SWITCHED_ON, [0x06], State.READY),
-        (7, State.READY, [0x04], State.SWITCH_ON_INHIBITED),
-        (7, State.READY, [0x02], State.SWITCH_ON_INHIBITED),
-        (8, State.ENABLED, [0x7E], State.READY),
-        (9, State.ENABLED, [0x7D], State.SWITCH_ON_INHIBITED),
-        (10, State.SWITCHED_ON, [0x75], State.SWITCH_ON_INHIBITED),
-        (10, State.SWITCHED_ON, [0x73], State.SWITCH_ON_INHIBITED),
-        (11, State.ENABLED, [0x7B], State.QUICK_STOP),
-        (12, State.QUICK_STOP, [0x7D], State.SWITCH_ON_INHIBITED),
-        (15, State.FAULT, [0x00, 0x80], State.SWITCH_ON_INHIBITED),
+        (2, NordState.SWITCH_ON_INHIBITED, [0x06], NordState.READY),
+        (3, NordState.READY, [0x07], NordState.SWITCHED_ON),
+        (4, NordState.SWITCHED_ON, [0x7F], NordState.ENABLED),
+        (5, NordState.ENABLED, [0x77], NordState.SWITCHED_ON),
+        (6, NordState.SWITCHED_ON, [0x06], NordState.READY),
+        (7, NordState.READY, [0x04], NordState.SWITCH_ON_INHIBITED),
+        (7, NordState.READY, [0x02], NordState.SWITCH_ON_INHIBITED),
+        (8, NordState.ENABLED, [0x7E], NordState.READY),
+        (9, NordState.ENABLED, [0x7D], NordState.SWITCH_ON_INHIBITED),
+        (10, NordState.SWITCHED_ON, [0x75], NordState.SWITCH_ON_INHIBITED),
+        (10, NordState.SWITCHED_ON, [0x73], NordState.SWITCH_ON_INHIBITED),
+        (11, NordState.ENABLED, [0x7B], NordState.QUICK_STOP),
+        (12, NordState.QUICK_STOP, [0x7D], NordState.SWITCH_ON_INHIBITED),
+        (15, NordState.FAULT, [0x00, 0x80], NordState.SWITCH_ON_INHIBITED),
     ],
 )
 def test_commanded_transitions(driver, number, source, words, target):
@@ -118,26 +118,28 @@ def test_commanded_transitions(driver, number, source, words, target):
     for word in words:
         driver.send(word)
     if number == 8:
-        assert driver.drive.state is State.ENABLED, "first the ramp"
+        assert driver.drive.state is NordState.ENABLED, "first the ramp"
         driver.wait(3.0)
     assert driver.drive.state is target
 
 
 def test_transition_1_comes_with_the_charging_relay(driver):
     driver.wait(0.19)
-    assert (driver.drive.state, driver.drive.status_word) == (State.NOT_READY, 0)
+    assert (driver.drive.state, driver.drive.status_word) == (NordState.NOT_READY, 0)
     driver.wait(0.02)
-    assert driver.drive.state is State.SWITCH_ON_INHIBITED
+    assert driver.drive.state is NordState.SWITCH_ON_INHIBITED
 
 
-@pytest.mark.parametrize("state", [s for s in State if s not in (State.FAULT_REACTION, State.FAULT)])
+@pytest.mark.parametrize(
+    "state", [s for s in NordState if s not in (NordState.FAULT_REACTION, NordState.FAULT)]
+)
 def test_transitions_13_and_14_a_fault_comes_from_every_state(driver, state):
     driver.to(state)
     driver.drive.trip(30)
-    assert driver.drive.state is State.FAULT_REACTION
+    assert driver.drive.state is NordState.FAULT_REACTION
     assert driver.drive.status_word & 0x4F == 0x0F
     driver.wait(0.1)
-    assert driver.drive.state is State.FAULT
+    assert driver.drive.state is NordState.FAULT
     assert driver.drive.status_word & 0x4F == 0x08
     assert (driver.drive.fault_tenths, driver.drive.last_faults[0]) == (30, 30)
 
@@ -145,11 +147,11 @@ def test_transitions_13_and_14_a_fault_comes_from_every_state(driver, state):
 @pytest.mark.parametrize(
     ("state", "bits"),
     [
-        (State.SWITCH_ON_INHIBITED, 0x40),
-        (State.READY, 0x31),
-        (State.SWITCHED_ON, 0x33),
-        (State.ENABLED, 0x37),
-        (State.QUICK_STOP, 0x17),
+        (NordState.SWITCH_ON_INHIBITED, 0x40),
+        (NordState.READY, 0x31),
+        (NordState.SWITCHED_ON, 0x33),
+        (NordState.ENABLED, 0x37),
+        (NordState.QUICK_STOP, 0x17),
     ],
 )
 def test_the_coded_states(driver, state, bits):
@@ -157,33 +159,33 @@ def test_the_coded_states(driver, state, bits):
 
 
 def test_switch_on_inhibited_is_left_only_by_shut_down(driver):
-    driver.to(State.SWITCH_ON_INHIBITED)
+    driver.to(NordState.SWITCH_ON_INHIBITED)
     for low in range(256):
         if low & 7 != 6:
             driver.send(low)
-            assert driver.drive.state is State.SWITCH_ON_INHIBITED, f"{low:02X}h"
+            assert driver.drive.state is NordState.SWITCH_ON_INHIBITED, f"{low:02X}h"
 
 
 def test_disable_voltage_goes_before_quick_stop(driver):
-    driver.to(State.ENABLED).send(0x79)
-    assert driver.drive.state is State.SWITCH_ON_INHIBITED
+    driver.to(NordState.ENABLED).send(0x79)
+    assert driver.drive.state is NordState.SWITCH_ON_INHIBITED
 
 
 def test_a_commanded_stop_can_be_withdrawn_on_the_ramp(driver):
-    driver.to(State.ENABLED).send(0x7E, 0x2000).wait(0.2).send(0x7F, 0x2000).wait(3.0)
-    assert (driver.drive.state, driver.drive.output_hz) == (State.ENABLED, 25.0)
+    driver.to(NordState.ENABLED).send(0x7E, 0x2000).wait(0.2).send(0x7F, 0x2000).wait(3.0)
+    assert (driver.drive.state, driver.drive.output_hz) == (NordState.ENABLED, 25.0)
 
 
 def test_a_quick_stop_cannot_be_withdrawn_and_ends_in_switch_on_inhibited(driver):
-    driver.to(State.QUICK_STOP).send(0x7F, 0x2000)
+    driver.to(NordState.QUICK_STOP).send(0x7F, 0x2000)
     assert driver.drive.status_word & 0x7F == 0x17
     driver.wait(3.0)
-    assert driver.drive.state is State.SWITCH_ON_INHIBITED
+    assert driver.drive.state is NordState.SWITCH_ON_INHIBITED
 
 
 def test_a_drive_in_quick_stop_goes_on_to_ready_if_that_is_commanded_meanwhile(driver):
-    driver.to(State.QUICK_STOP).send(0x7E).wait(3.0)
-    assert driver.drive.state is State.READY
+    driver.to(NordState.QUICK_STOP).send(0x7E).wait(3.0)
+    assert driver.drive.state is NordState.READY
 
 
 # §6.5.1: single bits
@@ -191,7 +193,7 @@ def test_a_drive_in_quick_stop_goes_on_to_ready_if_that_is_commanded_meanwhile(d
 
 @given(low=st.integers(0, 255), high=st.integers(0, 255).filter(lambda high: not high & 0x04))
 def test_without_bit_10_a_telegram_is_void(low, high):
-    driver = Driver().to(State.ENABLED)
+    driver = Driver().to(NordState.ENABLED)
     before = (driver.drive.state, driver.drive.control_word, driver.drive.setpoints)
     driver.send(low, 0x1234, high=high)
     assert (driver.drive.state, driver.drive.control_word, driver.drive.setpoints) == before
@@ -199,24 +201,24 @@ def test_without_bit_10_a_telegram_is_void(low, high):
 
 
 def test_only_the_edge_of_bit_7_acknowledges(driver):
-    driver.to(State.ENABLED).send(0xFF, 0x2000)
+    driver.to(NordState.ENABLED).send(0xFF, 0x2000)
     driver.drive.trip(30)
     driver.wait(0.1).send(0xFF)
-    assert driver.drive.state is State.FAULT, "no edge: the bit was set before"
+    assert driver.drive.state is NordState.FAULT, "no edge: the bit was set before"
     driver.send(0x7F).send(0xFF)
-    assert driver.drive.state is State.SWITCH_ON_INHIBITED
+    assert driver.drive.state is NordState.SWITCH_ON_INHIBITED
     assert driver.drive.fault_tenths == 0
     assert driver.drive.last_faults[0] == 30
 
 
 def test_a_fault_whose_cause_lasts_is_not_acknowledged(driver):
-    driver.to(State.READY)
+    driver.to(NordState.READY)
     driver.drive.trip(30, lasting=True)
     driver.wait(0.1).send(0x00).send(0x80)
-    assert driver.drive.state is State.FAULT
+    assert driver.drive.state is NordState.FAULT
     driver.drive.cause_gone()
     driver.send(0x00).send(0x80)
-    assert driver.drive.state is State.SWITCH_ON_INHIBITED
+    assert driver.drive.state is NordState.SWITCH_ON_INHIBITED
 
 
 @pytest.mark.parametrize(
@@ -233,7 +235,7 @@ def test_a_fault_whose_cause_lasts_is_not_acknowledged(driver):
     ],
 )
 def test_direction_and_clipping_at_p105(driver, direction, setpoint, hertz):
-    driver.to(State.READY).send(0x7F, setpoint, high=0x04 | direction >> 8).wait(3.0)
+    driver.to(NordState.READY).send(0x7F, setpoint, high=0x04 | direction >> 8).wait(3.0)
     assert driver.drive.output_hz == pytest.approx(hertz)
     assert driver.drive.status_word & 0x1800 == (0x0800 if hertz > 0 else 0x1000)
     assert driver.drive.actual_values[0] == round(hertz / 50 * 0x4000) & 0xFFFF
@@ -241,18 +243,18 @@ def test_direction_and_clipping_at_p105(driver, direction, setpoint, hertz):
 
 def test_the_parameter_set_is_chosen_and_echoed_by_bits_14_and_15(driver):
     driver.drive.parameters.write(_parameter(105), 1, 3, 250)
-    driver.to(State.READY).send(0x7F, 0x4000, high=0x84).wait(3.0)
+    driver.to(NordState.READY).send(0x7F, 0x4000, high=0x84).wait(3.0)
     assert driver.drive.status_word >> 14 == 2
     assert driver.drive.output_hz == 25.0
 
 
 def test_bit_4_sets_the_ramp_generator_to_0_and_keeps_the_state(driver):
-    driver.to(State.ENABLED).send(0x6F, 0x2000).wait(0.001)
-    assert (driver.drive.state, driver.drive.output_hz) == (State.ENABLED, 0.0)
+    driver.to(NordState.ENABLED).send(0x6F, 0x2000).wait(0.001)
+    assert (driver.drive.state, driver.drive.output_hz) == (NordState.ENABLED, 0.0)
 
 
 def test_bit_5_holds_the_frequency(driver):
-    driver.to(State.ENABLED).send(0x5F, 0x4000)
+    driver.to(NordState.ENABLED).send(0x5F, 0x4000)
     held = driver.drive.output_hz
     driver.wait(1.0)
     assert driver.drive.output_hz == held
@@ -260,10 +262,10 @@ def test_bit_5_holds_the_frequency(driver):
 
 
 def test_bit_6_takes_the_setpoint_away(driver):
-    driver.to(State.ENABLED).send(0x3F, 0x2000).wait(0.1)
+    driver.to(NordState.ENABLED).send(0x3F, 0x2000).wait(0.1)
     assert 0 < driver.drive.output_hz < 25
     driver.wait(3.0)
-    assert (driver.drive.state, driver.drive.output_hz) == (State.ENABLED, 0.0)
+    assert (driver.drive.state, driver.drive.output_hz) == (NordState.ENABLED, 0.0)
 
 
 # Ramps and values
@@ -273,7 +275,7 @@ def test_ramps_take_p102_p103_and_p426(driver):
     driver.drive.parameters.commission(102, 1.0)
     driver.drive.parameters.commission(103, 4.0)
     driver.drive.parameters.commission(426, 0.5)
-    driver.to(State.READY).send(0x7F, 0x4000).wait(0.5)
+    driver.to(NordState.READY).send(0x7F, 0x4000).wait(0.5)
     assert driver.drive.output_hz == pytest.approx(25.0)
     assert not driver.drive.status_word & 0x0100, "setpoint not reached yet"
     driver.wait(0.51)
@@ -286,7 +288,7 @@ def test_ramps_take_p102_p103_and_p426(driver):
 
 
 def test_disable_voltage_takes_the_output_away_and_the_motor_runs_down(driver):
-    driver.to(State.READY).send(0x7F, 0x4000).wait(3.0)
+    driver.to(NordState.READY).send(0x7F, 0x4000).wait(3.0)
     assert driver.drive.motor_hz(driver.now) == 50.0
     driver.send(0x7D)
     assert (driver.drive.output_hz, driver.drive.actual_values[:2]) == (0.0, (0, 0))
@@ -295,7 +297,7 @@ def test_disable_voltage_takes_the_output_away_and_the_motor_runs_down(driver):
 
 
 def test_current_is_scaled_by_p112_and_is_0_without_voltage(driver):
-    driver.to(State.ENABLED).wait(3.0)
+    driver.to(NordState.ENABLED).wait(3.0)
     current_word = driver.drive.actual_values[1]
     assert 10.0 * current_word / 0x4000 == pytest.approx(driver.drive.current_a, abs=0.001)
     assert 2.0 < driver.drive.current_a < 10.0
@@ -314,7 +316,7 @@ def test_what_an_actual_value_means_is_set_by_p543(driver):
 def test_under_local_control_the_bus_commands_nothing(driver):
     driver.drive.parameters.commission(509, 0)
     driver.wait(0.3).send(0x7E)
-    assert driver.drive.state is State.SWITCH_ON_INHIBITED
+    assert driver.drive.state is NordState.SWITCH_ON_INHIBITED
     assert not driver.drive.status_word & 0x0200
 
 

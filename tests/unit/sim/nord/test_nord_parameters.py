@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.core.abort import SdoAbort
 from bridge.sim.core.dictionary import Dictionary
-from bridge.sim.nord.nord_parameters import SK_5XXE, DriveParameters, add_display, sub_index
+from bridge.sim.core.sdo_abort import SdoAbort
+from bridge.sim.nord.nord_parameters import SK_5XXE, NordParameters, add_display, sub_index
 
 
 def test_sub_indices_count_elements_and_sets() -> None:
     assert [sub_index(element, set_) for element, set_ in ((1, 1), (1, 4), (2, 1), (5, 3))] == [1, 4, 5, 19]
 
 
-def entry(parameters: DriveParameters, number: int, sub: int):
+def entry(parameters: NordParameters, number: int, sub: int):
     objects = Dictionary()
     parameters.add_to(objects)
     return objects.find(0x2000 + number, sub)
 
 
 def test_a_write_is_for_its_set_and_outlasts_the_power_where_p560_says_so() -> None:
-    made = DriveParameters()
+    made = NordParameters()
     entry(made, 102, 2).download((500).to_bytes(2, "little"))
     assert [made.value(102, set_) for set_ in (1, 2)] == [2.0, 5.0]
     made.power_on()
@@ -36,7 +36,7 @@ def test_a_write_is_for_its_set_and_outlasts_the_power_where_p560_says_so() -> N
 
 
 def test_commissioning_sets_all_sets_and_names_what_is_wrong() -> None:
-    made = DriveParameters()
+    made = NordParameters()
     made.commission(105, 60.0)
     assert {made.value(105, set_) for set_ in range(1, 5)} == {60.0}
     made.commission(543, 9, element=2)
@@ -48,14 +48,14 @@ def test_commissioning_sets_all_sets_and_names_what_is_wrong() -> None:
 
 
 def test_meanings_are_elements_or_three_parameters() -> None:
-    assert [DriveParameters().meaning(543, value, 1) for value in range(1, 6)] == [1, 3, 5, 0, 0]
-    single = DriveParameters(SK_5XXE)
+    assert [NordParameters().meaning(543, value, 1) for value in range(1, 6)] == [1, 3, 5, 0, 0]
+    single = NordParameters(SK_5XXE)
     single.commission(544, 7)
     assert [single.meaning(543, value, 1) for value in range(1, 6)] == [1, 7, 5, 0, 0]
 
 
 def test_the_keypad_writes_as_p560_says() -> None:
-    made = DriveParameters()
+    made = NordParameters()
     made.at_keypad(105, 700)
     made.power_on()
     assert made.value(105) == 70.0

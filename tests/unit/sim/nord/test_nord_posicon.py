@@ -6,7 +6,7 @@ import pytest
 
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_posicon import PositionControl, commission, target
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 
 REACHED = 0x0100
 TURNS_LEFT = 0x1000
@@ -54,7 +54,7 @@ def test_it_goes_to_the_position_and_stops_there(axis: Axis):
     axis.wait(5.0)
     assert axis.revolutions == 30.0
     assert axis.drive.output_hz == 0
-    assert axis.drive.state is State.ENABLED, "it holds the position"
+    assert axis.drive.state is NordState.ENABLED, "it holds the position"
     assert axis.drive.status_word & REACHED
 
 
@@ -104,7 +104,7 @@ def test_a_stop_ramps_down_and_the_next_enable_goes_on(axis: Axis):
     axis.wait(3.0)
     axis.send(0x047E, 500.0)
     axis.wait(3.0)
-    assert axis.drive.state is State.READY
+    assert axis.drive.state is NordState.READY
     assert 20.0 < axis.revolutions < 400.0
     axis.send(0x047F, 100.0)
     axis.wait(10.0)

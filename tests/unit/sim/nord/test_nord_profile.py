@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 from bridge.sim.nord.nord_tu4 import NordTu4
 
 P168 = 0x20A8
@@ -68,7 +68,7 @@ def test_speed_is_in_revolutions_per_minute_and_signed(make, drive: int, rpm: in
     assert status & 0xFF == 0x37
     assert bool(status & 0x1000) is (rpm < 0)
     others = [one.state for place, one in enumerate(bench.node.drives) if place != drive - 1]
-    assert set(others) == {State.SWITCH_ON_INHIBITED}
+    assert set(others) == {NordState.SWITCH_ON_INHIBITED}
 
 
 def test_bit_12_does_not_turn_the_speed_round(make):
@@ -82,7 +82,7 @@ def test_bit_12_does_not_turn_the_speed_round(make):
 def test_bit_10_is_needed_here_too(make):
     bench = make()
     command(bench, 0x007E, 0)
-    assert bench.node.drives[0].state is State.SWITCH_ON_INHIBITED
+    assert bench.node.drives[0].state is NordState.SWITCH_ON_INHIBITED
 
 
 def test_p168_is_the_ramp(make):
@@ -146,7 +146,7 @@ def test_the_error_code_and_the_io_are_there(make):
 def test_p151_watches_in_the_profile(make):
     bench = make(p151_ms=100)
     run(bench, 600, seconds=0.09)
-    assert bench.node.drives[0].state is State.ENABLED
+    assert bench.node.drives[0].state is NordState.ENABLED
     bench.run(0.02)
     assert bench.node.drives[0].fault_tenths == 103
 

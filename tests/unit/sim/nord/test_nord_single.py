@@ -7,7 +7,7 @@ import pytest
 from bridge.canopen.frame import Frame
 from bridge.sim.nord.nord_single import NordSingle
 from bridge.sim.nord.nord_single_settings import RJ45_5XX, RJ45_54X, TU3
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 
 P509, P513, P543, P544, P700, P701, P746 = 0x21FD, 0x2201, 0x221F, 0x2220, 0x22BC, 0x22BD, 0x22EA
 READY, RUN, ACKNOWLEDGE = "7E04", "7F04", "8004"
@@ -39,7 +39,7 @@ def watched(make, variant=TU3):
     for _ in range(30):
         bench.put(cob_id, RUN + "0020" + words)
         bench.run(0.1)
-    assert bench.node.drive.state is State.ENABLED
+    assert bench.node.drive.state is NordState.ENABLED
     return bench
 
 
@@ -83,7 +83,7 @@ def test_the_rpdo_that_is_sent_says_how_many_setpoints_are_evaluated(make, cob_i
     bench.put(0x305, READY + "999999999999")
     bench.put(cob_id, READY + words)
     assert bench.node.drive.setpoints[:3] == evaluated
-    assert bench.node.drive.state is State.READY
+    assert bench.node.drive.state is NordState.READY
 
 
 @pytest.mark.parametrize("variant", [RJ45_5XX, RJ45_54X])
@@ -147,7 +147,7 @@ def test_meanings_of_values_are_single_parameters(make):
 def test_p513_trips_the_drive_when_the_telegrams_stop(make, variant):
     bench = watched(make, variant)
     bench.run(0.39)
-    assert bench.node.drive.state is State.ENABLED
+    assert bench.node.drive.state is NordState.ENABLED
     bench.run(0.02)
     assert (bench.node.drive.fault_tenths, bench.node.drive.output_hz) == (102, 0.0)
     bench.run(0.1)
@@ -162,7 +162,7 @@ def test_the_acknowledge_works_when_telegrams_come_again(make, variant):
     bench.run(1.0)
     cob_id = 0x305 if variant is TU3 else 0x205
     bench.put(cob_id, ACKNOWLEDGE + "000000000000")
-    assert bench.node.drive.state is State.SWITCH_ON_INHIBITED
+    assert bench.node.drive.state is NordState.SWITCH_ON_INHIBITED
     assert bench.of(0x085)[-1][1].hex() == "0000000000000000"
 
 
@@ -247,14 +247,14 @@ def test_a_broken_link_is_10_8_whatever_p120_would_say(make):
     assert bench.of(0x185)[-1][1].hex() == "00000000"
     assert bench.sdo("4066200100000000") == "80 66 20 01 00 00 06 06"
     bench.put(0x205, ACKNOWLEDGE + "0000")
-    assert bench.node.drive.state is State.FAULT
+    assert bench.node.drive.state is NordState.FAULT
     bench.node.restore_drive()
     bench.run(0.1)
     assert bench.of(0x085)[-1][1].hex() == "0050010000000000"
     assert bench.read(P746, 0) == 0x0C03
     bench.put(0x205, "0004" + "0000")
     bench.put(0x205, ACKNOWLEDGE + "0000")
-    assert bench.node.drive.state is State.SWITCH_ON_INHIBITED
+    assert bench.node.drive.state is NordState.SWITCH_ON_INHIBITED
 
 
 def test_by_rj45_there_is_no_link_to_lose(make):
@@ -282,7 +282,7 @@ def test_communication_settings_survive_only_when_saved(make):
     bench.node.power_cycle()
     bench.run(0.1)
     assert bench.read(0x1801, 1) == 0x4000_0285
-    assert bench.node.drive.state is State.NOT_READY
+    assert bench.node.drive.state is NordState.NOT_READY
 
 
 @pytest.mark.parametrize(

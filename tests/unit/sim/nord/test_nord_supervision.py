@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bridge.sim.core.emcy_producer import EmcyProducer
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.core.store import Store
 from bridge.sim.nord.nord_settings import RULES, factory_communication
 from bridge.sim.nord.nord_supervision import (
@@ -17,9 +17,9 @@ from bridge.sim.nord.nord_supervision import (
 
 def test_p173_shows_states_time_outs_and_drives() -> None:
     drives = [Presence.ONLINE, Presence.OFFLINE, Presence.LOST, Presence.UNKNOWN]
-    assert module_state(NmtState.OPERATIONAL, False, True, drives) == 0b0111_0010_0000_1010
-    assert module_state(NmtState.PRE_OPERATIONAL, True, False, []) == 5
-    assert module_state(NmtState.STOPPED, False, False, []) == 0
+    assert module_state(SlaveState.OPERATIONAL, False, True, drives) == 0b0111_0010_0000_1010
+    assert module_state(SlaveState.PRE_OPERATIONAL, True, False, []) == 5
+    assert module_state(SlaveState.STOPPED, False, False, []) == 0
 
 
 def test_the_watch_begins_with_the_first_telegram_after_its_time_was_set() -> None:

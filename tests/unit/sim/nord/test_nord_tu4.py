@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 
 P151, P160, P161, P162, P163, P164, P165, P166, P167 = 0x2097, *range(0x20A0, 0x20A8)
 P170, P173, P176, P177 = 0x20AA, 0x20AD, 0x20B0, 0x20B1
@@ -18,7 +18,7 @@ P513, P700, P701 = 0x2201, 0x22BC, 0x22BD
 @pytest.mark.parametrize("length", [0, 2, 4, 6, 7])
 def test_a_telegram_of_less_than_four_words_is_not_evaluated(live, length):
     live.put(0x205, bytes.fromhex("7E04000000000000")[:length])
-    assert live.node.drives[0].state is State.SWITCH_ON_INHIBITED
+    assert live.node.drives[0].state is NordState.SWITCH_ON_INHIBITED
     assert live.node.slave.rpdos_ignored == 1
 
 
@@ -28,7 +28,7 @@ def test_a_mapping_of_less_than_four_words_is_not_evaluated(live):
     live.write(0x1600, 0, 2, 1)
     live.nmt(0x01)
     live.command(0x047E)
-    assert live.node.drives[0].state is State.SWITCH_ON_INHIBITED
+    assert live.node.drives[0].state is NordState.SWITCH_ON_INHIBITED
     assert live.node.slave.rpdos_ignored == 1
 
 
@@ -50,8 +50,8 @@ def test_dummy_words_fill_a_telegram(live):
 def test_each_pdo_moves_its_drive_and_no_other(live, drive):
     live.command(0x047E, 0x0111, 0x0222, 0x0333, drive=drive)
     states = [one.state for one in live.node.drives]
-    assert states.pop(drive - 1) is State.READY
-    assert set(states) == {State.SWITCH_ON_INHIBITED}
+    assert states.pop(drive - 1) is NordState.READY
+    assert set(states) == {NordState.SWITCH_ON_INHIBITED}
     assert live.node.drives[drive - 1].setpoints == (0x0111, 0x0222, 0x0333, 0, 0)
     assert live.read(P176, 4 * drive - 2) == 0x047E
     assert live.read(P177, 4 * drive - 2) == 0x0B31
@@ -179,7 +179,7 @@ def test_a_turning_drive_is_looked_at_every_10_ms_and_only_while_its_frequency_c
 def test_frames_with_stamps_from_before_the_last_timer_do_no_harm(live):
     live.run(1.0)
     live.node.on_frame(Frame(0x205, bytes.fromhex("7E04000000000000")), live.now - 0.5)
-    assert live.node.drives[0].state is State.READY
+    assert live.node.drives[0].state is NordState.READY
 
 
 def test_with_ripple_the_current_moves_and_the_seed_repeats_it(make_bench):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 from bridge.sim.nord.nord_tu4 import NordTu4
 
 P151, P160, P161, P162, P163, P164, P165, P166, P167 = 0x2097, *range(0x20A0, 0x20A8)
@@ -70,13 +70,13 @@ def test_a_dropped_drive_is_lost_for_the_interface_and_misses_it_itself(live):
     assert live.answer(2) == (0, 0)
     assert (live.node.drives[1].fault_tenths, live.node.drives[1].output_hz) == (109, 0.0)
     live.command(0x0480, drive=2)
-    assert live.node.drives[1].state is State.FAULT
+    assert live.node.drives[1].state is NordState.FAULT
     live.node.restore_drive("fu2")
     live.run(0.1)
     assert live.of(0x085)[-1][1] == bytes.fromhex("0010010100000000")
     live.command(0x0400, drive=2)
     live.command(0x0480, drive=2)
-    assert live.node.drives[1].state is State.SWITCH_ON_INHIBITED
+    assert live.node.drives[1].state is NordState.SWITCH_ON_INHIBITED
 
 
 def test_a_dropped_drive_with_p513_minus_0_1_runs_on(live):
@@ -99,7 +99,7 @@ def test_a_silent_node_hears_and_works(live):
     live.node.silence()
     live.command(0x047E)
     assert live.run(1.0) == []
-    assert live.node.drives[0].state is State.READY
+    assert live.node.drives[0].state is NordState.READY
     live.node.speak()
     assert live.run(1.0) != []
 
@@ -107,9 +107,9 @@ def test_a_silent_node_hears_and_works(live):
 def test_a_power_cycle_starts_everything_anew(watched):
     watched.node.power_cycle()
     assert Frame(0x705, b"\0") in watched.run(0.01)
-    assert watched.node.drives[0].state is State.NOT_READY
+    assert watched.node.drives[0].state is NordState.NOT_READY
     watched.run(1.0)
-    assert watched.node.drives[0].state is State.SWITCH_ON_INHIBITED
+    assert watched.node.drives[0].state is NordState.SWITCH_ON_INHIBITED
     assert watched.read(P173, 1) & 3 == 1
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.sim.nord.nord_states import State
+from bridge.sim.nord.nord_states import NordState
 
 P151, P160, P161, P162, P163, P164, P165, P166, P167 = 0x2097, *range(0x20A0, 0x20A8)
 P170, P173, P176, P177 = 0x20AA, 0x20AD, 0x20B0, 0x20B1
@@ -18,9 +18,9 @@ def emcys(bench) -> list[str]:
 
 def test_p151_trips_every_drive_when_the_telegrams_stop(watched):
     watched.run(0.099)
-    assert watched.node.drives[0].state is State.ENABLED
+    assert watched.node.drives[0].state is NordState.ENABLED
     watched.run(0.002)
-    assert [drive.state for drive in watched.node.drives] == [State.FAULT_REACTION] * 4
+    assert [drive.state for drive in watched.node.drives] == [NordState.FAULT_REACTION] * 4
     assert watched.node.drives[0].output_hz == 0.0
     assert emcys(watched) == [f"008111{drive:02X}00000000" for drive in range(4)]
     watched.run(0.1)
@@ -37,9 +37,9 @@ def test_the_interface_forgives_and_the_drive_wants_the_acknowledge(watched):
     watched.command(0x047F, 0x2000)
     assert (watched.read(P170, 1), watched.read(P170, 2)) == (0, 1020)
     assert not watched.read(P173, 1) & 0x08
-    assert watched.node.drives[0].state is State.FAULT
+    assert watched.node.drives[0].state is NordState.FAULT
     watched.command(0x04FF, 0x2000)
-    assert watched.node.drives[0].state is State.SWITCH_ON_INHIBITED
+    assert watched.node.drives[0].state is NordState.SWITCH_ON_INHIBITED
     assert emcys(watched)[4:] == ["0000110000000000"], "FU2…4 still have their fault"
     for drive in (2, 3, 4):
         watched.command(0x0480, drive=drive)
@@ -47,7 +47,7 @@ def test_the_interface_forgives_and_the_drive_wants_the_acknowledge(watched):
     watched.command(0x047E, 0x2000)
     watched.command(0x047F, 0x2000)
     watched.run(0.05)
-    assert watched.node.drives[0].state is State.ENABLED
+    assert watched.node.drives[0].state is NordState.ENABLED
 
 
 def test_p151_waits_for_the_first_valid_telegram(make_bench):
@@ -65,7 +65,7 @@ def test_any_drives_telegram_restarts_p151(watched):
     for drive in (2, 3, 4, 2):
         watched.run(0.09)
         watched.command(0x0400, drive=drive)
-    assert watched.node.drives[0].state is State.ENABLED
+    assert watched.node.drives[0].state is NordState.ENABLED
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_leaving_operational_lets_p151_run_out(watched, command):
     watched.nmt(command)
     watched.run(0.05)
     watched.command(0x047F, 0x2000)
-    assert watched.node.drives[0].state is State.ENABLED
+    assert watched.node.drives[0].state is NordState.ENABLED
     watched.run(0.06)
     assert watched.node.drives[0].fault_tenths == 103
 

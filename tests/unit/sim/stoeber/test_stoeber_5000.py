@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.canopen.frame import Frame
-from bridge.sim.core.nmt_slave import NmtState
+from bridge.sim.core.nmt_slave import SlaveState
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from bridge.sim.stoeber.stoeber_axis import AxisState
 from bridge.sim.stoeber.stoeber_settings import coordinate
@@ -298,7 +298,7 @@ def test_life_guarding_brings_event_52_cause_1_and_pre_operational(drive):
     assert states(drive) == [AxisState.ENABLED]
     drive.run(0.02)
     assert states(drive) == [AxisState.FAULT_REACTION]
-    assert drive.node.slave.state is NmtState.PRE_OPERATIONAL
+    assert drive.node.slave.state is SlaveState.PRE_OPERATIONAL
     assert emcys(drive) == ["00 81 10 34 01 00 00 00"]
     drive.run(0.5)
     assert (states(drive), drive.node.axes[0].speed_rpm) == ([AxisState.FAULT], 0)

@@ -10,7 +10,7 @@ from bridge.canopen.pdo import PdoEntry
 from bridge.canopen.sdo import SdoChannel
 from bridge.mapping import load_family
 from bridge.sim.core.dictionary import Dictionary, Domain
-from bridge.sim.core.sdo_server import SdoServer
+from bridge.sim.core.sdo_server import SimulatedSdoServer
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 
 SIXTEEN = bytes(range(1, 17))
@@ -168,7 +168,7 @@ def test_8_2_3_sixteen_bytes_by_segments(dialogue, kept):
     memory = [kept]
     dictionary = Dictionary()
     dictionary.add(0x4001, 0, Domain(16, lambda: memory[0], lambda data: memory.__setitem__(0, data)))
-    server = SdoServer(dictionary)
+    server = SimulatedSdoServer(dictionary)
     channel = client()
     results = []
     if dialogue is DOWNLOAD:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.core.dictionary import DataType, Dictionary, constant
+from bridge.sim.core.dictionary import Dictionary, IntegerType, constant
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from bridge.sim.stoeber.stoeber_objects import alias, identity
 from bridge.sim.stoeber.stoeber_settings import coordinate
@@ -16,7 +16,7 @@ def test_the_product_code_is_the_rated_power() -> None:
 
 def test_an_alias_is_the_object_itself() -> None:
     objects = Dictionary()
-    objects.add_array(0x1400, [constant(DataType.UNSIGNED8, 7), constant(DataType.UNSIGNED8, 8)])
+    objects.add_array(0x1400, [constant(IntegerType.UNSIGNED8, 7), constant(IntegerType.UNSIGNED8, 8)])
     alias(objects, "A221", 0x1400, (1, 2))
     assert [objects.find(coordinate("A221"), element) for element in (0, 1)] == [
         objects.find(0x1400, sub) for sub in (1, 2)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.core.abort import SdoAbort
 from bridge.sim.core.dictionary import Dictionary
+from bridge.sim.core.sdo_abort import SdoAbort
 from bridge.sim.core.store import Store
 from bridge.sim.stoeber.stoeber_device import StoeberDevice
 from bridge.sim.stoeber.stoeber_parameters import add_axis, add_device

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.sim.core.abort import AbortCode, SdoAbort
-from bridge.sim.core.dictionary import Cell, DataType, Dictionary, Number
+from bridge.sim.core.dictionary import Cell, Dictionary, IntegerType, Number
+from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.core.store import Store
 from bridge.sim.stoeber.stoeber_pdo_objects import StoeberPdoObjects, resolved
 from bridge.sim.stoeber.stoeber_settings import factory_communication
@@ -16,7 +16,7 @@ class Rig:
         self.objects = Dictionary()
         self.store = Store(lambda: factory_communication(5, 1, mapped=False))
         cell = Cell()
-        number = Number(DataType.INTEGER16, cell.get, cell.set, in_rpdo=True, in_tpdo=True)
+        number = Number(IntegerType.INTEGER16, cell.get, cell.set, in_rpdo=True, in_tpdo=True)
         self.objects.add(0x2401, 0, number)
         StoeberPdoObjects(5, self.objects, self.store, lambda: True).add()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bridge.canopen.frame import Frame
-from bridge.sim.core.settings import PdoSettings
+from bridge.sim.core.communication_settings import PdoSettings
 from bridge.sim.stoeber.stoeber_5000 import Stoeber5000
 from bridge.sim.stoeber.stoeber_slave import StoeberTpdo
 

@@ -1,0 +1,164 @@
+"""What single entries of a mapping file look like: objects, patterns, codes, numbers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+
+from bridge.config.field_types import Name as Name
+from bridge.config.model import Table as Table
+from bridge.image import DataType
+from bridge.text import Text
+
+WORD_BITS: Final = 16
+_MOST_BITS: Final = 64
+_OBJECT_TEXT: Final = r"[0-9A-Fa-f]{4}:[0-9A-Fa-f]{2}"
+_MAPPED_TEXT: Final = rf"{_OBJECT_TEXT}(/[0-9]{{1,2}})?"
+_OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
+_PART: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})(?:/([0-9]{1,2}))?")
+_PATTERN: Final = re.compile(r"[01X]{1,16}")
+_CODE: Final = re.compile(r"[0-9A-F]{4}|[0-9A-F]{2}xx")
+_NUMBER: Final = re.compile(r"\d+\.\d")
+_DECIMAL: Final = re.compile(r"\d{1,10}")
+_STATE: Final = re.compile(r"-?\d{1,10}")
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class ObjectRef:
+    """An entry of the object dictionary."""
+
+    index: int
+    sub: int
+
+    def __str__(self) -> str:
+        return f"{self.index:04X}:{self.sub:02X}"
+
+
+class MappedObject(Table):
+    """What may stand for one word: one object, or several shorter ones, the first in the lowest bits.
+
+    ``bits`` has the length of each part where it is given; 0 is 16 for one object (times the words that
+    it fills) and 8 for each of several.
+    """
+
+    parts: tuple[ObjectRef, ...]
+    bits: tuple[int, ...]
+
+    @property
+    def is_composite(self) -> bool:
+        return len(self.parts) > 1
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Bits of each part, of an object that fills one word."""
+        default = WORD_BITS // 2 if self.is_composite else WORD_BITS
+        return tuple(bits or default for bits in self.bits)
+
+    def __str__(self) -> str:
+        named = zip(self.parts, self.bits, strict=True)
+        return "+".join(f"{part}/{bits}" if bits else f"{part}" for part, bits in named)
+
+
+def _object(text: object) -> object:
+    if isinstance(text, ObjectRef):
+        return text
+    match = _OBJECT.fullmatch(text) if isinstance(text, str) else None
+    if not match:
+        raise ValueError('must be an object as "3002:01", index and sub-index in hexadecimal')
+    return ObjectRef(int(match[1], 16), int(match[2], 16))
+
+
+def _mapped(text: object) -> object:
+    if isinstance(text, MappedObject):
+        return text
+    matches = [_PART.fullmatch(part) for part in text.split("+")] if isinstance(text, str) else []
+    found = [match for match in matches if match]
+    if not found or len(found) != len(matches):
+        raise ValueError(
+            'must be an object as "3002:01", with its bits as "6060:00/8", or several in one word as '
+            '"2AC8:00+2830:00"'
+        )
+    bits = tuple(int(match[3] or 0) for match in found)
+    mapped = MappedObject(
+        parts=tuple(ObjectRef(int(match[1], 16), int(match[2], 16)) for match in found), bits=bits
+    )
+    if any(match[3] and not 1 <= int(match[3]) <= _MOST_BITS for match in found):
+        raise ValueError(f"must have 1…{_MOST_BITS} bits")
+    if mapped.is_composite and sum(mapped.lengths) > WORD_BITS:
+        raise ValueError(f"has {sum(mapped.lengths)} bits, a word has {WORD_BITS}")
+    return mapped
+
+
+def _pattern(text: str) -> str:
+    text = text.replace(" ", "")
+    if not _PATTERN.fullmatch(text):
+        raise ValueError("must be written with 0, 1 and X (do not care), highest bit first")
+    return text
+
+
+def _code(text: str) -> str:
+    if not _CODE.fullmatch(text):
+        raise ValueError("must be four hexadecimal digits in capitals, or two and xx for the group")
+    return text
+
+
+def _number(text: str) -> str:
+    if not _NUMBER.fullmatch(text):
+        raise ValueError('must be a fault number with one decimal, such as "10.3"')
+    return text
+
+
+def _decimal(text: str) -> str:
+    if not _DECIMAL.fullmatch(text):
+        raise ValueError('must be a number in decimal, such as "41"')
+    return str(int(text))
+
+
+def _state(key: object) -> object:
+    if isinstance(key, str) and _STATE.fullmatch(key):
+        return int(key)
+    if isinstance(key, int):
+        return key
+    raise ValueError("must be a number in decimal, such as 3")
+
+
+def _text_schema(pattern: str) -> WithJsonSchema:
+    return WithJsonSchema({"type": "string", "pattern": f"^{pattern}$"})
+
+
+Ref = Annotated[ObjectRef, BeforeValidator(_object), _text_schema(_OBJECT_TEXT)]
+Mapped = Annotated[
+    MappedObject, BeforeValidator(_mapped), _text_schema(rf"{_MAPPED_TEXT}(\+{_MAPPED_TEXT})*")
+]
+Pattern = Annotated[str, AfterValidator(_pattern)]
+Word = Annotated[int, Field(ge=0, le=0xFFFF)]
+Bit = Annotated[int, Field(ge=0, le=15)]
+Bits = Annotated[list[str], Field(max_length=16, description="names of the bits from bit 0 on")]
+Kind = Annotated[DataType, Field(strict=False)]
+EmcyCode = Annotated[str, AfterValidator(_code)]
+FaultNumber = Annotated[str, AfterValidator(_number)]
+Decimal = Annotated[str, AfterValidator(_decimal)]
+States = dict[Annotated[int, BeforeValidator(_state), WithJsonSchema({"type": "string"})], str]
+"""Number to text; TOML writes the numbers as keys."""
+
+
+def pattern_bits(pattern: str) -> tuple[int, int]:
+    """``"0XX1000"`` as (mask, value): the word matches where ``word & mask == value``."""
+    mask = int("".join("0" if c == "X" else "1" for c in pattern), 2)
+    value = int(pattern.replace("X", "0"), 2)
+    return mask, value
+
+
+class Wording(Table):
+    """One sentence in two languages."""
+
+    en: str
+    de: str
+
+    @property
+    def said(self) -> Text:
+        """The sentence in the reader's language."""
+        return Text.both(self.en, self.de)

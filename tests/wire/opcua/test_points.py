@@ -16,6 +16,7 @@ from bridge.base.errors import Unavailable
 from bridge.command import Write
 from bridge.image import Quality
 from bridge.northbound.opcua.server import OpcUaServer
+from bridge.text import render
 from tests.support.opcua_client import call, node, word, write, write_all, write_value
 from tests.support.opcua_raw import ask
 from tests.support.opcua_site import OPEN, LocalView, make_plant, namespace
@@ -205,7 +206,7 @@ class TestWrites:
         assert view.requests == []
         (told,) = view.rejections
         assert (told.target, told.action, told.code) == ("conveyor/fu1", "write", "not_valid")
-        assert told.message == "BadTypeMismatch"
+        assert render(told.said) == "BadTypeMismatch"
         assert told.values == {"control_word": 0x047F, "frequency": "fast"}
 
     @pytest.mark.parametrize(

@@ -25,7 +25,10 @@ class WordChoice(StrEnum):
     WRITTEN = "the owner's word, or the next of a start"
     IN_FORCE = "the owner's word if it stops, else the stop in force; setpoints at rest"
     REACTION = "the reaction's stop"
-    BURST = "the stop that was asked for, and no less than the reaction's"
+    BURST = (
+        "the stop that was asked for, and no less than the reaction's; "
+        "disable voltage where silence would not stop the drive"
+    )
     SILENCE = "nothing; disable voltage where that would not stop the drive"
     BEFORE = "what was sent before the trip"
 

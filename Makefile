@@ -66,7 +66,7 @@ test: compiled packages clients ## unit, foreign, wire, lab, docs, browser, some
 # What changes seldom break, and what is like what runs already: LANDING=1 make unit runs both, of one part.
 landing: export LANDING := rest
 landing: compiled packages clients ## what make test leaves out, before a change lands: .ci/run has both
-	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab" "unit"
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab pages fuzz-short" "unit"
 	@$(MAKE) --no-print-directory browser
 
 # One after the other, so that nobody disturbs who measures times; and all of them even if one fails.

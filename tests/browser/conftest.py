@@ -11,7 +11,7 @@ from tests.browser.hands import PAIRED, PATIENT_MS, pair, put_in_order, serving
 from tests.support import sites
 from tests.support.desk import Desk, browser
 from tests.support.process import Process, drivebridge, free_port, until
-from tests.wire.test_page import write_site
+from tests.wire.test_page import DRIVE, write_site
 
 
 @pytest.fixture(scope="session")
@@ -31,9 +31,17 @@ def chromium() -> Iterator[Browser]:
         yield started
 
 
+def _begin_in_order(request: pytest.FixtureRequest, desk: Desk, *drives: str) -> None:
+    """Else nothing that failed once could pass when it is tried again: pytest-rerunfailures counts."""
+    if getattr(request.node, "execution_count", 1) > 1:
+        with desk.sits("operator") as page:
+            put_in_order(page, *drives)
+
+
 @pytest.fixture
-def desk(chromium: Browser, bridge: tuple[Process, int]) -> Iterator[Desk]:
+def desk(request: pytest.FixtureRequest, chromium: Browser, bridge: tuple[Process, int]) -> Iterator[Desk]:
     desk = Desk(chromium, bridge[1])
+    _begin_in_order(request, desk, DRIVE)
     yield desk
     assert not desk.complaints
 
@@ -54,10 +62,7 @@ def workshop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
 @pytest.fixture
 def bench(request: pytest.FixtureRequest, chromium: Browser, workshop: int) -> Iterator[Desk]:
     desk = Desk(chromium, workshop)
-    # pytest-rerunfailures counts: the test has failed, and is tried again.
-    if getattr(request.node, "execution_count", 1) > 1:
-        with desk.sits("operator") as page:
-            put_in_order(page, *PAIRED)
+    _begin_in_order(request, desk, *PAIRED)
     yield desk
     assert not desk.complaints
 

@@ -37,6 +37,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
         yield rig
 
 
+@pytest.mark.landing(2)
 @pytest.mark.timeout(LIMIT_S + 180)
 @pytest.mark.parametrize("cases", CASES, ids="+".join)
 def test_what_is_thrown_at_it_is_borne(
@@ -49,6 +50,7 @@ def test_what_is_thrown_at_it_is_borne(
     assert report.thrown == cases
 
 
+@pytest.mark.landing
 @pytest.mark.timeout(LIMIT_S)
 def test_fronts_that_stand_still_for_two_seconds_lose_no_good_client(rig: Rig) -> None:
     """As on a busy machine: a client whose library gives up after a second would be lost, and no log would

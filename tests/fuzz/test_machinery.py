@@ -22,6 +22,9 @@ from tests.fuzz.rig import Rig
 from tests.fuzz.run import fuzz
 from tests.support.process import running, until
 
+# The fuzzer itself.
+pytestmark = pytest.mark.landing
+
 BRIDGE = """
 import pathlib, subprocess, sys, time
 folder = pathlib.Path(sys.argv[1])

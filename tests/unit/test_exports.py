@@ -194,6 +194,7 @@ class Asker:
 NEVER: Final = (Code.NOT_ALLOWED, Code.NOT_CONFIGURED, Code.READ_ONLY)
 
 
+@pytest.mark.landing(3)
 @kinds
 @pytest.mark.parametrize("source", [Source.OPCUA, Source.ZENOH])
 def test_a_point_is_exported_as_writable_where_it_can_be_written(

@@ -67,6 +67,7 @@ def reader(tmp_path: Path) -> Iterator[Reader]:
     reader.end()
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("page", with_blocks("console", "python"), ids=repr)
 def test_what_a_page_does_can_be_done(page: Page, demo: Process, calm: None, reader: Reader) -> None:
     reader.work_through(page, demo)

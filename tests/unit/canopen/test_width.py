@@ -78,6 +78,7 @@ def entry(kind: str) -> ParameterEntry:
     return ParameterEntry("2001", ObjectRef(INDEX, 0), definition)
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("kind", "value", "answer"), CASES)
 def test_every_reader_takes_the_number_of_the_type(kind: ValueType, value: int, answer: bytes) -> None:
     size, data = KINDS[kind].size, KINDS[kind].encode(value)
@@ -93,6 +94,7 @@ def test_every_reader_takes_the_number_of_the_type(kind: ValueType, value: int, 
     assert width.holds(answer, data, signed=KINDS[kind].signed)
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("kind", "value", "answer"), CASES)
 def test_no_reader_takes_another_number_for_it(kind: str, value: int, answer: bytes) -> None:
     one = KINDS[kind]
@@ -102,6 +104,7 @@ def test_no_reader_takes_another_number_for_it(kind: str, value: int, answer: by
     assert not same(answer, other)
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("kind", "value", "answer"), CASES)
 def test_a_number_is_written_in_the_width_of_the_answer_and_in_that_of_its_type(
     kind: str, value: int, answer: bytes

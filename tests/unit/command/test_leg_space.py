@@ -63,6 +63,7 @@ def test_every_cell_that_can_where_a_change_lands() -> None:
     assert not TABLE.keys() - NEVER.keys() - reached, "name a profile that reaches them: _EVERY_CELL"
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("row", [row for row in ROWS if row not in _NORD])
 def test_one_reaction_in_the_words_of_every_family(row: str) -> None:
     assert not explored(row, ("quick_stop",)).cells & NEVER.keys()

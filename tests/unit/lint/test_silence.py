@@ -62,6 +62,7 @@ def has_hidden_reaction(mapping: str, slot: str) -> bool:
     return is_of_drive and not family.slot_named(slot).parameters_by_sdo
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("silent", SILENT)
 @pytest.mark.parametrize(("mapping", "slot"), SLOTS)
 def test_it_is_taken_where_the_drive_watches_its_own_process_data(
@@ -80,6 +81,7 @@ def test_it_is_taken_where_the_drive_watches_its_own_process_data(
 WATCHING = [(name, slot) for name, slot in SLOTS if WATCHES_ITS_PROCESS_DATA[name.partition("/")[0]]]
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("silent", SILENT)
 @pytest.mark.parametrize(("mapping", "slot"), WATCHING)
 def test_what_is_enforced_counts_only_where_an_sdo_channel_reaches_it(
@@ -95,6 +97,7 @@ def test_what_is_enforced_counts_only_where_an_sdo_channel_reaches_it(
     assert f"sdo_channels = {channels_to(mapping, slot)}" in fault
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("is_open", [True, False])
 @pytest.mark.parametrize(("mapping", "slot"), WATCHING)
 def test_a_dead_bridge_is_not_known_of_what_cannot_be_reached(

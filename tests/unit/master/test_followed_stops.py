@@ -42,6 +42,7 @@ def a_bench(folder: Path, mapping: str) -> Bench:
     return bench
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("mapping", FAMILIES)
 def test_every_family_follows_every_stop(tmp_path: Path, mapping: str) -> None:
     bench = a_bench(tmp_path, mapping)

@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import ClassVar
 
+import pytest
 from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule, run_state_machine_as_test
@@ -190,6 +191,7 @@ class MasterMachine(RuleBasedStateMachine):
         assert len(quick.events) <= MOST_EVENTS_A_SECOND * max(1.0, elapsed_s) + 20 * MasterMachine.steps
 
 
+@pytest.mark.landing
 def test_random_frames_losses_and_times() -> None:
     MasterMachine.steps = 0
     run_state_machine_as_test(

@@ -72,6 +72,7 @@ def writes(quick: Quick, *indices: int) -> list[tuple[int, int, bytes]]:
 # configuration
 
 
+@pytest.mark.landing
 def test_a_value_that_is_not_kept_is_written_once_in_an_hour(tmp_path: Path) -> None:
     quick = quick_with(tmp_path, Rounding(1, 0x2097, lambda value: min(value, 495)), CONFIGURE)
     quick.run(3600.0)
@@ -195,6 +196,7 @@ def test_a_store_may_take_ten_seconds(tmp_path: Path) -> None:
     assert writes(quick, 0x1010) == [SAVE]
 
 
+@pytest.mark.landing
 def test_a_store_without_an_answer_does_not_wear_out_the_node(tmp_path: Path) -> None:
     node = Storing(1, save_s=11.0)
     quick = quick_with(tmp_path, node, STORE)

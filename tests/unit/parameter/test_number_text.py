@@ -12,6 +12,7 @@ from tests.support.number_table import CASES
 LANGUAGES: tuple[Language, ...] = ("en", "de")
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: ascii(case["text"]))
 def test_a_text_is_the_number_that_the_table_says(case: dict[str, Any], language: Language) -> None:

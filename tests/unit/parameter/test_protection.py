@@ -112,6 +112,7 @@ MANUALS: Final = [
 ]
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize(("mapping", "name", "target"), MANUALS)
 def test_what_a_manual_calls_another_name_of_an_object_is_known_as_one(
     mapping: str, name: str, target: str

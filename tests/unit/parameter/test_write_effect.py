@@ -68,11 +68,13 @@ PROFILE_OBJECTS = [
 ]
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("profile", "index", "effect"), PROFILE_OBJECTS)
 def test_a_profile_says_what_its_objects_do(profile: int, index: int, effect: Effect | None) -> None:
     assert effect_of(index, profile) is effect
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("profile", "index", "effect"), PROFILE_OBJECTS)
 def test_of_a_node_whose_profile_nobody_knows_an_object_does_the_worst_that_it_does_in_any(
     profile: int, index: int, effect: Effect | None

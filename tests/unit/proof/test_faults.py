@@ -23,6 +23,7 @@ _PROGRAMS = ("__main__", "owner", "__init__")
 """They do something when they are imported."""
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 @pytest.mark.parametrize("cycles", [1, 2, 25, 50])
 def test_every_fault_is_injected_as_often_as_there_are_cycles(fault: Fault, cycles: int) -> None:

@@ -53,6 +53,7 @@ def test_a_text_that_has_no_place_or_several_is_an_error() -> None:
         Edit("a.py", "te", "").apply("te te")
 
 
+@pytest.mark.landing
 def test_a_tree_holds_one_mutant_at_a_time(tmp_path: Path) -> None:
     tree = Tree(tmp_path)
     first, second = MUTANTS[0], next(one for one in MUTANTS if one.edits[0].file != MUTANTS[0].edits[0].file)

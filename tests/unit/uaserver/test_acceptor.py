@@ -6,6 +6,7 @@ import asyncio
 import struct
 from contextlib import suppress
 
+import pytest
 from asyncua import ua
 
 from tests.support.opcua_application import Served
@@ -34,6 +35,7 @@ def error_of(told: bytes) -> int:
     return code
 
 
+@pytest.mark.landing
 async def test_noise_ends_a_connection_and_is_counted_once() -> None:
     application = Served()
     async with serving(application) as url:

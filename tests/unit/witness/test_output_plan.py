@@ -92,6 +92,7 @@ ODD_TITLES = (
 )
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("eds", ODD_TITLES)
 @pytest.mark.parametrize("place", range(4))
 @pytest.mark.parametrize("value", ['"hold"', "3", "0"])

@@ -72,6 +72,7 @@ def test_the_identifiers_of_the_site_file_count(tmp_path: Path) -> None:
     assert (drive.rpdo, drive.tpdo) == (0x345, 0x2C5)
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize(("mapping", "slot"), FAMILIES)
 @pytest.mark.parametrize("number", [1, 2, 3, 4, 5])
 def test_only_the_pdo_with_the_word_is_looked_for(

@@ -225,6 +225,7 @@ def test_a_value_that_is_not_kept_is_written_once(make) -> None:
 # the drop test
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("mapping", "node", "parameters", "bound_ms"), STOPPING)
 def test_a_drop_test_proves_the_drives_own_time(
     make, mapping: str, node: str, parameters: dict[str, float], bound_ms: int

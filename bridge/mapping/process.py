@@ -194,7 +194,7 @@ class Meaning(Table):
 
     @property
     def said_otherwise(self) -> Text:
-        """What is said of values that name another code."""
+        """Reason why the word has no value while a code names another one."""
         return _said(self.otherwise) or Text.of("meaning.not_in_telegram")
 
 
@@ -254,7 +254,7 @@ class ProcessValue(Table):
 
     @property
     def said_otherwise(self) -> Text:
-        """What is said where a parameter in ``when`` has another value."""
+        """Reason why the value means nothing while a parameter in ``when`` has another value."""
         return _said(self.otherwise) or Text.of("meaning.something_else")
 
     @property

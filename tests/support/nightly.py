@@ -6,6 +6,8 @@
 | before a change lands | ``make landing``, ``LANDING=rest`` | the rest of what is marked ``landing`` |
 | both | ``LANDING=1`` | what a change has to pass (``.ci/run``) |
 | by night | ``make nightly``, ``NIGHTLY=1`` | everything, with all examples: an hour |
+
+A test that is named on the command line (``test_it.py::test_this``) is taken in every run.
 """
 
 from __future__ import annotations
@@ -67,7 +69,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if IS_NIGHTLY:
+    if IS_NIGHTLY or any("::" in name for name in config.args):  # who names a test wants it
         return
     by_day = _by_day(items)
     taken = {item for item in items if not item.get_closest_marker("nightly")}

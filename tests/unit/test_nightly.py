@@ -48,8 +48,8 @@ def test_examples():
 """
 
 
-def ran(folder: Path, expected: int, **extent: str) -> set[str]:
-    """The tests that passed of a run with these variables; none may fail."""
+def ran(folder: Path, expected: int, only: str = "", **extent: str) -> set[str]:
+    """The tests that passed of a run with these variables, or of one that names a test; none may fail."""
     (folder / "test_it.py").write_text(TESTS.replace("EXAMPLES", str(expected)), encoding="utf-8")
     options = ("-v", "-p", "tests.support.nightly", "-p", "no:cacheprovider", "--strict-markers")
     command = [
@@ -60,7 +60,7 @@ def ran(folder: Path, expected: int, **extent: str) -> set[str]:
         "/dev/null",
         f"--rootdir={folder}",
         *options,
-        str(folder),
+        f"{folder}/test_it.py::{only}" if only else str(folder),
     ]
     done = subprocess.run(
         command,
@@ -93,6 +93,10 @@ def test_what_has_to_pass_before_a_change_lands_is_what_day_takes_and_leaves_out
     assert not day & rest
     assert {"test_rather_long", "test_seeds[1]", "test_each_second[1]", "test_each_second[3]"} < rest
     assert not rest & {"test_long", "test_seeds[2]"}
+
+
+def test_who_names_a_test_gets_it(tmp_path: Path) -> None:
+    assert ran(tmp_path, 7, "test_rather_long") == {"test_rather_long"}
 
 
 def test_no_test_of_this_run_is_one_that_should_not_be_in_it(request: pytest.FixtureRequest) -> None:

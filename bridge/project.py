@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from bridge.base.errors import FileFaults
-from bridge.config import NodeTable, Site, read_site
+from bridge.config import REACTIONS, NodeTable, Site, read_site
 from bridge.config.download import Download
 from bridge.derive import describe
 from bridge.drive.own_judgement import judge, why_silence_does_not_stop
@@ -60,7 +60,7 @@ def _vain_silences(project: Project) -> Iterator[tuple[Key, Text, str]]:
             settings = _settings(node, project.downloads.get(node.name, ()))
             for d, drive in enumerate(node.drive):
                 table = ("bus", b, "node", n, "drive", d)
-                if drive.on_expiry == "hold":
+                if drive.reaction.holds:
                     if drive.then_silence_ms:
                         yield (*table, "then_silence_ms"), _NEVER_SILENT, "0 (never), or another on_expiry"
                     continue
@@ -72,13 +72,16 @@ def _vain_silences(project: Project) -> Iterator[tuple[Key, Text, str]]:
                     continue
                 why = Text.of("check.silence_does_not_stop", why=why)
                 watch = _own_watch(family, node, slot)
-                if drive.on_expiry == "silence":
-                    hint = f'"disable_voltage", "quick_stop" or "stop"; or {watch}'
+                if drive.reaction.is_silent:
+                    hint = f"{_OTHERS}; or {watch}"
                     yield (*table, "on_expiry"), why, hint
                 if drive.then_silence_ms:
                     yield (*table, "then_silence_ms"), why, f"0 (never); or {watch}"
 
 
+_STOPS: Final = [f'"{name}"' for name, rule in REACTIONS.items() if rule.sends_stop]
+_OTHERS: Final = f"{', '.join(_STOPS[:-1])} or {_STOPS[-1]}"
+"""Reactions that stop any drive."""
 _NEVER_SILENT: Final = Text.of("check.never_silent")
 
 

@@ -12,11 +12,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
+from bridge.command.leg.due import expiry
 from bridge.command.leg.state import ANY_TRIP, MEANING, NORMAL, STARTING, Motion, Stage
 from bridge.command.leg.table import TABLE, Deed, Stimulus
-from bridge.command.leg.word_table import REACTION_STOPS, WORD_TABLE
+from bridge.command.leg.word_table import WORD_TABLE
 from bridge.command.stop_check import table as judge
 from bridge.command.stop_check.state import PLACES, LastStop, StopPlace
+from bridge.config import REACTIONS
 from tools.marks import replaced
 
 PAGE: Final = Path(__file__).resolve().parents[1] / "docs" / "reference" / "decision-tables.md"
@@ -39,7 +41,7 @@ def tables() -> str:
     parts = [_table([["stage", "what it is"], *([f"**{stage}**", MEANING[stage]] for stage in Stage)])]
     for heading, group in PARTS.items():
         stages = [stage for stage in Stage if stage in group]
-        rows = [[stimulus.value, *(_cell(stage, stimulus) for stage in stages)] for stimulus in Stimulus]
+        rows = [[_event(stimulus), *(_cell(stage, stimulus) for stage in stages)] for stimulus in Stimulus]
         happens = [row for row in rows if set(row[1:]) != {Deed.NOTHING.value}]
         parts += [f"### {heading}", _table([["event", *stages], *happens])]
     return "\n\n".join(parts)
@@ -52,7 +54,7 @@ def word_tables() -> str:
     shown = list(columns.values())
     rows = _alike((f"**{stage}**", [words[at] for words in shown]) for at, stage in enumerate(Stage))
     table = [["stage", *columns], *([stages, *words] for stages, words in rows.items())]
-    stops = [[f"`{reaction}`", *kinds] for reaction, kinds in REACTION_STOPS.items() if reaction != "hold"]
+    stops = [[f"`{name}`", rule.first, rule.stop] for name, rule in REACTIONS.items() if not rule.holds]
     return "\n\n".join(
         (
             _table(table),
@@ -105,6 +107,12 @@ def _table(rows: Iterable[list[str]]) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in (first, ["---"] * len(first), *others)).replace(
         " --- ", "---"
     )
+
+
+def _event(stimulus: Stimulus) -> str:
+    """Name of the event, with the reactions by which the end of the time-out is this one."""
+    reactions = [name for name, rule in REACTIONS.items() if expiry(rule) is stimulus]
+    return f"{stimulus.value} (on_expiry = {', '.join(reactions)})" if reactions else stimulus.value
 
 
 def _cell(stage: Stage, stimulus: Stimulus) -> str:

@@ -225,9 +225,8 @@ class DriveChannel(Channel):
         super()._on_tripped(tripped, now)
 
     def _reaction(self) -> Text:
-        reaction = self.settings.on_expiry
-        if reaction == "silence" and not self.leg.silence_stops:
-            reaction = "disable_voltage"
+        is_replaced = self.settings.reaction.is_silent and not self.leg.silence_stops
+        reaction = "disable_voltage" if is_replaced else self.settings.on_expiry
         fault = self._status.fault_said(self.family.faults.controller_silent, self.state)
         return Text.of("watchdog.reaction", reaction=Text.word("reaction", reaction), fault=fault)
 

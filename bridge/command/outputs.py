@@ -25,7 +25,7 @@ from bridge.command.stop_check.ignored_texts import ignored_by_outputs
 from bridge.command.stop_check.output_check import OutputReadback, OutputStopCheck, Question, StoppedOutput
 from bridge.command.stop_check.state import StopVerdict
 from bridge.command.worst_case import StopTime, Wire, output_stop_time
-from bridge.config import OutputsTable
+from bridge.config import REACTIONS, OutputsTable
 from bridge.drive import ControlWords, OwnJudgement
 from bridge.image import Image, Quality, Value
 from bridge.mapping.entry_types import ObjectRef
@@ -88,7 +88,7 @@ class OutputChannel(Channel):
             decode=words.decode,
             setpoints=words.count,
             control=settings.control,
-            reaction="disable_voltage",
+            reaction=REACTIONS["disable_voltage"],
             timeout_ms=settings.fieldbus_timeout_ms or 0,
             then_silence_s=0.0,
             ignores_errors=False,

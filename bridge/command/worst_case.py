@@ -82,14 +82,14 @@ def stop_time(
     not. ``transmission_type`` is that of the RPDO with the control word. With silence the reaction is the
     drive's own, ``own_ms`` after its last RPDO. If it has none (0), it gets disable voltage instead; None:
     the drive has not been asked yet."""
-    if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.on_expiry == "hold":
+    if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.reaction.holds:
         return StopTime()
-    if table.on_expiry == "silence" and own_ms is None:
+    if table.reaction.is_silent and own_ms is None:
         return StopTime(unknown=Text.of("stop_time.own_not_read"))
     terms = _to_the_wire(table.control, bus, timeout_ms, transmission_type, wire)
     if isinstance(terms, StopTime):
         return terms
-    if table.on_expiry == "silence" and own_ms:
+    if table.reaction.is_silent and own_ms:
         terms.append(Term("own_ms", own_ms, "the drive's own time-out, which stops it without RPDOs"))
     return StopTime(tuple(term for term in terms if term.ms))
 

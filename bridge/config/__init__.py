@@ -5,7 +5,6 @@ Reference for users: ``docs/reference/site-file.md``.
 
 from bridge.config.field_types import IGNORE_ALL_S as IGNORE_ALL_S
 from bridge.config.field_types import LIFE_SIGN_MS as LIFE_SIGN_MS
-from bridge.config.field_types import Reaction as Reaction
 from bridge.config.field_types import WordOrder as WordOrder
 from bridge.config.model import MODULES as MODULES
 from bridge.config.model import BusTable as BusTable
@@ -22,5 +21,9 @@ from bridge.config.model import Site as Site
 from bridge.config.model import UserTable as UserTable
 from bridge.config.model import ZenohTable as ZenohTable
 from bridge.config.model import mapping_key as mapping_key
+from bridge.config.reaction import REACTIONS as REACTIONS
+from bridge.config.reaction import Reaction as Reaction
+from bridge.config.reaction import ReactionRule as ReactionRule
+from bridge.config.reaction import StopKind as StopKind
 from bridge.config.site_file import load_site as load_site
 from bridge.config.site_file import read_site as read_site

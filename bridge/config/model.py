@@ -41,7 +41,6 @@ from bridge.config.field_types import (
     ParameterRights,
     PlainValue,
     Prefix,
-    Reaction,
     Reason,
     RegularExpression,
     SyncCounter,
@@ -50,6 +49,7 @@ from bridge.config.field_types import (
     WordOrder,
     listed,
 )
+from bridge.config.reaction import REACTIONS, Reaction, ReactionRule
 
 _MAPPED: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})/([0-9]{1,2})")
 
@@ -114,13 +114,13 @@ class AcceptsTable(Table):
 class CommandedTable(Table):
     """Owner of something on a bus, what becomes of it without one, and the reaction to an ignored stop."""
 
-    control: Control = Field("none", description="modbus, opcua, zenoh, lease or none")
+    control: Control = "none"
     fieldbus_timeout_ms: int | None = Field(
         None, ge=0, le=LONGEST_TIMEOUT_MS, description="0 (off) or 1…32767 ms, like P151"
     )
     stop_by_anyone: bool = True
     accepts: AcceptsTable = Field(default_factory=lambda: AcceptsTable.model_validate({}))
-    on_ignored_stop: OnIgnoredStop = Field("stop_node", description="stop_node, reset_node or report")
+    on_ignored_stop: OnIgnoredStop = "stop_node"
     ignored_stop_ms: int | None = Field(None, ge=50, le=600_000, description="50…600000 ms")
 
     @property
@@ -141,9 +141,7 @@ class DriveTable(CommandedTable):
         None, description="[lowest, highest] that the owner may set, each 0…32767 ms"
     )
     telegram_downtime_s: Downtime = 0.5
-    on_expiry: Reaction = Field(
-        "disable_voltage", description="disable_voltage, quick_stop, stop, silence or hold"
-    )
+    on_expiry: Reaction = "disable_voltage"
     then_silence_ms: int = Field(0, ge=0, le=600_000, description="0 (never) or a time in ms")
     parameters: dict[str, Full] = Field(
         default_factory=dict[str, float], description="scaling, where it is not read from the drive"
@@ -154,9 +152,13 @@ class DriveTable(CommandedTable):
     tpdo: PdoTables = Field(default_factory=list[PdoTable])
 
     @property
+    def reaction(self) -> ReactionRule:
+        return REACTIONS[self.on_expiry]
+
+    @property
     def falls_silent(self) -> bool:
         """Whether a trip ends the RPDOs, at once or later."""
-        return self.on_expiry == "silence" or (self.then_silence_ms > 0 and self.on_expiry != "hold")
+        return self.reaction.is_silent or (self.then_silence_ms > 0 and not self.reaction.holds)
 
     @property
     def timeout_range_ms(self) -> tuple[int, int]:
@@ -240,15 +242,13 @@ class NodeTable(Table):
         default_factory=list[str],
         description="what is plugged into a coupler, in its order: order codes, names or numbers of its EDS",
     )
-    supervision: Literal["heartbeat", "guarding", "none"] = Field(
-        "heartbeat", description="heartbeat, guarding or none"
-    )
+    supervision: Literal["heartbeat", "guarding", "none"] = "heartbeat"
     supervision_ms: int = Field(200, ge=20, le=65535, description="20…65535 ms")
     life_time_factor: int = Field(3, ge=1, le=255)
     mandatory: bool = False
     start_order: int = Field(0, ge=0, le=126, description="0…126, lower ones start first")
-    on_loss: OnLoss = Field("restart", description="restart, stop_node, stop_all or nothing")
-    on_failed_start: OnFailedStart = Field("reset_communication", description="reset_communication or report")
+    on_loss: OnLoss = "restart"
+    on_failed_start: OnFailedStart = "reset_communication"
     enabled: bool = True
     hold_ms: int = Field(2000, ge=0, le=3_600_000)
     sdo_timeout_ms: int = Field(500, ge=10, le=60_000)
@@ -303,11 +303,9 @@ class BusTable(Table):
     time_period_s: int = Field(0, ge=0, le=86_400, description="0 (off) or 1…86400 s")
     rpdo_period_ms: int | None = Field(None, ge=1, le=1000, description="1…1000 ms")
     deadman_ms: int = Field(100, ge=10, le=10_000, description="10…10000 ms")
-    mandatory_missing: MandatoryMissing = Field("go_on", description="go_on, hold_all or stop_all")
-    reset_at_start: Literal["none", "communication", "node"] = Field(
-        "none", description="none, communication or node"
-    )
-    on_intruder: OnIntruder = Field("stop_node", description="stop_node, stop_all or report")
+    mandatory_missing: MandatoryMissing = "go_on"
+    reset_at_start: Literal["none", "communication", "node"] = "none"
+    on_intruder: OnIntruder = "stop_node"
     gateway: Gateway | None = Field(None, description='"socket", or address:port on loopback')
     cable: list[CableTable] = Field(
         default_factory=list[CableTable], description="a [[bus.cable]] table for each segment"
@@ -327,7 +325,7 @@ class ModbusTable(Table):
         default_factory=lambda: ["127.0.0.0/8", "::1/128"], description="networks that may connect"
     )
     max_connections: int = Field(32, ge=1, le=1024)
-    parameters: ParameterRights = Field("write", description="write or read")
+    parameters: ParameterRights = "write"
 
 
 class UserTable(Table):
@@ -363,14 +361,14 @@ class PageTable(Table):
 
 
 class ZenohTable(Table):
-    mode: Literal["peer", "client"] = Field("peer", description="peer or client")
+    mode: Literal["peer", "client"] = "peer"
     listen: list[Locator] = Field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
     connect: list[Locator] = Field(default_factory=list[str])
     prefix: Prefix = "drives"
     encoding: Literal["json", "bare"] = "json"
     accept_put: bool = Field(False, description="true takes a plain put on a command key as a command")
     period_ms: int = Field(10, ge=1, le=10_000, description="1…10000 ms")
-    parameters: ParameterRights = Field("write", description="write or read")
+    parameters: ParameterRights = "write"
     user: str | None = Field(None, description="the bridge's own user, one of password_file")
     password_file: str | None = Field(None, description="a file with user:password for each who may connect")
     controllers: list[ControllerName] | None = None

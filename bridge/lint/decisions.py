@@ -39,5 +39,5 @@ def _check_drive(drive: DriveTable, name: str, key: Key, report: LintReport) -> 
         report.warning((*key, "fieldbus_timeout_ms"), Text.of("check.silence_stops_nothing", drive=name))
     if drive.telegram_downtime_s == IGNORE_ALL_S:
         report.warning((*key, "telegram_downtime_s"), Text.of("check.errors_stop_nothing", drive=name))
-    if drive.on_expiry == "hold" and drive.control != "none":
+    if drive.reaction.holds and drive.control != "none":
         report.warning((*key, "on_expiry"), Text.of("check.silence_is_reported", drive=name))

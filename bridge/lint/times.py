@@ -136,7 +136,7 @@ def _check_held(bus: CheckedBus, drive: CheckedDrive, report: LintReport) -> Non
     kind, sync_ms, timeout_ms = rpdo.transmission_type, bus.table.sync_period_ms, table.fieldbus_timeout_ms
     if not timeout_ms or table.control == "none" or table.telegram_downtime_s == IGNORE_ALL_S:
         return
-    if table.on_expiry in ("hold", "silence"):
+    if not table.reaction.sends_stop:
         return
     if kind > LAST_SYNCHRONOUS or not sync_ms or held_s(bus.table, kind):
         return

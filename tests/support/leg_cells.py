@@ -15,7 +15,7 @@ _S, _E = Stage, Stimulus
 _IDLE: Final = frozenset(Stage) - STARTING
 _REACTING: Final = frozenset((_S.RAMPING, _S.TRIPPED, _S.SILENCED, _S.BURST))
 _LED: Final = frozenset((_S.SETTLING, _S.BRAKING, _S.LEAVING, _S.LEADING))
-_EXPIRED: Final = (_E.EXPIRED_DISABLE, _E.EXPIRED_QUICK_STOP, _E.EXPIRED_SILENCE, _E.EXPIRED_HOLD)
+_EXPIRED: Final = (_E.EXPIRED_STOP, _E.EXPIRED_RAMP, _E.EXPIRED_SILENCE, _E.EXPIRED_HOLD)
 _STARTS: Final = (_E.START_REFUSED, _E.START_ENABLED, _E.START_STOPPING, _E.START_UNHEARD, _E.START_BRAKING)
 
 _REASONS: Final[tuple[tuple[str, Iterable[Stimulus], Iterable[Stage]], ...]] = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from time import process_time
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from bridge.command.leg.event import NodeBack, StatusReport
 from bridge.command.leg.settings import leg_settings
@@ -13,7 +13,7 @@ from bridge.command.leg.state import Stage, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.leg.table import Stimulus
 from bridge.command.messages.telegram import TelegramDecoder
-from bridge.config import DriveTable
+from bridge.config import DriveTable, Reaction
 from bridge.drive import DriveState, Meanings
 from bridge.mapping import load_family
 from tests.support.leg_recorded import Cells
@@ -32,7 +32,7 @@ CYCLIC: Final = replace(
 )
 """Profile of a drive whose setpoints follow its own position."""
 FAMILIES: Final = (*ALL, CYCLIC)
-REACTIONS: Final = ("disable_voltage", "quick_stop", "stop", "silence", "hold")
+REACTIONS: Final = get_args(Reaction)
 
 _WAY: Final = {"node lost", "node operational", "bus back", "bridge gap"}
 _BASE: Final = _WAY | {

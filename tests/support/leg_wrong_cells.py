@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from bridge.command.leg.state import Stage
 from bridge.command.leg.table import TABLE, Cell, Deed, Stimulus
+from bridge.config import Reaction
 from tests.support.leg_cells import NEVER
 from tests.support.leg_words import POSITION
 
@@ -31,30 +32,29 @@ _EVERY_STATE: Final = {
 _SETS: Final = {"owner writes a setpoint", "owner's control data are not valid", "owner's stop comes late"}
 _IGNORED: Final = {"telegram_downtime_s": -0.1}
 _SILENT: Final = {"then_silence_ms": 300}
-REACTIONS: Final = ("disable_voltage", "quick_stop", "stop", "silence", "hold")
 
 PROFILES: Final[dict[str, dict[str, Any]]] = {
     **{
         f"words, {reaction}": {"names": _WORDS | _SETS | _OTHERS, "on_expiry": reaction}
-        for reaction in REACTIONS
+        for reaction in get_args(Reaction)
     },
     **{
         f"bus, {reaction}": {
             "names": _WORDS | _BUS | {"bridge gap", "drive says: fault"},
             "on_expiry": reaction,
         }
-        for reaction in REACTIONS
+        for reaction in get_args(Reaction)
     },
     **{
         f"starts, {reaction}": {"names": _STARTS | _SAYS | {"node lost"}, "on_expiry": reaction}
-        for reaction in REACTIONS
+        for reaction in get_args(Reaction)
     },
     **{
         f"starts unheard, {reaction}": {
             "names": _STARTS | _UNHEARD | {"drive repeats", "drive says: braking"},
             "on_expiry": reaction,
         }
-        for reaction in REACTIONS
+        for reaction in get_args(Reaction)
     },
     "starts, telegrams": {"names": _STARTS | _SETS | {"drive says: braking", "drive repeats"}},
     "starts, whatever it says": {

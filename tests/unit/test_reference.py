@@ -313,7 +313,7 @@ def test_the_tables_of_the_controller_leg_are_those_of_the_code() -> None:
     stages = shown.column("The controller leg", "stage")
     assert [stage.strip("*") for stage in stages] == list(Stage)
     cells = {
-        (stage, row["event"]): cell
+        (stage, row["event"].partition(" (on_expiry = ")[0]): cell
         for heading in state_table.PARTS
         for row in shown.table(heading)
         for stage, cell in row.items()
@@ -324,3 +324,6 @@ def test_the_tables_of_the_controller_leg_are_those_of_the_code() -> None:
         cell = cells.get((stage.value, stimulus.value), "–")
         assert (f"**{after}**" in cell) is (after is not stage), "where it leads to can be read"
         assert deed in cell
+    events = shown.column("Neither tripped nor in a start", "event")
+    named = [names for event in events for names in re.findall(r" \(on_expiry = ([^)]+)\)$", event)]
+    assert sorted(", ".join(named).split(", ")) == sorted(get_args(Reaction)), "each reaction has its event"

@@ -25,8 +25,8 @@ _BURST_S: Final = 0.1
 """Time for which a stop breaks the silence: as long, so that the drive has it for certain; then the drive's
 own supervision goes on."""
 _RAMP_LIMIT_S: Final = 10.0
-"""After that a quick stop by the watchdog is followed by disable voltage in any case: Lenze's holds the motor
-for ever, and so does CiA 402's with 605Ah = 5 … 8."""
+"""Longest duration of a reaction's ramp, whatever the drive does: Lenze's quick stop holds the motor for
+ever, and so does CiA 402's with 605Ah = 5 … 8."""
 _CAN_BE_ENABLED: Final = (DriveState.READY, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED)
 _CANCELLED: Final = Outcome(Code.CANCELLED)
 
@@ -137,8 +137,8 @@ def _react(draft: Draft, about: About) -> None:
     reaction, then_silence_s = draft.settings.reaction, draft.settings.then_silence_s
     draft.drop_setpoints()
     draft.trip = Trip(
-        draft.now + _RAMP_LIMIT_S if reaction == "quick_stop" else None,
-        draft.now + then_silence_s if then_silence_s and reaction != "silence" else None,
+        draft.now + _RAMP_LIMIT_S if reaction.ramp else None,
+        draft.now + then_silence_s if then_silence_s and not reaction.is_silent else None,
     )
     _hold(draft, about)
 

@@ -3,8 +3,6 @@ silence, of a burst."""
 
 from __future__ import annotations
 
-from typing import Final
-
 from bridge.command.leg import owners
 from bridge.command.leg.deeds import About, happen
 from bridge.command.leg.draft import Draft
@@ -12,16 +10,17 @@ from bridge.command.leg.effect import Ignored
 from bridge.command.leg.table import Stimulus
 from bridge.command.messages.event import EventKind
 from bridge.command.messages.request import Code, Outcome
-from bridge.config import Reaction
+from bridge.config import ReactionRule
 from bridge.text import Text
 
-_EXPIRED: Final[dict[Reaction, Stimulus]] = {
-    "disable_voltage": Stimulus.EXPIRED_DISABLE,
-    "stop": Stimulus.EXPIRED_DISABLE,
-    "quick_stop": Stimulus.EXPIRED_QUICK_STOP,
-    "silence": Stimulus.EXPIRED_SILENCE,
-    "hold": Stimulus.EXPIRED_HOLD,
-}
+
+def expiry(reaction: ReactionRule) -> Stimulus:
+    """Event at the end of the time-out where this is the reaction."""
+    if reaction.holds:
+        return Stimulus.EXPIRED_HOLD
+    if reaction.is_silent:
+        return Stimulus.EXPIRED_SILENCE
+    return Stimulus.EXPIRED_RAMP if reaction.ramp else Stimulus.EXPIRED_STOP
 
 
 def judge(draft: Draft) -> None:
@@ -33,7 +32,7 @@ def judge(draft: Draft) -> None:
             draft.effects.append(Ignored())
         elif not draft.is_tripped:
             ends = Outcome(Code.CANCELLED, Text.of("start.watchdog_tripped"))
-            happen(draft, _EXPIRED[draft.settings.reaction], About(ends, due=timer.deadline))
+            happen(draft, expiry(draft.settings.reaction), About(ends, due=timer.deadline))
     lease_until = draft.owner.lease_until
     if lease_until is not None and draft.now >= lease_until:
         draft.tell(EventKind.OWNER, 300, Text.of("owner.lease_ran_out", who=str(draft.owner.identity)))

@@ -29,7 +29,7 @@ def until(settings: LegSettings, state: LegState) -> float | None:
     it, or where nothing enables it."""
     if not settings.words.enables(state.sent.words[0]):
         return None
-    trip = None if settings.reaction == "hold" else trips_at(settings, state)
+    trip = None if settings.reaction.holds else trips_at(settings, state)
     lease = state.owner.lease_until
     return lease if trip is None or (lease is not None and lease < trip) else trip
 

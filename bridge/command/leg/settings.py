@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bridge.command.messages.life_sign import LifeSign
 from bridge.command.messages.telegram import Telegram
-from bridge.config import IGNORE_ALL_S, DriveTable, Reaction
+from bridge.config import IGNORE_ALL_S, DriveTable, ReactionRule
 from bridge.drive import ControlWords, ValueCodec
 from bridge.image import Value
 from bridge.mapping.model import Family, Slot
@@ -34,7 +34,7 @@ class LegSettings:
     decode: Decode
     setpoints: int
     control: str
-    reaction: Reaction
+    reaction: ReactionRule
     timeout_ms: int
     then_silence_s: float
     ignores_errors: bool
@@ -67,7 +67,7 @@ def leg_settings(
         decode=decode,
         setpoints=len(family.process.rpdo) - 1,
         control=table.control,
-        reaction=table.on_expiry,
+        reaction=table.reaction,
         timeout_ms=table.fieldbus_timeout_ms or 0,
         then_silence_s=table.then_silence_ms / 1000,
         ignores_errors=table.telegram_downtime_s == IGNORE_ALL_S,

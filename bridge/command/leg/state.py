@@ -50,8 +50,8 @@ MEANING: Final[dict[Stage, str]] = {
     Stage.BRAKING: "the drive is in its quick stop, and gets 1 s to end it",
     Stage.LEAVING: "the quick stop has not ended by itself: disable voltage ends it",
     Stage.LEADING: "each report of the drive is answered with the next word on the way to enabled",
-    Stage.RAMPING: "quick stop is sent until the drive is at rest, for 10 s at most",
-    Stage.TRIPPED: "disable voltage is sent, or with `stop` the family's stop",
+    Stage.RAMPING: "the reaction's ramp goes on until the drive is at rest, for 10 s at most",
+    Stage.TRIPPED: "the reaction's stop is sent",
     Stage.SILENCED: "nothing is sent; disable voltage where that would not stop the drive",
     Stage.BURST: "a stop that somebody has asked for breaks the silence for 0.1 s",
     Stage.HELD: "what was sent before the trip is still sent",
@@ -157,7 +157,7 @@ class StartProgress(NamedTuple):
 
 
 class Trip(NamedTuple):
-    """Times of a trip: when a quick stop becomes disable voltage at the latest, when nothing is sent any
+    """Times of a trip: when the reaction's ramp ends at the latest, when nothing is sent any
     more, and when a stop that breaks the silence ends."""
 
     ramps_until: float | None = None

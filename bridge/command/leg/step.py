@@ -289,7 +289,7 @@ def _acknowledge(draft: Draft, request: Request, *, pulse: bool) -> None:
     draft.hear(arrival_of(request, draft.now))
     is_reset = pulse and draft.drive in FAULTED
     word = at_rest(draft.settings.words, draft.sent.words[0])
-    if draft.settings.reaction == "silence" and was_tripped and draft.trip.burst is None:
+    if draft.settings.reaction.is_silent and was_tripped and draft.trip.burst is None:
         # Nobody has asked for a ramp.
         word = draft.settings.words.disable_voltage(word)
     stimulus = Stimulus.ACKNOWLEDGE_FAULT if is_reset else Stimulus.ACKNOWLEDGE

@@ -41,10 +41,10 @@ class Stimulus(StrEnum):
     START_UNHEARD = "start of a drive that has not reported yet"
     START_BRAKING = "start of a drive in its quick stop"
     # time
-    EXPIRED_DISABLE = "timer expires (on_expiry = disable_voltage, stop)"
-    EXPIRED_QUICK_STOP = "timer expires (on_expiry = quick_stop)"
-    EXPIRED_SILENCE = "timer expires (on_expiry = silence)"
-    EXPIRED_HOLD = "timer expires (on_expiry = hold)"
+    EXPIRED_STOP = "timer expires: stop"
+    EXPIRED_RAMP = "timer expires: ramp, then stop"
+    EXPIRED_SILENCE = "timer expires: silence"
+    EXPIRED_HOLD = "timer expires: hold"
     REPORT_OVERDUE = "1 s without a report"
     BRAKING_OVERDUE = "1 s in the quick stop"
     START_OVERDUE = "3 s since the start began"
@@ -175,8 +175,8 @@ _ROWS: Final[dict[Stimulus, _Row]] = {
         (_S.BLIND,): (_S.PREPARED, Deed.WAIT),
     },
     Stimulus.START_BRAKING: _starts(_S.BRAKING, Deed.WAIT),
-    Stimulus.EXPIRED_DISABLE: _expires(_S.TRIPPED),
-    Stimulus.EXPIRED_QUICK_STOP: _expires(_S.RAMPING),
+    Stimulus.EXPIRED_STOP: _expires(_S.TRIPPED),
+    Stimulus.EXPIRED_RAMP: _expires(_S.RAMPING),
     Stimulus.EXPIRED_SILENCE: _expires(_S.SILENCED),
     Stimulus.EXPIRED_HOLD: _expires(_S.HELD, Deed.HOLD),
     Stimulus.REPORT_OVERDUE: {

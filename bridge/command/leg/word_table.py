@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from bridge.command.leg.draft import Draft
 from bridge.command.leg.state import STARTING, LegState, Motion, RpdoWords, Stage
-from bridge.config import Reaction
+from bridge.config import StopKind
 from bridge.drive import ControlWords
 
 _S = Stage
@@ -41,20 +41,6 @@ class WordRule(NamedTuple):
     may_hold: bool
 
 
-class StopKind(StrEnum):
-    STOP = "stop"
-    QUICK_STOP = "quick stop"
-    DISABLE_VOLTAGE = "disable voltage"
-
-
-REACTION_STOPS: Final[Mapping[Reaction, tuple[StopKind, StopKind]]] = {
-    "disable_voltage": (StopKind.DISABLE_VOLTAGE, StopKind.DISABLE_VOLTAGE),
-    "quick_stop": (StopKind.QUICK_STOP, StopKind.DISABLE_VOLTAGE),
-    "stop": (StopKind.STOP, StopKind.STOP),
-    "silence": (StopKind.STOP, StopKind.STOP),
-    "hold": (StopKind.STOP, StopKind.STOP),
-}
-"""The stop of each reaction while its ramp goes on, and after that."""
 _STOPS: Final[Mapping[StopKind, Callable[[ControlWords, int], int]]] = {
     StopKind.STOP: ControlWords.stop,
     StopKind.QUICK_STOP: ControlWords.quick_stop,
@@ -130,8 +116,8 @@ def _marked(draft: Draft, word: int, may_hold: bool) -> int:
 
 def _reaction_word(draft: Draft, may_hold: bool) -> int:
     words = draft.settings.words
-    ramps, afterwards = REACTION_STOPS[draft.settings.reaction]
-    kind = afterwards if draft.trip.ramps_until is None else ramps
+    reaction = draft.settings.reaction
+    kind = reaction.stop if draft.trip.ramps_until is None else reaction.first
     word = _STOPS[kind](words, draft.sent.words[0])
     return word if may_hold or kind is StopKind.DISABLE_VOLTAGE else words.withhold(word)
 

@@ -13,6 +13,7 @@ from bridge.condition.plant_layout import PlantLayout, layout_of
 from bridge.drive.scaling import scale_of
 from bridge.image import Image, Point
 from bridge.mapping import Family
+from bridge.text import Text, as_json
 
 _encode = msgspec.json.Encoder().encode
 
@@ -51,6 +52,7 @@ def _drive(drive: DriveSpec, main: str) -> dict[str, Any]:
         "control": drive.control,
         "stop_by_anyone": drive.stop_by_anyone,
         "on_expiry": drive.table.on_expiry,
+        "reaction": as_json(Text.word("reaction", drive.table.on_expiry)),
         "states": list(dict.fromkeys(state.name for state in status.state)),
         "stops_in": _stops_in(drive.family),
         "main": main,

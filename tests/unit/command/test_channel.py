@@ -182,13 +182,16 @@ def test_that_silence_would_not_stop_the_drive_is_told_where_it_is_to(
     assert len(rig.events) == is_told
 
 
-@pytest.mark.parametrize(("why_not", "reaction"), [("", "silence"), ("P151 is 0", "disable_voltage")])
-def test_a_trip_names_what_is_done(why_not: str, reaction: str) -> None:
+@pytest.mark.parametrize(
+    ("why_not", "silent", "reaction"),
+    [("", True, "silence, at which the drive stops by itself"), ("P151 is 0", False, "disable voltage")],
+)
+def test_a_trip_names_what_is_done(why_not: str, silent: bool, reaction: str) -> None:
     rig = Rig(on_expiry="silence")
     rig.run()
     rig.channel.on_own_watch(why_not, rig.now)
     rig.wait(0.2)
-    assert rig.silent is (reaction == "silence")
+    assert rig.silent is silent
     trip = rig.told(EventKind.WATCHDOG)[-1]
     assert trip.startswith(f"modbus:192.168.1.10 was silent for 200 ms: {reaction}, E010/10.3")
 

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import pytest
 
 from bridge.command import Code, Outcome, Start, Write
 from bridge.command.leg.effect import StartEnded
+from bridge.config import Reaction
 from bridge.drive import DriveState
 from tests.support.leg import Leg, settings_of
 from tests.support.leg_words import LENZE
@@ -67,7 +70,7 @@ def test_it_makes_no_edge_of_the_acknowledge_bit(drive: Drive, is_set: bool):
     assert drive.writes(stop) == stop
 
 
-@pytest.mark.parametrize("on_expiry", ["stop", "quick_stop", "disable_voltage", "silence"])
+@pytest.mark.parametrize("on_expiry", sorted(set(get_args(Reaction)) - {"hold"}))
 def test_to_a_drive_that_is_being_stopped_it_is_not_forwarded(on_expiry: str):
     drive = Drive(on_expiry=on_expiry)
     drive.runs()

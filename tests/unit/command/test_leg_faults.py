@@ -95,7 +95,7 @@ CELLS: Final[dict[str, tuple[str, Stage, Stimulus, Cell]]] = {
     "an enabling word passes a trip": ("telegrams", _S.TRIPPED, _E.ENABLING_WORD, (_S.ENABLED, _D.FORWARD)),
     "and the interlock": ("telegrams", _S.INTERLOCKED, _E.ENABLING_WORD, (_S.ENABLED, _D.FORWARD)),
     "nothing is enabled": ("telegrams", _S.READY, _E.ENABLING_WORD, (_S.INTERLOCKED, _D.TAKE)),
-    "the timer does nothing": ("telegrams", _S.ENABLED, _E.EXPIRED_DISABLE, (_S.ENABLED, _D.NOTHING)),
+    "the timer does nothing": ("telegrams", _S.ENABLED, _E.EXPIRED_STOP, (_S.ENABLED, _D.NOTHING)),
     "an acknowledge does nothing": ("telegrams", _S.TRIPPED, _E.ACKNOWLEDGE, (_S.TRIPPED, _D.CLEAR_STOP)),
     "it ends the interlock, too": ("telegrams", _S.TRIPPED, _E.ACKNOWLEDGE, (_S.READY, _D.CLEAR_STOP)),
     "a stop needs no stop word after it": ("telegrams", _S.ENABLED, _E.STOP, (_S.READY, _D.STOP_AS_ASKED)),
@@ -120,7 +120,7 @@ CELLS: Final[dict[str, tuple[str, Stage, Stimulus, Cell]]] = {
     "a start outlasts a fault": ("starts", _S.LEADING, _E.SAYS_FAULT, (_S.LEADING, _D.NOTHING)),
     "and its time": ("starts", _S.LEADING, _E.START_OVERDUE, (_S.LEADING, _D.NOTHING)),
     "another deed than what is done": ("telegrams", _S.ENABLED, _E.STOP, (_S.INTERLOCKED, _D.FORWARD)),
-    "a trip is shown as a wait": ("telegrams", _S.ENABLED, _E.EXPIRED_DISABLE, (_S.TRIPPED, _D.WAIT)),
+    "a trip is shown as a wait": ("telegrams", _S.ENABLED, _E.EXPIRED_STOP, (_S.TRIPPED, _D.WAIT)),
     "a start that is done as one that failed": (
         "starts",
         _S.LEADING,

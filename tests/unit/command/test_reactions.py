@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import pytest
 
 from bridge.command import Action, EventKind, Identity
 from bridge.command.drive_link import NodeState
+from bridge.config import REACTIONS, Reaction
 from tests.support.leg_words import NORD_TU4
 from tests.support.rig import (
     ACKNOWLEDGE,
@@ -20,6 +23,8 @@ from tests.support.rig import (
     SHUT_DOWN,
     Rig,
 )
+
+STOPPING = [name for name, rule in REACTIONS.items() if rule.sends_stop]
 
 
 def tripped(on_expiry: str, **settings: object) -> Rig:
@@ -80,14 +85,14 @@ def test_hold_goes_on_with_the_last_telegram_and_reports():
     assert rig.channel.current_fault == 10.3
 
 
-@pytest.mark.parametrize("on_expiry", ["disable_voltage", "quick_stop", "stop", "silence"])
+@pytest.mark.parametrize("on_expiry", sorted(set(get_args(Reaction)) - {"hold"}))
 def test_setpoints_go_to_zero(on_expiry: str):
     rig = tripped(on_expiry)
     assert rig.sent_setpoints == (0, 0, 0, 0)
     assert rig.channel.setpoints == (0, 0, 0, 0)
 
 
-@pytest.mark.parametrize("on_expiry", ["disable_voltage", "quick_stop", "stop"])
+@pytest.mark.parametrize("on_expiry", STOPPING)
 def test_then_silence_ends_the_sending_after_its_time(on_expiry: str):
     rig = tripped(on_expiry, then_silence_ms=500)
     rig.wait(0.499)
@@ -225,10 +230,10 @@ def test_silence_that_would_not_stop_the_drive_is_disable_voltage():
     assert rig.sent == 0x0474
     assert rig.sent_setpoints[0] == 0
     (trip,) = (message for message in rig.told(EventKind.WATCHDOG) if "was silent" in message)
-    assert ": disable_voltage, " in trip
+    assert ": disable voltage, " in trip
 
 
-@pytest.mark.parametrize("on_expiry", ["disable_voltage", "quick_stop", "stop"])
+@pytest.mark.parametrize("on_expiry", STOPPING)
 def test_then_silence_that_would_not_stop_the_drive_is_disable_voltage(on_expiry: str):
     rig = Rig(on_expiry=on_expiry, then_silence_ms=500)
     rig.channel.on_own_watch("P151 is 0 (off)", rig.now)

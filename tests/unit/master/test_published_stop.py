@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
@@ -22,7 +23,7 @@ from bridge.canopen import cobid
 from bridge.canopen.frame import Frame
 from bridge.canopen.sync import LAST_SYNCHRONOUS, burst_length
 from bridge.command.worst_case import REACTION_BOUND_MS, Wire
-from bridge.config import Site, load_site
+from bridge.config import Reaction, Site, load_site
 from bridge.node.process.held import held_s
 from tests.support import sites
 from tests.support.broadcast_manager import LATE_S
@@ -212,7 +213,7 @@ def all_settings(draw: st.DrawFn) -> Setting:
         draw(st.sampled_from([2, 5, 7, 10, 20, 40])),
         draw(st.sampled_from([time for time in DEADMEN_MS if time >= 2 * period_ms])),
         draw(st.sampled_from([20, 50, 90, 100, 130, 200, 333, 700])),
-        draw(st.sampled_from(["disable_voltage", "quick_stop", "stop", "silence"])),
+        draw(st.sampled_from([one for one in get_args(Reaction) if one != "hold"])),
         draw(st.sampled_from([0, 1, 1, 2, 3, 7, 254, 255])),
         draw(st.integers(2, 6)),
         (),

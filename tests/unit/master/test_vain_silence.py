@@ -132,7 +132,7 @@ def test_a_drive_that_is_set_otherwise_stops_in_the_published_time(tmp_path: Pat
     assert enabling[-1].time - last <= bench.stop_ms / 1000
     assert bench.value(f"{bench.name}/supervision/follows") is True
     (trip,) = [event for event in bench.events if "was silent for 200 ms" in event.message]
-    assert "200 ms: disable_voltage" in trip.message
+    assert "200 ms: disable voltage" in trip.message
 
 
 @pytest.mark.parametrize("drive", [SILENCE, THEN_SILENCE])

@@ -17,7 +17,7 @@ from bridge.canopen.nmt import NmtCommand, NmtState, command_name
 from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import Action
 from bridge.condition.causes import RULES
-from bridge.config import DriveTable, NodeTable
+from bridge.config import NodeTable, Reaction
 from bridge.drive import DriveState
 from bridge.text import LANGUAGES, Text
 from bridge.text.templates import parse, source, templates
@@ -29,7 +29,7 @@ GROUPS: Final[Mapping[str, Iterable[str]]] = {
     "nmt_command": [command_name(command) for command in NmtCommand],
     "nmt_state": [state.words for state in NmtState],
     "node_state": [state.value for state in NodeState],
-    "reaction": get_args(DriveTable.model_fields["on_expiry"].annotation),
+    "reaction": get_args(Reaction),
     "supervision": get_args(NodeTable.model_fields["supervision"].annotation),
     "trouble": sorted({rule.cause for rule in RULES}),
     "word": ["control_word", "status_word"],

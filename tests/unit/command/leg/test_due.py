@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import pytest
 
 from bridge.command import Action
-from bridge.command.leg.due import judge
+from bridge.command.leg.due import expiry, judge
 from bridge.command.leg.effect import Tell, Tripped
 from bridge.command.leg.state import Owner, Stage
+from bridge.command.leg.table import TABLE
+from bridge.config import REACTIONS, Reaction
 from bridge.text import render
 from tests.support.leg import PLC, draft_of, running_nord
+
+
+@pytest.mark.parametrize("reaction", get_args(Reaction))
+def test_a_trip_goes_to_the_stage_of_its_reaction(reaction: Reaction) -> None:
+    rule = REACTIONS[reaction]
+    leg = running_nord(on_expiry=reaction)
+    leg.trips()
+    stage = leg.state.stage
+    assert TABLE[Stage.ENABLED, expiry(rule)][0] is stage
+    assert (stage is Stage.SILENCED, stage is Stage.HELD) == (rule.is_silent, rule.holds)
+    assert (stage is Stage.RAMPING) is (rule.ramp is not None) is (leg.state.trip.ramps_until is not None)
 
 
 @pytest.mark.parametrize(("at", "trips"), [(100.199, False), (100.2, True)])

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import pytest
 
 from bridge.catalogue.codes import WatchdogState
 from bridge.command import TakeControl
 from bridge.command.leg.outlook import next_deadline, output_then, trips_at, until, watchdog_state
+from bridge.config import Reaction
 from tests.support.leg import RUN, SHUT_DOWN, Leg, running_nord, settings_of
 from tests.support.rig import OPERATOR
 
@@ -62,7 +65,7 @@ def test_the_first_of_lease_and_watchdog_ends_it(ttl_ms: int, end: float) -> Non
     assert until(leg.settings, leg.state) == end
 
 
-@pytest.mark.parametrize("reaction", ["disable_voltage", "quick_stop", "stop", "silence"])
+@pytest.mark.parametrize("reaction", sorted(set(get_args(Reaction)) - {"hold"}))
 def test_what_is_sent_then_is_what_the_leg_itself_sends_then(reaction: str) -> None:
     leg = running_nord(on_expiry=reaction)
     then = output_then(leg.settings, leg.state)

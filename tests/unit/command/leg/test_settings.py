@@ -6,6 +6,7 @@ import pytest
 
 from bridge.command.drive_link import NodeState
 from bridge.command.leg.outlook import next_deadline, watchdog_state
+from bridge.config import REACTIONS
 from bridge.drive import DriveState
 from bridge.mapping import load_family
 from tests.support.leg import Leg, settings_of
@@ -27,7 +28,7 @@ def test_a_drive_without_a_time_out_is_not_watched():
 
 
 @pytest.mark.parametrize(("then_silence_ms", "silent_at"), [(500, 101.5), (3000, 104.0)])
-@pytest.mark.parametrize("on_expiry", ["stop", "quick_stop", "disable_voltage"])
+@pytest.mark.parametrize("on_expiry", [name for name, rule in REACTIONS.items() if rule.sends_stop])
 def test_silence_comes_so_long_after_the_trip(on_expiry: str, then_silence_ms: int, silent_at: float):
     given = {"fieldbus_timeout_ms": 1000, "on_expiry": on_expiry, "then_silence_ms": then_silence_ms}
     leg = Leg(settings_of("nord/sk-tu4-cao", **given))

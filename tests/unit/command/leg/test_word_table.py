@@ -9,7 +9,6 @@ from bridge.command.leg.event import StopsOnSilence
 from bridge.command.leg.state import ANY_TRIP, Motion, Stage
 from bridge.command.leg.word_table import (
     MAY_HOLD,
-    REACTION_STOPS,
     WORD_TABLE,
     WordChoice,
     WordRule,
@@ -38,12 +37,6 @@ def test_what_enables_is_the_owners_or_was_sent_before_a_trip_that_holds() -> No
     stages = {stage for (stage, _), sends in WORD_TABLE.items() if sends.word in may_enable}
     assert stages.isdisjoint({Stage.CLOSED, Stage.INTERLOCKED, *ANY_TRIP} - {Stage.HELD})
     assert WORD_TABLE[Stage.HELD, Motion.SEEN] == WordRule(WordChoice.BEFORE, may_hold=True)
-
-
-def test_no_reaction_ends_weaker_than_it_begins() -> None:
-    strength = ["stop", "quick stop", "disable voltage"]
-    for ramps, afterwards in REACTION_STOPS.values():
-        assert strength.index(afterwards) >= strength.index(ramps)
 
 
 @pytest.mark.parametrize(

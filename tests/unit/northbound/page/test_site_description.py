@@ -16,6 +16,7 @@ def test_the_site_is_described_by_the_names_of_its_points() -> None:
     told = described(plant.image, plant.catalogue)
     assert [one["name"] for one in told["drives"]] == [DRIVE, "conveyor/fu2"]
     assert all(one["main"] == "frequency" and one["stops_in"] == "ready" for one in told["drives"])
+    assert {one["reaction"]["code"] for one in told["drives"]} == {"reaction.disable_voltage"}
     names = {f"{place}/{leaf}" for place, kind in told["places"].items() for leaf in told["natures"][kind]}
     assert names == {point.name for point in plant.image.points}
     for drive in told["drives"]:

@@ -6,7 +6,7 @@ import { isConnected, troubles } from "../live.js";
 import { has } from "../site.js";
 import { quality } from "../values.js";
 import { quantity } from "../format.js";
-import { t } from "../texts.js";
+import { inWords, t } from "../texts.js";
 import { good, goodLabel, ownState } from "../drivestate.js";
 import { ownerOf } from "../owner.js";
 import { Meter } from "../meter.js";
@@ -45,7 +45,7 @@ function OfController({ drive }) {
 function ControllerBreak({ drive, timeout, worst }) {
   if (timeout === null) return t("chain.unknown");
   if (!timeout) return t("chain.controller.unwatched");
-  const filled = { timeout: quantity(timeout, "ms"), reaction: t(`reaction.${drive.on_expiry}`) };
+  const filled = { timeout: quantity(timeout, "ms"), reaction: inWords(drive.reaction) };
   if (drive.on_expiry === "hold") return html`<strong class="is-alarm">${t(holdKey(drive), filled)}</strong>`;
   return html`${t("chain.controller.silent", filled)}${" "}<${Worst} name=${worst} />`;
 }

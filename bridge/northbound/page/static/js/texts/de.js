@@ -335,11 +335,6 @@ export const de = {
   "chain.within": "Höchstens {time}.",
   "chain.never": "Er läuft weiter.",
   "chain.not_known": "Die Zeit ist nicht bekannt: {why}.",
-  "reaction.disable_voltage": "Spannung sperren",
-  "reaction.quick_stop": "Schnellhalt",
-  "reaction.stop": "Halt an der Rampe",
-  "reaction.silence": "Schweigen, damit der Antrieb von selbst anhält",
-  "reaction.hold": "der Antrieb bleibt, wie er ist",
 
   "integration.protocols": "Protokolle",
   "integration.modbus": "Modbus TCP",

@@ -335,11 +335,6 @@ export const en = {
   "chain.within": "At most {time}.",
   "chain.never": "It runs on.",
   "chain.not_known": "The time is not known: {why}.",
-  "reaction.disable_voltage": "voltage off",
-  "reaction.quick_stop": "quick stop",
-  "reaction.stop": "ramp down",
-  "reaction.silence": "silence, so that the drive stops by itself",
-  "reaction.hold": "the drive is left as it is",
 
   "integration.protocols": "Protocols",
   "integration.modbus": "Modbus TCP",

@@ -116,6 +116,7 @@ def test_a_reaction_in_the_site_file_is_that_of_its_axis(tmp_path: Path, reactio
     assert [case.drive for case in verdict.worst_cases if "6007 is 0" in case.own.reason] == [runs_on]
 
 
+@pytest.mark.landing
 def test_points_and_registers_are_alike_for_both(tmp_path: Path) -> None:
     bench = running(site(tmp_path))
     leaves = [

@@ -92,6 +92,7 @@ def test_the_layers_are_those_that_are_checked() -> None:
 # snippets
 
 
+@pytest.mark.landing(18)
 @pytest.mark.parametrize("page", with_blocks("json", "ini", "toml"), ids=repr)
 def test_snippets_are_what_they_say(page: Page, tmp_path: Path) -> None:
     for block in page.blocks:

@@ -132,6 +132,7 @@ class Client:
         return self.write(unit, row.address, *words)
 
 
+@pytest.mark.landing(11)
 @kinds
 def test_a_register_is_exported_as_writable_where_it_can_be_written(tmp_path: Path, kind: Kind) -> None:
     bench = kind.bench(tmp_path)
@@ -194,7 +195,7 @@ class Asker:
 NEVER: Final = (Code.NOT_ALLOWED, Code.NOT_CONFIGURED, Code.READ_ONLY)
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(8)
 @kinds
 @pytest.mark.parametrize("source", [Source.OPCUA, Source.ZENOH])
 def test_a_point_is_exported_as_writable_where_it_can_be_written(
@@ -271,6 +272,7 @@ def by_a_restart(bench: Bench, client: Client) -> None:
 STOPS: Final = (by_register, by_quick_stop, by_disable_voltage, by_somebody_else, by_release, by_a_restart)
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("stop", STOPS)
 def test_after_a_stop_the_holding_registers_have_the_stop(
     tmp_path: Path, stop: Callable[[Bench, Client], None]

@@ -153,7 +153,7 @@ def late_process_data(hall: Hall, number: int) -> None:
     hall.plant.on_time(hall.now + 5)
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(5)
 @pytest.mark.parametrize(
     ("provoke", "most"),
     [
@@ -306,6 +306,7 @@ class _Visitor:
     def close(self) -> None: ...
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(
     ("stranger", "guest"),
     [("192.168.1.1", "10.0.0.9"), ("2001:db8::{:x}", "fd00::{:x}")],

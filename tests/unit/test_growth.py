@@ -87,6 +87,7 @@ def booted(path: Path) -> None:
         runner.run(play())
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("work", [loaded, booted], ids=lambda work: work.__name__)
 def test_calls_grow_no_faster_than_nodes(tmp_path: Path, work: Callable[[Path], None]) -> None:
     few, many = site(tmp_path / "few", FEW), site(tmp_path / "many", MANY)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.support.process import REPOSITORY
 from tools.house import House, circles
 
@@ -66,6 +68,7 @@ def test_a_circle_may_have_several_steps() -> None:
     assert circles({"a": {"b"}, "b": set()}) == []
 
 
+@pytest.mark.landing
 def test_the_house_has_no_loose_modules_and_no_circles() -> None:
     made = House(REPOSITORY)
     assert made.loose() == ["exports", "project"]

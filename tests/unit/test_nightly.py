@@ -74,6 +74,7 @@ def ran(folder: Path, expected: int, only: str = "", **extent: str) -> set[str]:
     return set(re.findall(r"::(\S+) PASSED", done.stdout))
 
 
+@pytest.mark.landing
 def test_by_night_all_is_tried_and_by_day_a_part_of_it(tmp_path: Path) -> None:
     day, night = ran(tmp_path, 7), ran(tmp_path, 100, NIGHTLY="1", LANDING="rest")
     rows = {f"test_rows[{one}-{other}]" for one in range(3) for other in range(3)}
@@ -87,6 +88,7 @@ def test_by_night_all_is_tried_and_by_day_a_part_of_it(tmp_path: Path) -> None:
     assert day & rows < rows
 
 
+@pytest.mark.landing
 def test_what_has_to_pass_before_a_change_lands_is_what_day_takes_and_leaves_out(tmp_path: Path) -> None:
     day, rest = ran(tmp_path, 7, LANDING="0"), ran(tmp_path, 7, LANDING="rest")
     assert ran(tmp_path, 7, LANDING="1") == day | rest

@@ -200,6 +200,7 @@ def test_exports_are_tables(tmp_path: Path, what: str) -> None:
     assert table.stdout.splitlines()[0].split(",") == list(rows[0])
 
 
+@pytest.mark.landing
 def test_what_is_not_served_is_not_exported(tmp_path: Path) -> None:
     done = call("export", "zenoh", str(write_site(tmp_path)))
     assert done.returncode == 1
@@ -219,6 +220,7 @@ def test_of_several_buses_one_is_exported_as_dbc(tmp_path: Path) -> None:
     assert "BU_: DRIVEBRIDGE n1" in done.stdout
 
 
+@pytest.mark.landing
 def test_a_mapping_of_ones_own_is_simulated_by_the_family_it_extends(tmp_path: Path) -> None:
     (tmp_path / "mappings").mkdir()
     (tmp_path / "mappings" / "fan.toml").write_text('extends = "cia402/velocity"\n', encoding="utf-8")

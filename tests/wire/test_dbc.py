@@ -106,7 +106,7 @@ def points(recording: Recording, *options: str) -> Image:
     return told
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing
 @pytest.mark.parametrize("options", [(), ("--words",)], ids=["values", "words"])
 def test_a_log_says_what_the_bridge_says(recording: Recording, options: tuple[str, ...]) -> None:
     told = points(recording, *options)

@@ -177,6 +177,7 @@ async def test_a_front_without_listener_ends() -> None:
     os.close(mouth)
 
 
+@pytest.mark.landing
 def test_a_hung_front_is_killed_and_comes_back(tmp_path: Path, ports: tuple[int, int]) -> None:
     path = start(tmp_path, ports)
     with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:

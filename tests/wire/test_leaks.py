@@ -80,6 +80,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> str:
     return called("-m", "pytest", "-p", "no:cacheprovider", "--rootdir", str(folder), str(folder)).stdout
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("name", LEFT)
 def test_what_is_left_is_told_of_the_test_that_leaves_it(told: str, name: str) -> None:
     [line] = [

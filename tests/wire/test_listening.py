@@ -89,6 +89,7 @@ async def is_turned_away(client: socket.socket) -> bool:
         return False
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("serving", [modbus, opcua, page])
 async def test_without_descriptors_clients_are_turned_away_with_one_line(
     tmp_path: Path,

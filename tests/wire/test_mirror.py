@@ -394,6 +394,7 @@ async def test_a_killed_bus_process_leaves_every_point_dead_until_it_is_back(end
             assert (await client.request(stop)).ok
 
 
+@pytest.mark.landing
 async def test_a_hung_bus_process_counts_as_gone_after_a_second(endpoint: str) -> None:
     async with bus_process(endpoint) as process, front(endpoint) as client:
         frequency = "conveyor/fu1/actual/frequency"

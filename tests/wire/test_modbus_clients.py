@@ -134,7 +134,7 @@ def mbpoll(port: int, asked: Sequence[Asked]) -> list[Found]:
     return found
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing
 @pytest.mark.parametrize("client", [pymodbus, modbus_serial, mbpoll])
 def test_every_maximal_run_is_read(
     bridge: FamilyBridge, asked: list[Asked], client: Callable[[int, Sequence[Asked]], list[Found]]

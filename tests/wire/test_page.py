@@ -151,6 +151,7 @@ def browser(bridge: tuple[Process, int]) -> Browser:
     return Browser(bridge[1])
 
 
+@pytest.mark.landing
 def test_nothing_is_told_without_a_login(browser: Browser) -> None:
     assert browser.request("GET", "/api/session").status == 401
     for path in GUARDED:
@@ -259,6 +260,7 @@ def test_large_and_malformed_requests_are_refused(browser: Browser) -> None:
     assert browser.request("GET", "/").status == 200, "and it still serves"
 
 
+@pytest.mark.landing
 def test_who_says_nothing_is_cut_off(browser: Browser) -> None:
     """Slow heads: a connection that says nothing, and one that never comes to the end of its head. A tab that
     only looks is none of them."""

@@ -147,6 +147,7 @@ def as_words(value: float) -> list[int]:
 # Modbus
 
 
+@pytest.mark.landing
 def test_modbus_reads_what_was_read_and_writes_the_drive(shop: Shop, plc: ModbusTcpClient) -> None:
     shown = shop.map("parameter/p103", "input register")
     place = shop.map("parameter/p103", "holding register")

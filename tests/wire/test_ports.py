@@ -86,6 +86,7 @@ async def test_one_port_that_is_taken_keeps_nothing_else_from_being_served(tmp_p
             assert "not served: modbus" in service.supervisor.status
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("what", ["modbus", "gateway", "zenoh"])
 async def test_a_port_that_becomes_free_is_served(tmp_path: Path, what: str) -> None:
     with taken() as other:

@@ -225,7 +225,7 @@ def test_steps_5_and_6_the_words_and_p151(rig: Rig, slot: str) -> None:
     assert rig.parameter("fu1", "P151") == 200
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing
 @pytest.mark.parametrize("protocol", DRIVES)
 def test_steps_8_and_9_what_the_parameters_show(rig: Rig, protocol: str) -> None:
     axis, slot = rig.axes[protocol], DRIVES[protocol]

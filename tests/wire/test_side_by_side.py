@@ -72,6 +72,7 @@ def test_one_that_fails_ends_the_other(lanes: Lanes, order: tuple[str, str], tmp
     wait_gone(tmp_path / "long.pid")
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(("told", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_whoever_ends_it_ends_all(lanes: Lanes, told: signal.Signals, status: int, tmp_path: Path) -> None:
     pids = tmp_path / "long.pid", tmp_path / "left.pid"

@@ -117,7 +117,7 @@ def way(bridge: Seen, plc: ModbusTcpClient) -> float:
     return took
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing
 @pytest.mark.timeout(300)  # the tests of the documentation may have the demo
 @pytest.mark.parametrize("number", ENDING, ids=lambda number: number.name)
 def test_the_demo_stops_its_drives_first_and_leaves_nothing_behind(
@@ -141,7 +141,7 @@ def test_the_demo_stops_its_drives_first_and_leaves_nothing_behind(
         assert "Traceback" not in demo.process.output()
 
 
-@pytest.mark.landing(8)
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("after_s", [0.05, 0.15, 0.3, 0.6, 1.0, 1.5])
 @pytest.mark.parametrize("number", ENDING, ids=lambda number: number.name)
 def test_a_signal_while_it_starts_ends_it_without_a_trace(

@@ -52,6 +52,7 @@ def test_the_demos_controller_never_trips_its_own_watchdog(tmp_path: Path) -> No
         assert "watchdog" not in kinds
 
 
+@pytest.mark.landing
 def test_the_demos_controller_asks_nothing_of_a_node_that_is_not_operational(tmp_path: Path) -> None:
     port = free_port()
     bus = sites.bus(sites.node(sites.drive("fu4", "lease", TIMEOUT_MS), more="sdo_channels = [4]"))

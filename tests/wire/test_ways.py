@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tools import ways
 
 MOST_FILES = 12
@@ -12,6 +14,7 @@ BY_TWO_PROCESSES = {"A TPDO to a zenoh key": 14}
 """With both ends of the link to the front, and zenoh's worker there."""
 
 
+@pytest.mark.landing
 async def test_the_page_draws_the_ways_that_values_take(tmp_path: Path) -> None:
     found = await ways.follow(tmp_path)
     counts = {name: len(files) for name, files in found.items()}

@@ -55,6 +55,7 @@ def test_the_families_come_along(installed: Path) -> None:
     assert "nord/sk-tu4-cao" in families
 
 
+@pytest.mark.landing
 def test_the_demo_site_is_there_and_right(installed: Path) -> None:
     done = call(installed, "-m", "bridge", "check", str(installed / "bridge" / "demo" / "site.toml"))
     assert done.returncode == 0, done.stderr

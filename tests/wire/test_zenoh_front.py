@@ -137,6 +137,7 @@ async def test_names_without_end_end_the_front_and_no_drive(tmp_path: Path) -> N
         await it.answers()
 
 
+@pytest.mark.landing
 async def test_a_killed_front_is_a_silent_controller_and_comes_back(tmp_path: Path) -> None:
     async with plant(tmp_path) as it:
         async with zenoh_peer(it.endpoint) as peer:

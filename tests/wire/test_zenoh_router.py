@@ -73,6 +73,7 @@ def shown(peer: Peer) -> object:
     return (peer.latest(f"{FU3}/actual/value_1") or {}).get("v")
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(("ours", "theirs"), [("client", "client"), ("client", "peer"), ("peer", "client")])
 async def test_the_bridge_knows_who_reads_behind_a_router(ours: str, theirs: str) -> None:
     plant = make_plant()

@@ -76,7 +76,7 @@ async def test_each_of_many_commands_at_once_is_answered() -> None:
     assert len({len(answer["values"]) for answer in said[600:]}) == 1
 
 
-@pytest.mark.landing(2)
+@pytest.mark.landing
 @pytest.mark.parametrize("count", [6, 12])
 async def test_stopped_clients_do_not_hold_up_the_commands_of_others(count: int) -> None:
     async with rig(mode="client", further=MORE_NODES, room=32768) as r:

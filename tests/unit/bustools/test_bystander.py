@@ -66,6 +66,7 @@ def own_objects(family: Family) -> list[str]:
     return [str(place.ref) for place in places(family, link=True)]
 
 
+@pytest.mark.landing(66)
 @pytest.mark.parametrize(("mapping", "slot"), FAMILIES)
 @pytest.mark.parametrize("state", [DriveState.OPERATION_ENABLED, DriveState.READY, DriveState.FAULT])
 def test_what_is_protected_is_not_written_while_the_drive_is_enabled(

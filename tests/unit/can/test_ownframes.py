@@ -102,6 +102,7 @@ STEPS = st.one_of(
 )
 
 
+@pytest.mark.landing
 @settings(max_examples=150, deadline=None)
 @given(st.lists(STEPS, max_size=60))
 @example([("tell", [ENABLING], 0.001, False), ("block", 0.9), ("run", 0.5), ("tell", [STOPPED], 0.1, False)])

@@ -28,6 +28,7 @@ def ask(quick: Quick) -> None:
 # SDO answers
 
 
+@pytest.mark.landing(12)
 @pytest.mark.parametrize("retries", [0, 1, 3])
 @pytest.mark.parametrize("delay_s", [0.3, 0.6, 0.99, 1.2])
 def test_a_slow_node_is_no_duplicate(tmp_path: Path, retries: int, delay_s: float) -> None:

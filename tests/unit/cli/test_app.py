@@ -26,6 +26,7 @@ _OTHERS = (
 )
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(
     ("word", "imported"), [("version", ""), ("run", "import bridge.service.opcua_front; ")]
 )
@@ -37,6 +38,7 @@ def test_a_command_does_not_import_the_others(word: str, imported: str) -> None:
     assert [name for name in done.stdout.split() if name.startswith(_OTHERS)] == []
 
 
+@pytest.mark.landing
 def test_without_cantools_a_dbc_export_says_what_to_install() -> None:
     script = (
         "import sys; sys.modules['cantools'] = None; "

@@ -43,7 +43,7 @@ def test_a_number_is_found_as_the_display_shows_it(family: str, asked: str, firs
     assert all(line.startswith("      ") for line in rest), "it is the only one"
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("name", sorted(set(family_names()) - {"generic/device"}))
 def test_every_code_of_an_emergency_message_is_known(name: str) -> None:
     """Each code as the bus and the manual have it, also where the drive's own number says more (BU 2500

@@ -196,6 +196,7 @@ def test_without_a_listener_nothing_is_followed(hall: Hall) -> None:
 
 
 class TestBusyControllers:
+    @pytest.mark.landing
     def test_telegrams_that_change_nothing_are_counted(self, hall: Hall) -> None:
         hall.write(control_word=SHUT_DOWN, setpoint_1=0)
         hall.cycle(SUMMARY_S + 1, control_word=SHUT_DOWN, setpoint_1=0)

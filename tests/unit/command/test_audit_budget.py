@@ -89,6 +89,7 @@ def made_up_actions(hall: Hall, number: int) -> None:
     hall.plant.rejected(Rejection(who, FU1, f"Method{number}", Code.UNKNOWN_POINT, "no"), hall.now)
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize(
     "refuse", [made_up_units, made_up_registers, made_up_targets, made_up_names, made_up_actions]
 )

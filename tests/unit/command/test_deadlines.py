@@ -133,6 +133,7 @@ def test_it_holds_no_more_than_a_few_entries_each() -> None:
     assert several.due(1e6) == [0, 1, 2]
 
 
+@pytest.mark.landing(20)
 @pytest.mark.parametrize("seed", range(20))
 def test_it_finds_whatever_is_due_and_nothing_else(seed: int) -> None:
     chance, several, now = random.Random(seed), Several(6), 0.0
@@ -215,6 +216,7 @@ class Told:
         return min((max(at, now) for at in times if at is not None), default=inf)
 
 
+@pytest.mark.landing(30)
 @pytest.mark.parametrize("seed", range(30))
 def test_whoever_brings_a_deadline_forward_tells(seed: int) -> None:
     """Of the drive's link and of its stops; what changes the leg settles."""

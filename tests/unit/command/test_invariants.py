@@ -328,6 +328,7 @@ class DriveByChance(RuleBasedStateMachine):
         assert all(earlier <= later for earlier, later in pairwise(times))
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize(
     ("reaction", "control"),
     [

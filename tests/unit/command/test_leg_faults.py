@@ -131,7 +131,7 @@ CELLS: Final[dict[str, tuple[str, Stage, Stimulus, Cell]]] = {
 }
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(7)
 @pytest.mark.parametrize("profile", PROFILES)
 def test_without_a_fault_nothing_is_found(profile: str) -> None:
     space(**PROFILES[profile]).explore(MOST)
@@ -269,6 +269,7 @@ def test_an_event_that_does_nothing_is_found(fault: str) -> None:
         space(**PROFILES[profile]).explore(MOST)
 
 
+@pytest.mark.landing(25)
 @pytest.mark.parametrize("fault", DEEDS)
 def test_a_wrong_deed_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
     profile, where, name, wrong = DEEDS[fault]

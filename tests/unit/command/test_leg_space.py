@@ -124,6 +124,7 @@ _FORGETFUL: Final[dict[str, dict[str, Any]]] = {
 }
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize("profile", by_night_of(_FORGETFUL, 1))
 def test_what_the_walk_forgets_decides_nothing(profile: str) -> None:
     explored_all = space(**_FORGETFUL[profile])

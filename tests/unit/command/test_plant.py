@@ -136,6 +136,7 @@ class TestPoints:
         "identity/vendor identity/product identity/revision identity/serial identity/device_name"
     )
 
+    @pytest.mark.landing(29)
     @pytest.mark.parametrize("leaf", CONTRACT.split())
     def test_every_drive_has_the_names_of_the_contract(self, hall: Hall, leaf: str):
         for drive in ("fu1", "infeed"):

@@ -103,6 +103,7 @@ def test_each_state_has_its_number(state: str) -> None:
     assert watchdog_state(watched.settings, watched.state) == NUMBERS[state]
 
 
+@pytest.mark.landing(196)
 @pytest.mark.parametrize("state", NEXT)
 @pytest.mark.parametrize(("first", "second"), list(product(EVENTS, EVENTS)))
 def test_each_event_leads_where_the_table_says_also_after_each_other(

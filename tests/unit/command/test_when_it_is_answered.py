@@ -192,6 +192,7 @@ METHODS: Mapping[Action, Callable[[Hall], None]] = {
 }
 
 
+@pytest.mark.landing(11)
 @pytest.mark.parametrize("method", METHODS)
 def test_a_method_of_a_drive(hall: Hall, method: Action) -> None:
     METHODS[method](hall)
@@ -228,6 +229,7 @@ OF_BUSES = tuple(action for action in AFTERWARDS if action is not Action.DISABLE
 PLACES = [*((NODE, action) for action in AFTERWARDS), *((BUS, action) for action in OF_BUSES)]
 
 
+@pytest.mark.landing(9)
 @pytest.mark.parametrize(("target", "action"), PLACES)
 def test_a_command_to_a_node_in_operation(hall: Hall, target: str, action: Action) -> None:
     hall.run()
@@ -237,6 +239,7 @@ def test_a_command_to_a_node_in_operation(hall: Hall, target: str, action: Actio
     assert not enables(shown[f"{FU1}/supervision/sent_control_word"])
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("target", [NODE, BUS])
 def test_a_node_that_is_started_is_booted(hall: Hall, target: str) -> None:
     hall.act(Action.STOP_NODE, NODE)

@@ -119,7 +119,7 @@ def written(bench: DerivedBench, drive: str, name: str, value: int) -> Outcome:
     return outcome
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("form", FORMS)
 def test_each_axis_is_a_drive_of_its_own(tmp_path: Path, form: str) -> None:
     sections, slots = FORMS[form]

@@ -36,6 +36,7 @@ def without(*names: str) -> Mapping[str, Section]:
     return {name: section for name, section in SPIN.items() if name not in names}
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize(
     ("kind", "modes", "mapping"),
     [
@@ -82,6 +83,7 @@ def test_what_is_no_drive_is_refused(sections: Mapping[str, Section], message: s
         derive_family(described(sections), "spin.eds")
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("sections", [SPIN, FIXED, {**SPIN, "6061": var("mode display", I8, "ro")}])
 def test_the_device_is_driven_by_its_mapping(tmp_path: Path, sections: Mapping[str, Section]) -> None:
     bench = DerivedBench(tmp_path, described(sections))

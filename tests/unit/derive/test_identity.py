@@ -39,6 +39,7 @@ def file(identity: dict[str, Section], info: tuple[int, int] | None) -> Descript
     return read_device(content.encode(), "spin.eds")
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize(
     ("identity", "info", "wanted"),
     [

@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -52,6 +53,7 @@ def mutants(draw: st.DrawFn) -> str:
     return "\n".join(text) + "\n"
 
 
+@pytest.mark.landing
 @given(mutants())
 @settings(max_examples=examples(60), deadline=None)
 def test_a_mapping_is_whole_or_not_there(text: str) -> None:

@@ -83,6 +83,7 @@ WORDS = {
 """Bytes, and what has to be in each frame."""
 
 
+@pytest.mark.landing
 @settings(max_examples=examples(12), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     further=st.lists(st.sampled_from([MODE, TORQUE_LIMIT]), unique=True, max_size=2),
@@ -116,6 +117,7 @@ def test_every_word_that_a_derived_drive_is_sent_is_right_and_it_runs(
     assert bench.value(f"{drive}/actual/velocity") == 300
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(
     ("word", "index", "held", "name", "shown"),
     [
@@ -180,6 +182,7 @@ def free(sections: dict[str, Section], *numbers: str) -> None:
         sections[f"{mapping}sub0"] = {**sections[f"{mapping}sub0"], "DefaultValue": "0"}
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("kind", ["255", "1", "253"])
 def test_a_tpdo_that_is_off_is_switched_on_and_sent_with_each_change(tmp_path: Path, kind: str) -> None:
     """Bit 31 of 1800h:01, and a type that waits for SYNC or for a remote frame (CiA 301 §7.5.2.37)."""
@@ -209,6 +212,7 @@ def test_a_pdo_that_is_off_for_good_is_refused_by_name(number: str) -> None:
         derive_family(described(sections), "spin.eds")
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(
     ("rpdo", "tpdo"),
     [

@@ -31,7 +31,7 @@ def facts(one: ODVariable) -> tuple[object, ...]:
     return (one.name, one.data_type, one.access_type, one.unit, one.description, *numbers)
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("name", family_names())
 def test_canopen_reads_from_the_eds_what_was_written(name: str) -> None:
     dictionary = load_dictionary(name, 5)

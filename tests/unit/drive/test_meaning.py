@@ -136,6 +136,7 @@ def test_a_drive_in_another_set_than_commanded_gets_no_scaled_value(tmp_path: Pa
     assert decode({"setpoint_1": 5}, (0,) * 4, ENABLE).setpoints == (5, 0, 0, 0)
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("in_set", [1, 2, 3, 4])
 def test_start_and_stop_stay_in_their_set(tmp_path: Path, in_set: int) -> None:
     bench = made(tmp_path)
@@ -157,6 +158,7 @@ CODES = st.lists(st.sampled_from([0, 1, 2, 3, 4, 5, 10, 15, 23, 24, 57]), min_si
 UNREADABLE = st.sets(st.tuples(st.sampled_from([ACTUAL, SETPOINT]), st.integers(1, 3), st.integers(1, 4)))
 
 
+@pytest.mark.landing
 @settings(max_examples=examples(40), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(actual=CODES, setpoints=CODES, unreadable=UNREADABLE, active=st.integers(1, 4))
 def test_no_point_is_good_unless_its_meaning_was_read(
@@ -208,6 +210,7 @@ def test_no_point_is_good_unless_its_meaning_was_read(
             assert refused.code is Code.NOT_CONFIGURED, (value.leaf, refused)
 
 
+@pytest.mark.landing
 @settings(max_examples=examples(20), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     full_hz=st.lists(st.integers(300, 2000).map(lambda tenths: tenths / 10), min_size=4, max_size=4),

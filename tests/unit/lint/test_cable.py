@@ -82,6 +82,7 @@ def test_the_bit_rate_that_fits_is_named(tmp_path: Path) -> None:
     assert said.endswith("; a shorter cable"), "no bit rate has a length for that"
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize(
     ("length_m", "area_mm2", "least_mm2"),
     [(25, 0.2, 0.25), (80, 0.25, 0.34), (230, 0.34, 0.5), (480, 0.5, 0.75)],

@@ -97,7 +97,7 @@ def test_what_is_enforced_counts_only_where_an_sdo_channel_reaches_it(
     assert f"sdo_channels = {channels_to(mapping, slot)}" in fault
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(17)
 @pytest.mark.parametrize("is_open", [True, False])
 @pytest.mark.parametrize(("mapping", "slot"), WATCHING)
 def test_a_dead_bridge_is_not_known_of_what_cannot_be_reached(
@@ -158,6 +158,7 @@ def test_both_keys_of_all_drives_are_told_in_one_go(tmp_path: Path):
     assert len(told) == 2
 
 
+@pytest.mark.landing(13)
 @pytest.mark.parametrize("mapping", [name for name in FAMILIES if node_of(name)])
 def test_the_published_time_has_the_drives_own_in_it(tmp_path: Path, mapping: str):
     def worst_ms(drive: str) -> int:

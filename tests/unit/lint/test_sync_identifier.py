@@ -53,6 +53,7 @@ OTHERS = [(*one, 0xC8) for one in NAMES]
 OTHERS += [("lenze/8400-motec", "5E90:00", True, value) for value in (0x4000_0080, 0x2000_0080, 0)]
 
 
+@pytest.mark.landing(38)
 @pytest.mark.parametrize(("mapping", "name", "is_same", "value"), OTHERS)
 def test_another_identifier_than_the_bridges_is_a_fault(
     tmp_path: Path, mapping: str, name: str, is_same: bool, value: int
@@ -64,12 +65,14 @@ def test_another_identifier_than_the_bridges_is_a_fault(
     assert "configure[0]" in found
 
 
+@pytest.mark.landing(26)
 @pytest.mark.parametrize("value", [0x80, 0x8000_0080])
 @pytest.mark.parametrize(("mapping", "name"), [one[:2] for one in NAMES if one[1] != "1005:00"])
 def test_the_bridges_own_is_none(tmp_path: Path, mapping: str, name: str, value: int) -> None:
     assert not any(judge(tmp_path, mapping, SYNCHRONOUS, configure(name, value)).values())
 
 
+@pytest.mark.landing(22)
 @pytest.mark.parametrize("mapping", FAMILIES)
 def test_it_says_nothing_of_factory_settings(tmp_path: Path, mapping: str) -> None:
     assert not any(judge(tmp_path, mapping, SYNCHRONOUS).values())

@@ -33,6 +33,7 @@ def told(verdict: CheckResult) -> list[str]:
     return [str(one) for one in verdict.of(Severity.WARNING) if "fieldbus_timeout_range_ms" in str(one)]
 
 
+@pytest.mark.landing(40)
 @pytest.mark.parametrize("mapping", VENDORS)
 @pytest.mark.parametrize(
     ("more", "messages"),
@@ -70,7 +71,7 @@ def test_a_range_that_cannot_be_meant_so(
         assert any(message in one for one in found)
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("mapping", FAMILIES)
 def test_the_longest_time_is_published_beside_the_sites(tmp_path: Path, mapping: str) -> None:
     def case(more: str, timeout_ms: int = SITE_MS):

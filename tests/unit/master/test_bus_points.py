@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 from bridge.can.interface import ControllerState
 from bridge.command import EventKind
 from tests.support.bench import Bench, write_site
 
 
+@pytest.mark.landing
 def test_error_frames_are_shown_at_once_and_told_every_ten_seconds(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path))
     bench.run(1.0)
@@ -26,6 +29,7 @@ def test_error_frames_are_shown_at_once_and_told_every_ten_seconds(tmp_path: Pat
     assert re.match(r"50\d\d error frames: no acknowledge", told[1])
 
 
+@pytest.mark.landing
 def test_a_bus_that_flaps_is_told_now_and_then_and_its_last_state_always(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path))
     bench.run(1.0)

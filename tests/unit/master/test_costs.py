@@ -60,6 +60,7 @@ def of_a_tpdo(crowd: Crowd, data: bytes) -> int:
     return calls_of(crowd.bench.master.take_in)
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("nodes", [FEW, MANY])
 def test_a_frame_costs_what_comes_of_it_however_many_nodes_there_are(
     crowds: dict[int, Crowd], nodes: int
@@ -99,6 +100,7 @@ def test_what_many_nodes_cost_grows_no_faster_than_they_do(crowds: dict[int, Cro
     assert many["a second at rest"] <= 285_000
 
 
+@pytest.mark.landing
 def test_the_start_of_many_nodes_costs_no_more_for_each(tmp_path: Path) -> None:
     calls: dict[int, int] = {}
     for count in (FEW, MANY):

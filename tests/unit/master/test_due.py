@@ -213,6 +213,7 @@ def outcome_of(play: Play) -> SimpleNamespace:
     return SimpleNamespace(log=bench.log, events=events, image=image)
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize("seed", by_night_of(range(SEEDS), 4))
 def test_nothing_is_missed_and_the_same_comes_of_it(tmp_path: Path, seed: int) -> None:
     play, other = Play(tmp_path, seed), Play(tmp_path, seed)

@@ -183,6 +183,7 @@ def leaves_at(bench: Bench) -> list[float]:
     return [frame.time for frame in told if frame.data[0] in (0x02, 0x80)]
 
 
+@pytest.mark.landing(9)
 @pytest.mark.parametrize(("mapping", "kind", "caller"), by_night(CASES))
 def test_a_drive_that_hears_us_stops(tmp_path: Path, mapping: str, kind: int, caller: str) -> None:
     bench = moving(tmp_path, mapping, kind, node=LOSS if caller.startswith("lost") else "")
@@ -196,6 +197,7 @@ def test_a_drive_that_hears_us_stops(tmp_path: Path, mapping: str, kind: int, ca
     assert speed(bench.node) == 0
 
 
+@pytest.mark.landing(9)
 @pytest.mark.parametrize(("mapping", "kind", "caller"), by_night(CASES))
 def test_a_deaf_drive_stops_by_the_command_or_is_named(
     tmp_path: Path, mapping: str, kind: int, caller: str
@@ -237,6 +239,7 @@ def test_a_foreign_sync_that_does_not_come_holds_nothing_up_for_long(tmp_path: P
     assert begin + 0.1 <= leaves_at(bench)[0] <= begin + 0.13
 
 
+@pytest.mark.landing(10)
 @pytest.mark.parametrize("kind", [1, 10])
 @pytest.mark.parametrize("mapping", FAMILIES)
 def test_a_restarted_bridge_that_cannot_boot_the_node_stops_it(

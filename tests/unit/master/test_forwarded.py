@@ -228,6 +228,7 @@ def ask(bench: Bench, target: str, asked: Asked) -> tuple[Outcome, bool]:
     return outcome, sum(asked.is_said(frame.data) for frame in sent) >= 2
 
 
+@pytest.mark.landing(14)
 @pytest.mark.parametrize(("target", "node", "bus"), by_night(itertools.product(RPDO, NODES, BUSES), 4))
 def test_an_answer_says_forwarded_where_the_bus_says_what_was_asked(
     tmp_path: Path, target: str, node: str, bus: str

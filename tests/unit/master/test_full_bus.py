@@ -55,12 +55,14 @@ def test_without_a_babbling_node_the_load_is_small(bench: BusyBench) -> None:
     assert 5 < load(bench) < 60
 
 
+@pytest.mark.landing
 def test_the_load_is_shown_as_what_it_is(bench: BusyBench) -> None:
     bench.babble = LAST
     keep_running(bench, 2.2)
     assert load(bench) == pytest.approx(100.0, abs=0.5)
 
 
+@pytest.mark.landing
 def test_where_the_others_frames_are_less_urgent_everything_goes_on(bench: BusyBench) -> None:
     bench.babble = LAST
     keep_running(bench, 3.0)
@@ -85,7 +87,7 @@ def test_a_stop_waits_for_one_frame_and_for_no_more(bench: BusyBench) -> None:
     assert first.time - stopped < 5 * FRAME_S + 0.002
 
 
-@pytest.mark.landing(2)
+@pytest.mark.landing
 def test_where_nothing_gets_through_the_node_is_told_lost_and_is_not_forgotten(bench: BusyBench) -> None:
     keep_running(bench, 1.0)
     assert bench.plant.drives["conveyor/fu1"].quality.label == "good"

@@ -153,6 +153,7 @@ CASES: Final = [
 """All causes where NMT stop does nothing to the drive."""
 
 
+@pytest.mark.landing(12)
 @pytest.mark.parametrize(("mapping", "kind", "cause", "goes_on"), by_night(CASES))
 def test_what_runs_is_stopped_before_the_bus_is_left_to_another(
     tmp_path: Path, mapping: str, kind: int, cause: str, goes_on: bool
@@ -236,6 +237,7 @@ STAGES: Final[dict[str, tuple[str, Callable[[Bench], None]]]] = {
 }
 
 
+@pytest.mark.landing(14)
 @pytest.mark.parametrize(("stage", "cause"), by_night(itertools.product(STAGES, CAUSES)))
 def test_in_every_stage_the_drive_is_stopped_first(tmp_path: Path, stage: str, cause: str) -> None:
     keys, enter = STAGES[stage]
@@ -305,6 +307,7 @@ def down(bench: Bench) -> None:
     bench.run(0.02)
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize(
     ("mapping", "kind", "when", "target"),
     by_night(
@@ -342,6 +345,7 @@ def test_a_node_that_is_to_stop_is_stopped_when_the_bus_is_back(
 # a boot-up
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize(
     ("mapping", "how", "kind"),
     by_night(itertools.product(FAMILIES, ["none", "communication", "node"], TYPES)),

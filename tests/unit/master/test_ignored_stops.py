@@ -94,6 +94,7 @@ def test_a_deaf_drive_is_named_and_its_node_stopped(bench: DeafBench) -> None:
     assert str(bench.value("conveyor/node/boot_status")).startswith("stopped by the bridge: conveyor/fu1")
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(("deaf", "code"), [(False, "ok"), (True, "ignored")])
 def test_the_audit_log_has_the_end_of_a_stop(bench: DeafBench, deaf: bool, code: str) -> None:
     entries: list[AuditEntry] = []
@@ -190,6 +191,7 @@ def test_the_time_of_the_site_counts(tmp_path: Path) -> None:
     assert len(worst(bench)) == 1
 
 
+@pytest.mark.landing
 def test_a_node_that_is_lost_is_not_judged(bench: DeafBench) -> None:
     bench.node_is_deaf_to = frozenset({RPDO1})
     bench.cut = True

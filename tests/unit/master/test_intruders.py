@@ -123,6 +123,7 @@ def test_it_is_not_started_again_by_itself_but_by_command(tmp_path: Path) -> Non
     assert bench.value("conveyor/fu1/status/state") != 4, "the restart is interlocked"
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("can_id", [0x205, 0x305, 0x405, 0x505])
 def test_every_rpdo_of_the_node_is_watched_also_of_drives_that_the_site_leaves_out(
     tmp_path: Path, can_id: int
@@ -203,6 +204,7 @@ def test_only_the_node_that_it_is_about_is_stopped(tmp_path: Path) -> None:
     assert quick.states() == "oso"
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize(
     "frame", [Frame(0x202, ENABLE), Frame(0x602, WRITE), Frame(0x080), Frame(0x100, bytes(6))]
 )

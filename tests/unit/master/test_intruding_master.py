@@ -85,6 +85,7 @@ CASES: Final = [
 ]
 
 
+@pytest.mark.landing(7)
 @pytest.mark.parametrize(("mapping", "kind", "start_every_s"), by_night(CASES))
 def test_an_intruder_that_is_a_master_keeps_no_drive_running(
     tmp_path: Path, mapping: str, kind: int, start_every_s: float
@@ -132,6 +133,7 @@ def test_who_brings_a_held_node_back_is_answered_at_once(tmp_path: Path, data: b
     assert quick.told("intruder: NMT") and quick.told("intruder: NMT")[0].severity == 900
 
 
+@pytest.mark.landing(7)
 @pytest.mark.parametrize("data", [b"\1\1", b"\2\2", b"\1", b"", b"\1\7", b"\x77\2", b"\x81\1"])
 def test_who_brings_no_held_node_back_is_only_told(tmp_path: Path, data: bytes) -> None:
     quick = held(tmp_path)
@@ -197,6 +199,7 @@ def test_the_answers_stay_within_their_share_and_none_is_forgotten(tmp_path: Pat
     assert answers.next_deadline() is None
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(("mapping", "is_reset"), [("lenze/8400-motec", True), ("cia402/velocity", False)])
 def test_a_drive_that_answers_do_not_stop_is_reset_and_stays_stopped(
     tmp_path: Path, mapping: str, is_reset: bool

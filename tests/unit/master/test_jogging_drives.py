@@ -85,7 +85,7 @@ def running(folder: Path, mapping: str) -> tuple[DeafBench, str]:
     return bench, drive
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("mapping", SPEEDS)
 def test_a_drive_that_goes_deaf_while_its_owner_jogs_is_named(tmp_path: Path, mapping: str) -> None:
     bench, drive = running(tmp_path, mapping)
@@ -96,7 +96,7 @@ def test_a_drive_that_goes_deaf_while_its_owner_jogs_is_named(tmp_path: Path, ma
     assert event.message.startswith("ignores its stop: ")
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("mapping", SPEEDS)
 def test_a_drive_that_hears_is_not_named_while_its_owner_jogs(tmp_path: Path, mapping: str) -> None:
     bench, drive = running(tmp_path, mapping)

@@ -390,6 +390,7 @@ def test_a_hold_ends_with_the_bridge_that_held(tmp_path: Path) -> None:
     assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("downtime", [-0.1, 0, 0.5])
 def test_after_an_outage_of_the_bus_the_first_rpdos_are_stopped_ones(tmp_path: Path, downtime: float) -> None:
     bench = Bench(write_site(tmp_path, drive=f"telegram_downtime_s = {downtime}"))
@@ -474,6 +475,7 @@ def test_errors_ignored_or_not_a_node_that_restarts_again_and_again_is_not_enabl
         assert not moves(bench)
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("action", [Action.RESET, Action.RESET_COMMUNICATION, Action.STOP_NODE])
 def test_errors_ignored_or_not_a_node_that_we_stop_is_not_enabled(tmp_path: Path, action: Action) -> None:
     bench = Bench(write_site(tmp_path, drive=IGNORE))

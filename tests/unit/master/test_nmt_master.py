@@ -318,6 +318,7 @@ def test_a_single_node_is_never_a_duplicate(tmp_path: Path) -> None:
 # a node that boots in a loop
 
 
+@pytest.mark.landing
 def test_a_node_that_boots_in_a_loop_is_told_once_a_minute_and_does_not_load_the_bus(tmp_path: Path) -> None:
     quick = started(tmp_path, "", "")
     quick.run(30.0)
@@ -337,6 +338,7 @@ def test_a_node_that_boots_in_a_loop_is_told_once_a_minute_and_does_not_load_the
     assert quick.states() == "oo"
 
 
+@pytest.mark.landing
 def test_a_node_that_fails_a_second_after_each_start_is_asked_less_and_less_often(tmp_path: Path) -> None:
     quick = started(tmp_path, "")
     boots: list[float] = []

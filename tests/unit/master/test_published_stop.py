@@ -254,7 +254,7 @@ def test_nothing_enables_a_drive_longer_than_published(setting: Setting) -> None
     judge(see(setting))
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("kind", [0, 1, 2, 3, 255])
 @pytest.mark.parametrize(
     ("sync_ms", "deadman_ms", "timeout_ms"), [(10, 100, 130), (5, 100, 50), (20, 250, 200), (40, 400, 1000)]

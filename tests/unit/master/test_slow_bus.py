@@ -89,7 +89,7 @@ WAYS |= {
 }
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(18)
 @pytest.mark.parametrize(("way", "phase"), by_night(itertools.product(WAYS, range(PHASES)), 4))
 def test_nothing_enables_a_drive_after_its_stop(way: str, phase: int, tmp_path: Path) -> None:
     node = sites.node(sites.drive("drive", "modbus", 500, f'name = "fu1"\n{sites.SCALED}'), mapping=MAPPING)

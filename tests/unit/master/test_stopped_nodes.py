@@ -59,7 +59,7 @@ def test_a_node_that_answers_is_not_sent_it_twice(tmp_path: Path) -> None:
 # stopped by the bridge
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("supervision", SUPERVISIONS)
 @pytest.mark.parametrize("boots_for_s", [0.05, 0.25, 0.5, 0.9])
 def test_stop_all_wakes_who_was_just_booted(tmp_path: Path, supervision: str, boots_for_s: float) -> None:
@@ -123,6 +123,7 @@ def test_a_node_that_an_operator_keeps_pre_operational_can_be_started_after_stop
     assert quick.states() == "oo"
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("supervision", SUPERVISIONS)
 def test_the_lost_node_itself_hears_the_stop_and_is_woken(tmp_path: Path, supervision: str) -> None:
     """Only its own frames were lost."""

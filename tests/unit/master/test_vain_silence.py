@@ -86,6 +86,7 @@ class Silent(Bench):
         return point.value
 
 
+@pytest.mark.landing(23)
 @pytest.mark.parametrize(
     ("mapping", "slot", "node", "drive"),
     by_night((*node, drive) for node in NODES for drive in (SILENCE, THEN_SILENCE)),
@@ -212,6 +213,7 @@ def test_of_a_write_that_nobody_answered_the_watch_is_not_known(tmp_path: Path) 
     assert bench.stop_ms == plain_ms(bench)
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("drive", [SILENCE, THEN_SILENCE])
 @pytest.mark.parametrize("action", sorted(STOP_ACTIONS))
 def test_a_stop_by_anybody_is_on_the_bus_though_the_drive_gets_nothing_any_more(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from bridge.canopen.frame import Frame
 from bridge.command.drive_link import NodeState
 from tests.support.quick import OPERATIONAL, Quick, QuickNode, quick_site
@@ -39,6 +41,7 @@ def starts(quick: Quick, since: float) -> list[tuple[int, int]]:
     return [command for command in quick.nmt(since) if command == (1, 1)]
 
 
+@pytest.mark.landing
 def test_a_flapping_node_is_booted_every_ten_seconds_in_the_end(tmp_path: Path) -> None:
     quick = flapping(tmp_path)
     quick.run(60.0)
@@ -47,6 +50,7 @@ def test_a_flapping_node_is_booted_every_ten_seconds_in_the_end(tmp_path: Path) 
     assert 50 <= len(starts(quick, since)) <= 62, "at least every 10 s, and hardly more often"
 
 
+@pytest.mark.landing
 def test_a_flapping_node_is_told_of_now_and_then(tmp_path: Path) -> None:
     quick = flapping(tmp_path)
     quick.run(60.0)
@@ -57,6 +61,7 @@ def test_a_flapping_node_is_told_of_now_and_then(tmp_path: Path) -> None:
     assert quick.told("lost again and again")
 
 
+@pytest.mark.landing
 def test_being_heard_again_does_not_shorten_the_pause(tmp_path: Path) -> None:
     quick = Quick(quick_site(tmp_path, 1))
     quick.run(3.0)

@@ -190,6 +190,7 @@ CASES: Final = [
 ]
 
 
+@pytest.mark.landing(13)
 @pytest.mark.parametrize(("mapping", "failure", "place"), by_night(dict.fromkeys(CASES)))
 def test_a_drive_that_was_running_is_stopped_by_a_bridge_that_cannot_boot_it(
     tmp_path: Path, mapping: str, failure: str, place: str
@@ -207,6 +208,7 @@ def test_a_drive_that_was_running_is_stopped_by_a_bridge_that_cannot_boot_it(
     assert not is_running(restart.bench.node), "and stays stopped"
 
 
+@pytest.mark.landing
 def test_every_family_that_can_be_simulated_is_stopped(tmp_path: Path) -> None:
     """Those that are not in the table above, with the identifier that only the node knows."""
     for mapping in sorted(set(SIMULATED) - set(SOME)):
@@ -318,6 +320,7 @@ def test_it_stays_stopped_between_attempts_and_is_woken_for_each(tmp_path: Path)
     assert commands[-1] == 0x02
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("mapping", ["lenze/8400-motec", "nord/sk-tu4-cao", "stoeber/5000"])
 def test_where_a_stopped_node_runs_on_it_is_reset_and_that_once(tmp_path: Path, mapping: str) -> None:
     bench = failing(tmp_path, mapping)

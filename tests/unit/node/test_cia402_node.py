@@ -465,6 +465,7 @@ def test_pp_a_position_that_the_drive_does_not_take_is_told_and_the_next_has_its
     assert bench.value("axis/drive/actual/position") == 20_000
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("mode", ["cyclic-position", "cyclic-velocity"])
 @pytest.mark.parametrize("period_ms", [4, 10, 40])
 def test_the_interpolation_time_is_the_period_of_sync(booted, mode: str, period_ms: int) -> None:

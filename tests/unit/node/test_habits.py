@@ -72,7 +72,7 @@ def test_a_device_without_habits_is_booted_by_blocks(tmp_path: Path) -> None:
     assert block_requests(bench) == 2, "one download, one upload"
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("name", HABITS)
 def test_a_habit_keeps_no_node_out_that_can_be_used_and_is_named(tmp_path: Path, name: str) -> None:
     habit = load_habit(name)
@@ -85,7 +85,7 @@ def test_a_habit_keeps_no_node_out_that_can_be_used_and_is_named(tmp_path: Path,
         assert drive.channel is not None and drive.quality.name != "CONFIG_ERROR"
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("name", [name for name in HABITS if name.startswith("block-")])
 def test_a_broken_block_transfer_is_told_once_and_not_tried_again(tmp_path: Path, name: str) -> None:
     bench = bench_of(tmp_path, load_habit(name))
@@ -99,6 +99,7 @@ def test_a_broken_block_transfer_is_told_once_and_not_tried_again(tmp_path: Path
     assert len(told) == 1, told
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("name", [name for name in HABITS if not load_habit(name).boots])
 def test_a_device_that_cannot_be_booted_is_named_by_its_habit_instead_of_by_its_plug(
     tmp_path: Path, name: str

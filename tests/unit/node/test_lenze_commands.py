@@ -73,6 +73,7 @@ def test_the_parameters_of_a_lenze_are_saved(bench: Bench, ask: Callable[..., Ou
     assert after_the_mains_were_off(bench, ask) == 1
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(
     ("action", "more"),
     [

@@ -134,6 +134,7 @@ def test_a_setpoint_keeps_its_word_when_its_scale_is_changed_and_says_so(tmp_pat
     assert point(bench, "command/frequency")[:2] == (25.0, Quality.GOOD)
 
 
+@pytest.mark.landing
 def test_a_setpoint_of_another_scale_is_not_sent_with_the_next_enable(tmp_path: Path) -> None:
     bench = made(tmp_path)
     enable(bench, frequency=25.0)
@@ -179,7 +180,7 @@ def test_a_setting_that_is_written_through_the_bridge_counts_at_once(tmp_path: P
     assert "P105 of parameter set 1 is 100, it was 50" in bench.events[-1].message
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing
 @pytest.mark.parametrize("answer_s", [0.2, 0.25, 0.4])
 def test_a_change_is_found_within_10_s_where_answers_are_slow(tmp_path: Path, answer_s: float) -> None:
     """Codes and scales of the set in use are asked before everything that is polled."""
@@ -192,6 +193,7 @@ def test_a_change_is_found_within_10_s_where_answers_are_slow(tmp_path: Path, an
         assert [event for event in bench.events if event.message.startswith(f"P{number}")], number
 
 
+@pytest.mark.landing
 def test_what_a_drive_is_not_asked_for_long_is_in_doubt(tmp_path: Path) -> None:
     """Its SDO server is silent, and its process data go on."""
     bench = made(tmp_path)

@@ -103,6 +103,7 @@ def test_in_another_mode_a_setpoint_is_refused_and_its_bits_are_not_served(tmp_p
     assert point(bench, "command/position").quality is Quality.GOOD
 
 
+@pytest.mark.landing
 @settings(max_examples=examples(25), suppress_health_check=list(HealthCheck))
 @given(
     mapping=st.sampled_from(list(OF_MODE)),
@@ -125,6 +126,7 @@ def test_whatever_the_mode_nothing_is_good_that_means_something_else(
         assert bench.ask(Action.DISABLE_VOLTAGE, DRIVE).ok
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("mapping", OF_MODE)
 def test_a_mode_that_a_tpdo_tells_counts_at_once(tmp_path: Path, mapping: str) -> None:
     """6061h is in the TPDO, beside the bits whose meaning it says; 6060h is asked in the next second."""

@@ -63,7 +63,7 @@ def asked(folder: Path) -> list[tuple[int, int]]:
     return list(dict.fromkeys((int.from_bytes(data[1:3], "little"), data[3]) for data in reads))
 
 
-@pytest.mark.landing(2)
+@pytest.mark.landing
 @pytest.mark.parametrize("fault", [silent, misread])
 def test_what_no_rule_needs_keeps_no_node_out(tmp_path: Path, fault: Fault) -> None:
     objects = asked(tmp_path / "whole")
@@ -82,6 +82,7 @@ def test_what_no_rule_needs_keeps_no_node_out(tmp_path: Path, fault: Fault) -> N
     assert wrong == []
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("index", [0x1000, 0x1001, 0x1008, 0x100A, 0x1014, 0x1018])
 def test_a_site_file_without_rules_needs_nothing_of_who_the_node_is(tmp_path: Path, index: int) -> None:
     bench = Bench(write_site(tmp_path), present=False)

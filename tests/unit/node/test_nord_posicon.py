@@ -100,6 +100,7 @@ def test_enabling_moves_nothing(bench: Bench) -> None:
     assert actual(bench, "target_reached") is True
 
 
+@pytest.mark.landing
 def test_it_goes_to_the_position_that_is_written(bench: Bench) -> None:
     enable(bench)
     write(bench, 0.5, control_word=ENABLE, frequency=50.0, position=30.0)
@@ -221,7 +222,7 @@ def test_with_position_control_off_no_target_is_reached_and_none_is_taken(tmp_pa
     assert bench.node.drives[0].position_increments == 7_250.0
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing
 @pytest.mark.parametrize(("number", "raw", "element"), [(600, 0, 1), (SETPOINT, 4, 2), (SETPOINT, 23, 1)])
 def test_what_is_changed_on_the_way_leaves_no_target_reached(
     bench: Bench, number: int, raw: int, element: int

@@ -104,6 +104,7 @@ def status(bench: Bench) -> str:
 # §6.8 as a dialogue, for every family that has a frequency word.
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("mapping", SINGLE)
 def test_6_8_switching_a_drive_on_and_off(make_single, mapping: str):
     bench = make_single(mapping)
@@ -120,6 +121,7 @@ def test_6_8_switching_a_drive_on_and_off(make_single, mapping: str):
         assert bench.value(f"{DRIVE}/actual/frequency") == hz
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("mapping", SINGLE)
 def test_p105_is_read_from_the_drive_and_scales(make_single, mapping: str):
     bench = make_single(mapping, p105_hz=80.0)
@@ -230,6 +232,7 @@ def test_nobody_tells_the_drive_a_position_unasked(make_single, mapping: str):
     assert not [frame for frame in bench.log if frame.can_id == (0x305 if "5xxe" in mapping else 0x405)]
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(
     ("mapping", "cob_id"), [("nord/sk-5xxe-rj45-encoder", 0x305), ("nord/sk-54xe-rj45-encoder", 0x405)]
 )
@@ -243,6 +246,7 @@ def test_a_controller_may_play_the_encoder(make_single, mapping: str, cob_id: in
 # Faults and watches
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("mapping", SINGLE)
 def test_a_fault_is_told_by_its_number_and_acknowledged(make_single, mapping: str):
     bench = make_single(mapping)
@@ -260,6 +264,7 @@ def test_a_fault_is_told_by_its_number_and_acknowledged(make_single, mapping: st
     assert bench.value(f"{DRIVE}/supervision/last_fault") == 2.1
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("mapping", SINGLE)
 def test_a_silent_bridge_is_stopped_by_p513(make_single, mapping: str):
     bench = make_single(mapping, p513_s=0.3)
@@ -334,6 +339,7 @@ def test_p151_watches_in_the_profile_too(make_profile):
 # The SK CU4-CAO
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("layout", ["three", "five"])
 def test_a_cu4_is_a_tu4_in_either_layout(make, layout: str):
     bench = make(

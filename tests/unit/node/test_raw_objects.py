@@ -39,6 +39,7 @@ def test_bytes_are_written_and_the_point_shows_the_value(parameters: Parameters)
     assert parameters.point("p102") == (1.03, Quality.GOOD)
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("value", ["6", "xy", 103, "FF 7F"])
 def test_what_the_parameter_does_not_take_is_not_sent(parameters: Parameters, value: str | int) -> None:
     outcome = parameters.ask(WRITE, parameter="P102", value=value, raw=True)
@@ -46,6 +47,7 @@ def test_what_the_parameter_does_not_take_is_not_sent(parameters: Parameters, va
     assert parameters.downloads(0x2066) == []
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("address", ["3000:01", "1017:00", "1400:01", "1010:01"])
 def test_what_is_protected_is_protected_as_bytes(parameters: Parameters, address: str) -> None:
     index = int(address[:4], 16)

@@ -105,6 +105,7 @@ def test_a_stop_after_the_owner_fell_silent_is_judged_by_itself(tmp_path: Path) 
     assert "6411h:02 (lamp) holds 0003h" in told(bench)[-1][1]
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize(
     ("prepare", "reason"),
     [

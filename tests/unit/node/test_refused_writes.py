@@ -68,7 +68,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("what", REFUSED)
 def test_it_counts_once_and_is_one_event(bench: Bench, what: str) -> None:
     before = bench.number("bridge/refused_writes")

@@ -165,7 +165,7 @@ CASES: Final = [
 ]
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(8)
 @pytest.mark.parametrize(("mapping", "answer_s"), CASES)
 def test_a_change_is_found_whatever_decides_a_value(tmp_path: Path, mapping: str, answer_s: float) -> None:
     bench = made(tmp_path, mapping, answer_s)

@@ -128,6 +128,7 @@ def test_a_silent_bridge_is_stopped_by_life_guarding(bench: Bench):
     assert bench.node.slave.state is SlaveState.PRE_OPERATIONAL
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("action", [Action.STOP, Action.QUICK_STOP])
 def test_stop_and_quick_stop_brake(bench: Bench, action: Action):
     start(bench)
@@ -217,6 +218,7 @@ def test_four_axes_one_at_a_time(make):
     assert bench.value("lift/axis1/actual/velocity") == 300.0
 
 
+@pytest.mark.landing
 def test_sdo_channel_n_reads_the_scaling_of_axis_n(make):
     mapping = "stoeber/5000-four-axes"
     bench = make(mapping, FOUR, "sdo_channels = [2, 3, 4]", axes=4)

@@ -117,6 +117,7 @@ def test_homing_by_the_control_word(bench: Bench):
     assert (actual(bench, "position"), axis(bench).place) == (700, HOME_AT + 700)
 
 
+@pytest.mark.landing
 def test_a_limit_switch_is_told(bench: Bench):
     enable(bench)
     write(bench, 15.0, control_word=ABSOLUTE, position=-150_000, velocity=18_000)
@@ -126,6 +127,7 @@ def test_a_limit_switch_is_told(bench: Bench):
     assert actual(bench, "target_reached") is False
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("action", [Action.STOP, Action.DISABLE_VOLTAGE])
 def test_a_stop_forgets_the_position(bench: Bench, action: Action):
     enable(bench)

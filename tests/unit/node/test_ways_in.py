@@ -156,7 +156,7 @@ WAYS: Final[dict[str, tuple[Way, bool]]] = {
 }
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(5)
 @pytest.mark.parametrize(("way", "moving"), list(itertools.product(WAYS, (False, True))))
 def test_an_output_is_reached_by_no_way_but_its_owners(tmp_path: Path, way: str, *, moving: bool) -> None:
     write, is_engineer = WAYS[way]

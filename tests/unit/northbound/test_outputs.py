@@ -83,6 +83,7 @@ class TestModbus:
         assert bench.node.number("6200:01") == 0
         assert bench.value("shaft/supervision/owner") == ""
 
+    @pytest.mark.landing(7)
     @pytest.mark.parametrize(
         ("start", "words", "code"),
         [

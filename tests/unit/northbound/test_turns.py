@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -88,6 +89,7 @@ STEPS = st.lists(
 )
 
 
+@pytest.mark.landing
 @given(STEPS)
 def test_everybody_who_waits_has_one_turn(steps: list[tuple[str, int]]) -> None:
     turns = Turns[int]()

@@ -195,6 +195,7 @@ def refused(access: DriveParameters, text: str, address: ObjectRef) -> bool:
     return entry.address != address
 
 
+@pytest.mark.landing(22)
 @pytest.mark.parametrize("mapping", FAMILIES)
 def test_no_spelling_of_what_is_protected_is_written(mapping: str) -> None:
     access = access_to(mapping)
@@ -283,6 +284,7 @@ def state(bench: Bench, name: str) -> object:
     return bench.value(f"{name}/status/state")
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("mapping", DEAF)
 @pytest.mark.parametrize("who", [ENGINEER, CONTROLLER], ids=str)
 def test_a_drive_is_not_made_deaf_by_another_name(tmp_path: Path, mapping: str, who: Identity) -> None:

@@ -35,6 +35,7 @@ def test_every_fault_is_found_by_the_tests_that_are_named_for_it() -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.landing
 def test_a_fault_that_no_test_notices_is_named(tmp_path: Path) -> None:
     table = tmp_path / "seeded.toml"
     kept = ["[[file]]", 'file = "node/put_off.py"', 'tests = "tests/unit/node"', "fault = ["]

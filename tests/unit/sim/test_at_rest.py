@@ -95,6 +95,7 @@ async def at_rest(site: Path, counts: Counter[str]) -> Counter[int]:
     return sent
 
 
+@pytest.mark.landing
 def test_a_node_that_is_told_the_same_looks_at_nothing_anew(
     tmp_path: Path, loop: VirtualLoop, counts: Counter[str]
 ) -> None:

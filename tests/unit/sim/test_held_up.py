@@ -64,7 +64,7 @@ async def longest_silence(loop: VirtualLoop, site: Path, seed: int) -> dict[int,
     return silence
 
 
-@pytest.mark.landing(5)
+@pytest.mark.landing
 @pytest.mark.parametrize("seed", range(5))
 def test_a_pause_of_the_process_is_no_silence_of_its_nodes(
     tmp_path: Path, loop: VirtualLoop, seed: int

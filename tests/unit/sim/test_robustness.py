@@ -287,7 +287,7 @@ KINDS: Final[Mapping[str, Kind]] = {
 }
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("name", KINDS)
 @settings(max_examples=EXAMPLES, deadline=None)
 @given(data=st.data())

@@ -41,6 +41,7 @@ def by_the_page(asked: dict[str, object]) -> dict[str, list[Any]]:
     return json.loads(run.stdout)
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize(
     ("said", "english", "german"),
     [

@@ -188,6 +188,7 @@ _LINE = st.one_of(
 )
 
 
+@pytest.mark.landing
 @settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(_LINE, max_size=12).map("\n".join))
 @example("[" * 2000)

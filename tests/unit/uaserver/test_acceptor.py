@@ -43,6 +43,7 @@ async def test_noise_ends_a_connection_and_is_counted_once() -> None:
         assert application.broken == 1
 
 
+@pytest.mark.landing
 async def test_a_hello_that_takes_no_answer_is_refused() -> None:
     application = Served()
     where = b"opc.tcp://x"
@@ -54,6 +55,7 @@ async def test_a_hello_that_takes_no_answer_is_refused() -> None:
     assert (application.refused, application.broken) == (1, 0)
 
 
+@pytest.mark.landing
 async def test_a_chunk_beyond_the_limit_is_not_waited_for() -> None:
     application = Served()
     async with serving(application) as url:

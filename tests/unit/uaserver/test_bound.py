@@ -40,6 +40,7 @@ async def serving(application: Served) -> AsyncIterator[str]:
         bound.close()
 
 
+@pytest.mark.landing
 async def test_an_application_without_a_bridge_is_served() -> None:
     application = Served({"anonymous": User("anonymous", is_anonymous=True)})
     async with serving(application) as url, Client(url) as client:
@@ -51,6 +52,7 @@ async def test_an_application_without_a_bridge_is_served() -> None:
     assert application.told[-1] == ("anonymous", False, False)
 
 
+@pytest.mark.landing
 async def test_who_is_not_identified_is_refused_and_counted() -> None:
     application = Served()
     async with serving(application) as url:

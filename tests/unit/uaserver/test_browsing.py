@@ -49,6 +49,7 @@ def names(result: ua.BrowseResult) -> list[str]:
     return [one.BrowseName.Name for one in result.References]
 
 
+@pytest.mark.landing
 async def test_a_browse_goes_on_where_it_stopped(space: AddressSpace) -> None:
     browser = Browser(space)
     (whole,) = await browse(browser, asked())

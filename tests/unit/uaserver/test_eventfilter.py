@@ -20,6 +20,7 @@ from tests.support.opcua_filters import (
 Codes, Ids, Kind, Op = ua.StatusCodes, ua.ObjectIds, ua.VariantType, ua.FilterOperator
 
 
+@pytest.mark.landing(16)
 @pytest.mark.parametrize(
     ("operand", "code"),
     [

@@ -15,6 +15,7 @@ from tests.support.opcua_filters import (
 Codes, Ids, Kind, Op = ua.StatusCodes, ua.ObjectIds, ua.VariantType, ua.FilterOperator
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize(
     ("wrong", "attribute", "code"),
     [

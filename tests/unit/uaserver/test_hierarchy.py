@@ -15,6 +15,7 @@ def node(number: int) -> ua.NodeId:
     return ua.NodeId(number)
 
 
+@pytest.mark.landing
 def test_a_type_is_its_own_subtype_and_supertype(space: AddressSpace) -> None:
     audit = node(Ids.AuditEventType)
     assert supertypes(space, audit) == [audit, node(Ids.BaseEventType), node(Ids.BaseObjectType)]

@@ -58,6 +58,7 @@ def wanted(
     return ua.MonitoredItemCreateRequest(ua.ReadValueId(where, attribute), mode, asked)
 
 
+@pytest.mark.landing
 async def test_an_item_is_told_what_there_is_and_every_change(rig: Rig) -> None:
     (made,) = await rig.create(wanted())
     assert made.StatusCode.is_good()

@@ -25,6 +25,7 @@ def node(name: str) -> ua.NodeId:
     return ua.NodeId(getattr(ua.ObjectIds, name))
 
 
+@pytest.mark.landing
 def test_each_value_stands_in_its_node(described: AddressSpace) -> None:
     for name, value in VALUES.items():
         found = described.read_attribute_value(node(name), Ids.Value)

@@ -28,6 +28,7 @@ from tests.support.opcua_filters import (
 Codes, Ids, Kind, Op = ua.StatusCodes, ua.ObjectIds, ua.VariantType, ua.FilterOperator
 
 
+@pytest.mark.landing(25)
 @pytest.mark.parametrize(
     ("elements", "passes"),
     [
@@ -151,6 +152,7 @@ def test_any_two_kinds_can_be_compared(types: EventTypes, comparison: ua.FilterO
         assert event_filter(asked(element), types).passes(EVENT) in (True, False)
 
 
+@pytest.mark.landing
 @given(st.lists(ELEMENTS, max_size=8))
 @settings(max_examples=300)
 def test_every_clause_is_judged_or_refused(

@@ -92,7 +92,7 @@ ODD_TITLES = (
 )
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(24)
 @pytest.mark.parametrize("eds", ODD_TITLES)
 @pytest.mark.parametrize("place", range(4))
 @pytest.mark.parametrize("value", ['"hold"', "3", "0"])
@@ -199,6 +199,7 @@ SAFE_1 = f"{OWNED}on_expiry = {{ digital_outputs_1_to_8 = 1 }}"
 HELD_1 = f'{OWNED}on_expiry = {{ digital_outputs_1_to_8 = "hold" }}'
 
 
+@pytest.mark.landing(12)
 @pytest.mark.parametrize(
     ("section", "value", "outputs", "why"),
     [
@@ -290,6 +291,7 @@ def judged(path: Path) -> tuple[float, dict[str, WorstCase]]:
     return verdict.loads[0].most_percent, {case.drive: case for case in verdict.worst_cases}
 
 
+@pytest.mark.landing(9)
 @pytest.mark.parametrize("rate", [50_000, 125_000, 1_000_000])
 @pytest.mark.parametrize("nodes", [1, 3, 9])
 def test_nobody_is_held_to_less_than_the_bridge_publishes(tmp_path: Path, rate: int, nodes: int) -> None:

@@ -47,7 +47,7 @@ _FULL_PERCENT = 75
 FAMILIES = [(mapping, slot.name) for mapping in family_names() for slot in load_family(mapping).slot]
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(13)
 @pytest.mark.parametrize(("mapping", "slot"), FAMILIES)
 def test_both_say_the_same_of_every_word(tmp_path: Path, mapping: str, slot: str) -> None:
     family = load_family(mapping)

@@ -226,6 +226,7 @@ async def move(url: str) -> None:
         break_off(second)
 
 
+@pytest.mark.landing
 async def test_each_private_name_is_there(tmp_path: Path) -> None:
     async with serving(OPEN, tmp_path) as (server, _), connected(server) as client:
         await (await client.create_subscription(500, Listens())).subscribe_data_change(

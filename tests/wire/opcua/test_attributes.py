@@ -33,6 +33,7 @@ def walked(space: AddressSpace) -> list[ua.NodeId]:
     return sorted(found)
 
 
+@pytest.mark.landing
 async def test_no_attribute_of_any_node_is_good_and_null(served: Served, client: Client) -> None:
     (session,) = sessions(served[0])
     nodes = walked(session.aspace)

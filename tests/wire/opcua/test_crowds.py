@@ -185,6 +185,7 @@ class TestSubscriptions:
                 break_off(crashed)
                 await asyncio.sleep(0.1)
 
+    @pytest.mark.landing
     async def test_monitored_items_are_shared_out(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -198,6 +199,7 @@ class TestSubscriptions:
                 ua.StatusCodes.BadTooManyMonitoredItems
             }
 
+    @pytest.mark.landing
     async def test_requests_that_come_at_once_share_what_there_is(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -211,6 +213,7 @@ class TestSubscriptions:
 
             assert sum(await asyncio.gather(watch(one), watch(two))) == 150
 
+    @pytest.mark.landing
     async def test_one_address_watches_one_value_so_often(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -224,6 +227,7 @@ class TestSubscriptions:
                 other = await subscription.subscribe_data_change(client.nodes.namespace_array)
                 await subscription.unsubscribe([*made[:10], other])
 
+    @pytest.mark.landing
     async def test_one_address_does_not_take_all_items_for_events(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

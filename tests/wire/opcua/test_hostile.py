@@ -165,6 +165,7 @@ def type_of_answer(kind: type) -> type:
     return getattr(ua, kind.__name__.replace("Request", "Response"))
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize("kind", WITH_STRINGS, ids=lambda kind: kind.__name__)
 async def test_every_string_of_every_service(served: Served, bystander: Seen, kind: type) -> None:
     async with come_far_enough_for(kind, served) as client:
@@ -179,6 +180,7 @@ async def test_every_string_of_every_service(served: Served, bystander: Seen, ki
     await assert_unharmed(served, bystander)
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize("kind", requests(), ids=lambda kind: kind.__name__)
 async def test_null_arrays_are_empty_ones(
     served: Served, bystander: Seen, kind: type, caplog: pytest.LogCaptureFixture
@@ -368,6 +370,7 @@ async def test_a_stream_of_malformed_requests_costs_one_line(served: Served) -> 
     assert "malformed messages from 127.0.0.1" in lines[0]
 
 
+@pytest.mark.landing
 async def test_a_front_that_tells_of_no_change_any_more_is_started_anew(tmp_path: Path) -> None:
     async with serving(OPEN, tmp_path) as (server, _):
         failed = asyncio.create_task(server.failed())

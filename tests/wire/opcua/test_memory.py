@@ -116,6 +116,7 @@ async def test_all_together_hold_a_fixed_sum(tmp_path: Path, monkeypatch: pytest
             await bystander.nodes.server_state.read_value()
 
 
+@pytest.mark.landing
 async def test_answers_that_nobody_reads_are_part_of_the_sum(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

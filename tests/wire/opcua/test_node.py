@@ -90,6 +90,7 @@ async def test_node_opcua_browses_reads_writes_subscribes_and_calls(encrypted: b
     }
 
 
+@pytest.mark.landing
 async def test_node_opcua_walks_through_the_services(tmp_path: Path) -> None:
     async with serving(OPEN, tmp_path) as (server, _):
         seen = await answers("services.mjs", tmp_path, server.endpoint_url)

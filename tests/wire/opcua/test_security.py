@@ -89,6 +89,7 @@ class TestEncrypted:
             assert str(strict[1].requests[-1].identity) == "opcua:anna"
             assert strict[1].requests[-1].identity.address == "127.0.0.1"
 
+    @pytest.mark.landing(5)
     @pytest.mark.parametrize(
         ("user", "password"),
         [("anna", "wrong"), ("anna", ""), ("nobody", PASSWORD), ("admin", PASSWORD), ("Admin", "")],

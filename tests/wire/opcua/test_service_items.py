@@ -36,6 +36,7 @@ Codes, Ids, Attribute, Errors, Mode, Times = (
 
 
 class TestItems:
+    @pytest.mark.landing
     async def test_the_settings_are_those_that_are_used(self, client: Client) -> None:
         number = await subscription(client, 100)
         node = await point(client, LOAD)

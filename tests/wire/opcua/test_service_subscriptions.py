@@ -31,6 +31,7 @@ Codes, Errors = ua.StatusCodes, ua.uaerrors
 
 
 class TestSubscriptions:
+    @pytest.mark.landing
     async def test_what_is_revised_is_what_is_used(self, client: Client) -> None:
         made = await subscribed(client, 1, RequestedLifetimeCount=1, RequestedMaxKeepAliveCount=2)
         agreed = (made.RevisedPublishingInterval, made.RevisedLifetimeCount, made.RevisedMaxKeepAliveCount)

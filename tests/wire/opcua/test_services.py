@@ -39,6 +39,7 @@ Codes, Ids, Attribute, Errors, Times = (
 # the table
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize(
     "service",
     [one for name, services in SERVICES.items() if name != "SecureChannel" for one in services],

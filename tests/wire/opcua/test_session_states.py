@@ -120,6 +120,7 @@ def services() -> Iterator[tuple[Need, str]]:
         yield Need.USE, route.name
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("state", RequestSession)
 async def test_every_service_is_answered_as_the_table_says(
     server: OpcUaServer, state: RequestSession

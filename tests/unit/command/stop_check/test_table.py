@@ -39,6 +39,7 @@ def space(name: str) -> StopSpace:
     return StopSpace(PROFILES[name]) if name in PROFILES else StopSpace(ON_CHANGE[name], pause=None)
 
 
+@pytest.mark.landing
 @pytest.mark.parametrize("name", by_night_of(sorted(_EVERY, key=_BIG.__contains__), len(_EVERY) - len(_BIG)))
 def test_whatever_happens_keeps_the_rules(name: str) -> None:
     explored = space(name)
@@ -80,7 +81,7 @@ def _wrong_outcomes() -> Iterator[Any]:
             yield pytest.param(_OUTCOMES, cell, (outcome, deeds), id=f"{label}: outcome")
 
 
-@pytest.mark.landing(6)
+@pytest.mark.landing(10)
 @pytest.mark.parametrize(("table", "cell", "wrong"), [*_wrong_places(), *_wrong_outcomes()])
 def test_a_fault_in_any_cell_is_found(table: str, cell: object, wrong: object) -> None:
     with patch.dict(getattr(judge, table), {cell: wrong}):

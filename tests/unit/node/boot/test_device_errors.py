@@ -235,6 +235,7 @@ EVENTS = ("disturb", "start the drive", "unplug", "plug", "power cycle", "stop t
 happenings = st.tuples(st.sampled_from(EVENTS), st.sampled_from((0.2, 2.5, 6.0)))
 
 
+@pytest.mark.landing
 @given(st.lists(happenings, max_size=6), st.booleans())
 @settings(max_examples=8)
 def test_whatever_happens_no_running_drive_is_reset_and_none_twice_for_one_error(

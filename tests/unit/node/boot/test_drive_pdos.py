@@ -63,6 +63,7 @@ def test_a_good_node_has_a_plan_for_each_drive(tmp_path: Path) -> None:
     assert [plan.problem for plan in result.drives.values()] == ["", ""]
 
 
+@pytest.mark.landing(18)
 @pytest.mark.parametrize("cob_id", [0x000, 0x080, 0x085, 0x100, 0x585, 0x605, 0x705, 0x7E5, 0x2000_0205])
 @pytest.mark.parametrize("parameter", [0x1400, 0x1800])
 def test_an_identifier_that_belongs_to_something_else_is_used_for_no_pdo(

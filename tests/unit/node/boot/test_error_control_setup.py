@@ -84,6 +84,7 @@ def test_a_node_that_beats_faster_than_asked_is_no_duplicate(tmp_path: Path) -> 
     assert quick.value("bus/can0/duplicate_ids") == ""
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("kept_ms", [0, 101, 1000, 5])
 def test_a_period_that_does_not_do_is_told(tmp_path: Path, kept_ms: int) -> None:
     quick = quick_with(tmp_path, Keeps(lambda period_ms: kept_ms if period_ms else 0))

@@ -73,6 +73,7 @@ STOPPING = [
 ]
 
 
+@pytest.mark.landing(11)
 @pytest.mark.parametrize(("mapping", "node", "parameters", "bound_ms"), STOPPING)
 def test_a_dead_bridge_shows_in_the_drive_within_the_published_time(
     make, mapping: str, node: str, parameters: dict[str, float], bound_ms: int
@@ -100,6 +101,7 @@ RUNNING_ON = [
 ]
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize(("mapping", "node", "parameters", "why"), RUNNING_ON)
 def test_a_drive_that_would_run_on_is_a_configuration_error(
     make, mapping: str, node: str, parameters: dict[str, float], why: str
@@ -225,7 +227,7 @@ def test_a_value_that_is_not_kept_is_written_once(make) -> None:
 # the drop test
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing(4)
 @pytest.mark.parametrize(("mapping", "node", "parameters", "bound_ms"), STOPPING)
 def test_a_drop_test_proves_the_drives_own_time(
     make, mapping: str, node: str, parameters: dict[str, float], bound_ms: int
@@ -273,6 +275,7 @@ def test_where_the_site_stops_by_silence_a_drop_test_ends_the_rpdos_alone(make, 
         assert [frame for frame in bench.sent(other) if last + 0.1 < frame.time < again - 0.1]
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(
     ("mapping", "node"), [("lenze/8400-motec", HEARTBEAT_LENZE), ("stoeber/5000", GUARDED)]
 )

@@ -31,6 +31,7 @@ def was_started(bench: Bench) -> bool:
     return START in [frame._replace(time=0.0) for frame in bench.log]
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize(
     ("rule", "letter", "where"),
     [
@@ -85,6 +86,7 @@ def test_a_node_whose_heartbeat_does_not_come_is_k(tmp_path: Path) -> None:
     assert not was_started(bench)
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize("answers", range(1, 30, 4))
 def test_a_time_out_has_the_letter_of_its_step_and_the_node_is_lost(tmp_path: Path, answers: int) -> None:
     bench = Bench(write_site(tmp_path))

@@ -157,6 +157,7 @@ def test_what_the_drive_holds_already_is_not_written_again(parameters: Parameter
     assert parameters.node.drives[0].parameters.eeprom_writes == 0
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("identity", [OPERATOR, OBSERVER, Identity(Source.MODBUS, "10.0.0.1")])
 def test_who_is_no_engineer_writes_nothing(parameters: Parameters, identity: Identity) -> None:
     for action, more in ((WRITE, {"parameter": "P102", "value": 1.0}), (SAVE, {})):
@@ -179,6 +180,7 @@ def test_without_roles_only_who_controls_the_drive_sets_its_parameters(parameter
     assert parameters.ask(WRITE, ENGINEER, parameter="P102", value=1.0).ok, "an engineer may all the same"
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize(
     ("name", "value", "code"),
     [
@@ -336,6 +338,7 @@ def test_what_was_read_is_not_a_present_value_once_the_node_is_gone(parameters: 
 # what commands or supervises a drive
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("name", ["3000:00", "3005:01", "6040:00", "6042:00", "6060:00"])
 def test_what_commands_a_drive_is_no_parameter(parameters: Parameters, name: str) -> None:
     outcome = parameters.write(name, 1)
@@ -343,6 +346,7 @@ def test_what_commands_a_drive_is_no_parameter(parameters: Parameters, name: str
     assert not parameters.downloads(int(name[:4], 16))
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("name", ["P509", "P510", "P513", "P151", "2201:00", "P120[1]"])
 def test_only_an_engineer_sets_what_supervises_a_drive(parameters: Parameters, name: str) -> None:
     plc = Identity(Source.MODBUS, "10.0.0.1", sets_parameters=True)
@@ -359,6 +363,7 @@ def test_what_supervises_a_drive_is_not_set_while_it_is_enabled(parameters: Para
     assert "while the drive is enabled" in drive_word[0].message
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(("name", "index"), [("P513", 0x2201), ("P509", 0x21FD)])
 def test_whether_it_is_enabled_is_judged_again_when_its_turn_has_come(
     parameters: Parameters, name: str, index: int

@@ -204,6 +204,7 @@ _STEPS = st.lists(
 )
 
 
+@pytest.mark.landing
 @settings(max_examples=examples(60), suppress_health_check=list(HealthCheck))
 @given(steps=_STEPS)
 @example(steps=[("safe", 0), ("active", 0), ("cut", 0), ("restart", 1), ("back", 200)])

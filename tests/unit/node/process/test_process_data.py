@@ -120,6 +120,7 @@ class TestValues:
         assert bench.value(f"{DRIVE}/command/target_high") == 0xFFFF
         assert bench.value(f"{DRIVE}/command/target") == -95.0
 
+    @pytest.mark.landing(7)
     @pytest.mark.parametrize(
         ("values", "message"),
         [

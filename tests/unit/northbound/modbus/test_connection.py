@@ -6,6 +6,7 @@ import struct
 from collections.abc import Callable
 from itertools import pairwise
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -63,6 +64,7 @@ STREAM = b"".join(
 )
 
 
+@pytest.mark.landing
 def test_every_cut_of_the_stream_gives_the_same_answers():
     whole, fault = talk([STREAM])
     assert fault == ""
@@ -161,6 +163,7 @@ def pdus(draw: st.DrawFn) -> bytes:
     return struct.pack(">BH", function, start) + tail
 
 
+@pytest.mark.landing
 @settings(max_examples=examples(300), deadline=None)
 @given(st.lists(st.tuples(st.sampled_from([0, 1, 2, 9, 33, 255]), pdus()), max_size=12))
 def test_any_request_gets_one_well_formed_answer(requests: list[tuple[int, bytes]]):

@@ -12,6 +12,7 @@ from tests.support.modbus_site import (
 )
 
 
+@pytest.mark.landing(29)
 @pytest.mark.parametrize(
     ("pdu", "answer"),
     [

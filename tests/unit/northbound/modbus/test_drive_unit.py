@@ -90,6 +90,7 @@ def test_single_registers(rig: Rig):
         assert seen[-1].action == action
 
 
+@pytest.mark.landing(30)
 @pytest.mark.parametrize(
     ("start", "words", "code"),
     [
@@ -225,6 +226,7 @@ class TestStopForEverybody:
         assert rig.sent[:2] == (0x047F, 0x2000)
         return rig
 
+    @pytest.mark.landing(6)
     @pytest.mark.parametrize(("code", "word"), [(1, 0x047E), (2, 0x047B), (3, 0x0474)])
     @pytest.mark.parametrize("caller", [PLC, OTHER_PLC])
     def test_stops_by_every_function_that_writes_registers(self, code: int, word: int, caller: Identity):

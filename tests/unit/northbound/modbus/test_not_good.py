@@ -160,7 +160,7 @@ class Model:
 STEPS = st.one_of(st.integers(0, 3), st.sampled_from((0.01, 0.06, 0.11)))
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("mapping", family_names())
 @settings(max_examples=examples(15))
 @given(

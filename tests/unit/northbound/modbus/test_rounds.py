@@ -101,6 +101,7 @@ def waits(loop: Loop, crowd: list[Client], good: Client) -> list[int]:
     return found
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize("count", [10, 100])
 @pytest.mark.parametrize("pipelined", [1, 64], ids=["one by one", "pipelined"])
 @pytest.mark.parametrize("hosts", [1, 100], ids=["of one address", "of many"])

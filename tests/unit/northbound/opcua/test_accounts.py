@@ -22,6 +22,7 @@ class TestPasswords:
         assert first != second
         assert "swordfish" not in first
 
+    @pytest.mark.landing
     def test_only_the_right_password_is_right(self) -> None:
         line = hash_password("swordfish")
         assert verify_password(line, "swordfish")
@@ -30,6 +31,7 @@ class TestPasswords:
         assert not verify_password("nonsense", "swordfish")
         assert not verify_password(None, "nobody")
 
+    @pytest.mark.landing
     async def test_a_user_has_the_role_of_the_site_file(self) -> None:
         line = hash_password("swordfish")
         users = Accounts(OpcUaTable(user=[UserTable(name="eva", role="engineer", password_hash=line)]))

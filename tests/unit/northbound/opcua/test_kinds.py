@@ -27,6 +27,7 @@ def variables() -> list[VariableNode]:
     return bridge.variables
 
 
+@pytest.mark.landing
 def test_nodes_of_one_kind_share_what_they_have(space: AddressSpace) -> None:
     kinds = Kinds(space)
     first, second, number = map(kinds.of, variables())

@@ -74,7 +74,7 @@ def tree(space: AddressSpace, image: Image) -> Tree:
     return tree_in(space, image)
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing
 @pytest.mark.parametrize("name", PLANTS)
 def test_clients_see_what_asyncua_would_have_held(name: str, standard: AddressSpace, tmp_path: Path) -> None:
     image = PLANTS[name](tmp_path).image
@@ -182,6 +182,7 @@ class TestWhatIsHeld:
     def browse(space: AddressSpace, name: str) -> list[ua.NodeId]:
         return list(below(space, ua.NodeId(name, NAMESPACE)))
 
+    @pytest.mark.landing
     def test_before_anybody_looks_it_is_one_small_object_for_each_node_that_is_no_property(
         self, standard: AddressSpace
     ) -> None:

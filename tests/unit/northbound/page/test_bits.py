@@ -268,7 +268,7 @@ def test_what_a_running_drive_is_said_to_do_it_does(tmp_path: Path, mapping: str
                     assert bit == table[text], f"{text}: {bit} ({word:04X}h)"
 
 
-@pytest.mark.landing(5)
+@pytest.mark.landing(9)
 @pytest.mark.parametrize("action", [Action.QUICK_STOP, Action.DISABLE_VOLTAGE])
 @pytest.mark.parametrize("mapping", MAPPINGS)
 def test_the_bit_that_stops_a_drive_is_said_to(tmp_path: Path, mapping: str, action: Action) -> None:

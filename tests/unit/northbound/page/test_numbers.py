@@ -87,6 +87,7 @@ _LIMITS: Final = [
 ]
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("language", ["en", "de"])
 def test_what_the_page_shows_as_allowed_is_allowed_and_can_be_typed(language: str) -> None:
     script = ["node", "--input-type=module", "--eval", _SHOW_ALL, language, json.dumps(_LIMITS)]

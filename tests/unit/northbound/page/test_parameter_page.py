@@ -40,6 +40,7 @@ def test_each_drive_has_its_parameters_with_range_states_and_wear() -> None:
     assert "protected" in by_name["P509"]
 
 
+@pytest.mark.landing(22)
 @pytest.mark.parametrize("mapping", family_names(mapping_folders()))
 def test_the_parameters_of_every_family_can_be_listed(mapping: str) -> None:
     family = load_family(mapping)

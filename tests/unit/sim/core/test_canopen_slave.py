@@ -31,6 +31,7 @@ def test_nmt_commands_work_addressed_and_for_all(bench, command, state, node):
     assert bench.guard()[-1].data[0] & 0x7F == state
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("data", ["0106", "01", "010500", "0505", ""])
 def test_other_nmt_frames_change_nothing(bench, data):
     bench.put(0, data)
@@ -172,6 +173,7 @@ def test_types_1_to_240_send_at_every_nth_sync(live, every):
     assert tpdos(live.run(1.0)) == []
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize("value", [241, 251, 252, 253])
 def test_reserved_transmission_types_are_refused(bench, value):
     assert bench.write(0x1800, 2, value, 1) == "06090030"
@@ -248,6 +250,7 @@ def test_bit_31_switches_a_pdo_off_and_bit_30_reads_1(bench):
     assert [frame.can_id for frame in bench.nmt(START)] == [0x285, 0x385, 0x485]
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("value", [0x2000_0185, 0x0000_0800, 0x4000_0000, 0x4000_0605, 0x4000_0705])
 def test_forbidden_cob_ids_are_refused(bench, value):
     assert bench.write(0x1800, 1, value, 4) == "06090030"
@@ -282,6 +285,7 @@ def test_a_mapping_changes_only_in_pre_operational_and_only_at_count_0(live):
     assert live.write(0x1A00, 1, 0x3001_0210, 4) == "60"
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize(
     ("index", "word", "code"),
     [

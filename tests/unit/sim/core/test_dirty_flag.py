@@ -208,6 +208,7 @@ class Traffic:
         return Frame(0x605, struct.pack("<BHBI", *what, random.choice(VALUES)))
 
 
+@pytest.mark.landing(13)
 @pytest.mark.parametrize("seed", by_night_of(range(12), 4))
 @pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 def test_who_looks_at_everything_sends_the_same_at_the_same_time(family: Family, seed: int) -> None:

@@ -32,6 +32,7 @@ def test_the_device_name_comes_in_segments(bench):
     assert bench.sdo("60 00 00 00 00 00 00 00")[:2] == "80", "the transfer is over"
 
 
+@pytest.mark.landing(17)
 @pytest.mark.parametrize(
     ("request_", "code", "why"),
     [

@@ -25,6 +25,7 @@ def test_a_value_is_put_into_its_object() -> None:
         put_in(entry, "6083", 101.0, 101)
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize(
     ("index", "is_command", "why"),
     [

@@ -82,6 +82,7 @@ def test_a_family_of_its_own_is_booted_started_and_stopped(tmp_path: Path) -> No
     assert drive.channel.state is DriveState.SWITCH_ON_INHIBITED
 
 
+@pytest.mark.landing(22)
 @pytest.mark.parametrize("mapping", SIMULATED)
 def test_every_mapping_can_be_played(tmp_path: Path, mapping: str) -> None:
     family = load_family(mapping)

@@ -18,6 +18,7 @@ def test_a_parameter_and_its_object_are_one(bench):
     assert bench.read(parameter(164), 4) == 100
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(("element", "direction"), [(6, "send"), (6, "receive")])
 def test_p160_switches_each_half_of_a_pdo(bench, element, direction):
     assert bench.read(parameter(160), element) == 3

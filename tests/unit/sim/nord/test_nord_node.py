@@ -26,6 +26,7 @@ def fail(node) -> None:
     node.fail_drive("fu1", 30) if isinstance(node, NordTu4) else node.fail_drive(30)
 
 
+@pytest.mark.landing(3)
 def test_a_drives_fault_is_an_emergency_with_its_number(bench):
     fail(bench.node)
     bench.run(0.1)

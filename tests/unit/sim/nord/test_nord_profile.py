@@ -57,6 +57,7 @@ def test_the_profile_replaces_the_objects_of_the_words(bench):
     assert bench.read(0x1604, 1) == 0x3004_0010
 
 
+@pytest.mark.landing(12)
 @pytest.mark.parametrize("drive", [1, 2, 3, 4])
 @pytest.mark.parametrize("rpm", [750, -1200, 0])
 def test_speed_is_in_revolutions_per_minute_and_signed(make, drive: int, rpm: int):
@@ -151,6 +152,7 @@ def test_p151_watches_in_the_profile(make):
     assert bench.node.drives[0].fault_tenths == 103
 
 
+@pytest.mark.landing
 def test_a_reset_of_the_communication_leaves_no_mapping_of_what_is_not_there(make):
     bench = make()
     run(bench, 600)

@@ -84,6 +84,7 @@ def test_pdo5_carries_the_interfaces_inputs_and_outputs(bench):
 # P160…P167 and the objects they stand for
 
 
+@pytest.mark.landing(18)
 @pytest.mark.parametrize(
     ("parameter", "sub", "size", "value", "index", "object_sub", "expected"),
     [
@@ -182,6 +183,7 @@ def test_frames_with_stamps_from_before_the_last_timer_do_no_harm(live):
     assert live.node.drives[0].state is NordState.READY
 
 
+@pytest.mark.landing
 def test_with_ripple_the_current_moves_and_the_seed_repeats_it(make_bench):
     def currents(seed: int) -> list[bytes]:
         bench = make_bench(operational=True, ripple=0.02, seed=seed)

@@ -104,6 +104,7 @@ def test_a_silent_node_hears_and_works(live):
     assert live.run(1.0) != []
 
 
+@pytest.mark.landing
 def test_a_power_cycle_starts_everything_anew(watched):
     watched.node.power_cycle()
     assert Frame(0x705, b"\0") in watched.run(0.01)

@@ -68,6 +68,7 @@ def test_any_drives_telegram_restarts_p151(watched):
     assert watched.node.drives[0].state is NordState.ENABLED
 
 
+@pytest.mark.landing(7)
 @pytest.mark.parametrize(
     "frame",
     [

@@ -18,12 +18,12 @@ def run_opcua(path: Path, signs: int | None, listening: int | None) -> Coroutine
     """The OPC UA front of the site file at ``path``, as ``RunFront`` says."""
     site = load_site(path)
     settings = required(site.opcua, "opcua")
-    bound = None if listening is None else ListeningSocket(listening, "opcua.listen")
 
     async def open_server(mirror: View, stack: AsyncExitStack) -> OpcUaServer:
         # Nothing of what is built here is garbage, and looking for it takes a quarter of the time.
         gc.disable()
         stack.callback(gc.enable)
+        bound = None if listening is None else ListeningSocket(listening, "opcua.listen")
         server = OpcUaServer(mirror, settings, Path(site.site.state_dir), site.site.name, bound)
         await server.start()
         stack.push_async_callback(server.close)

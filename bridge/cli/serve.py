@@ -5,12 +5,11 @@ from __future__ import annotations
 import asyncio
 import logging
 import tempfile
-from collections.abc import Callable, Collection, Coroutine
-from enum import StrEnum
+from collections.abc import Callable, Collection
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -18,8 +17,9 @@ from bridge.base.errors import BridgeError, OperationFailed
 from bridge.cli import logs
 from bridge.cli.ending_signals import ending_signals
 from bridge.cli.stopping import Shutdown, until_stopped
-from bridge.config import BusTable, Site, ZenohTable, load_site
-from bridge.service.front_process import FRONTS, Front, become_front, give_reason, limit_memory
+from bridge.config import BusTable, ZenohTable
+from bridge.service.front_process import Front, become_front, give_reason
+from bridge.service.fronts import FRONTS, FrontKind, ProcessRole
 
 # The service is not imported for a front: after one has ended, its clients wait for the next.
 if TYPE_CHECKING:
@@ -28,17 +28,8 @@ if TYPE_CHECKING:
     from bridge.sim.runner import Simulation
 
 
-class ProcessRole(StrEnum):
-    """Processes of the service, as ``run --role`` names them."""
-
-    ALL = "all"
-    BUS = "bus"
-    OPCUA = "opcua"
-    PAGE = "page"
-    ZENOH = "zenoh"
-
-
 SiteArgument = Annotated[Path, typer.Argument(metavar="SITE", help="the site file")]
+_FRONTS: Final = " or ".join((", ".join(kind.role for kind in FRONTS[:-1]), FRONTS[-1].role))
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="log more")]
 _log = logging.getLogger(__name__)
 _DEMO_MOVES = (
@@ -54,7 +45,7 @@ def run(
     site: SiteArgument,
     role: Annotated[
         list[ProcessRole] | None,
-        typer.Option(help="run one process alone: bus, opcua, page or zenoh; or bus with some of the others"),
+        typer.Option(help=f"run one process alone: bus, {_FRONTS}; or bus with some of the others"),
     ] = None,
     parent: Annotated[int, typer.Option(hidden=True)] = 0,
     signs: Annotated[int | None, typer.Option(hidden=True)] = None,
@@ -64,13 +55,14 @@ def run(
     """Run the bridge for SITE. Nodes of a virtual bus are simulated in the same process."""
     logs.set_up(verbose=verbose)
     roles = role or [ProcessRole.ALL]
-    front = next((one for one in roles if one in FRONTS), None)
-    if front is not None and ProcessRole.BUS not in roles:
+    fronts = [kind for kind in FRONTS if kind.role in roles]
+    if fronts and ProcessRole.BUS not in roles:
         if len(roles) > 1:
             raise BridgeError("a process has one role; with bus, those of the fronts that it is to start")
-        _become_front(parent, front)
+        [front] = fronts
+        _become_front(parent, is_prompt=front.is_prompt)
         try:
-            until_stopped(_front_of(front, site, signs, listening))
+            until_stopped(front.run()(site, signs, listening))
         except BridgeError as error:
             if signs is not None:
                 give_reason(signs, str(error))
@@ -79,32 +71,8 @@ def run(
     from bridge.project import load_project
 
     ending = Shutdown()
-    fronts = FRONTS if ProcessRole.ALL in roles else tuple(one for one in roles if one in FRONTS)
-    until_stopped(_serve(load_project(site), ending, fronts=fronts), ending)
-
-
-def _front_of(role: str, site: Path, signs: int | None, listening: int | None) -> Coroutine[None, None, None]:
-    """A front imports nothing of another's."""
-    if role == "opcua":
-        from bridge.service.opcua_front import run_opcua
-
-        return run_opcua(_limited(load_site(site)), signs, listening)
-    if role == "zenoh":
-        from bridge.service.zenoh_front import run_zenoh
-
-        return run_zenoh(_limited(load_site(site)), signs)
-    from bridge.project import load_project
-    from bridge.service.page_front import run_page
-
-    project = load_project(site)
-    _limited(project.site)
-    return run_page(project, signs, listening)
-
-
-def _limited(site: Site) -> Site:
-    """The site of this front, which gets no more memory than that says."""
-    limit_memory(site.site.front_memory_mb)
-    return site
+    started = FRONTS if ProcessRole.ALL in roles else fronts
+    until_stopped(_serve(load_project(site), ending, fronts=started), ending)
 
 
 def demo(verbose: Verbose = False) -> None:
@@ -158,21 +126,21 @@ def demo_controller(endpoint: str, moves: list[str], parent: int = 0) -> None:
     from bridge.sim.controller import Move, run_controller
 
     logs.set_up(verbose=False)
-    _become_front(parent, "demo controller")
+    _become_front(parent)
     run_controller(endpoint, [Move.from_text(move) for move in moves])
 
 
-def _become_front(parent: int, role: str) -> None:
+def _become_front(parent: int, *, is_prompt: bool = False) -> None:
     """A front that is still starting has nothing to clean up."""
     ending_signals.let_kill()
-    become_front(parent, role)
+    become_front(parent, is_prompt=is_prompt)
 
 
 async def _serve(
     project: Project,
     ending: Shutdown,
     *,
-    fronts: Collection[str] = FRONTS,
+    fronts: Collection[FrontKind[Any]] = FRONTS,
     controller: bool = False,
     ready: Callable[[], None] = lambda: None,
 ) -> None:

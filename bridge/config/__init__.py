@@ -10,6 +10,7 @@ from bridge.config.model import MODULES as MODULES
 from bridge.config.model import BusTable as BusTable
 from bridge.config.model import CableTable as CableTable
 from bridge.config.model import DriveTable as DriveTable
+from bridge.config.model import ListeningTable as ListeningTable
 from bridge.config.model import ModbusTable as ModbusTable
 from bridge.config.model import NodeTable as NodeTable
 from bridge.config.model import OpcUaTable as OpcUaTable

@@ -318,7 +318,13 @@ class BusTable(Table):
         return (self.rpdo_period_ms or self.sync_period_ms or 20) / 1000
 
 
-class ModbusTable(Table):
+class ListeningTable(Table):
+    """Settings of a server that listens on one port, which no other may have."""
+
+    listen: Endpoint
+
+
+class ModbusTable(ListeningTable):
     listen: Endpoint = Field("127.0.0.1:502", description="address:port")
     word_order: WordOrder = Field("ABCD", description="ABCD, CDAB, BADC or DCBA")
     allow: list[Network] = Field(
@@ -334,7 +340,7 @@ class UserTable(Table):
     password_hash: str = Field(description="the line that `drivebridge hash-password` prints")
 
 
-class OpcUaTable(Table):
+class OpcUaTable(ListeningTable):
     listen: Endpoint = Field("127.0.0.1:4840", description="address:port")
     no_security: bool = Field(False, description="true opens an endpoint without encryption")
     anonymous: Literal["none", "observer", "operator"] = "none"
@@ -348,7 +354,7 @@ class OpcUaTable(Table):
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 
-class PageTable(Table):
+class PageTable(ListeningTable):
     """The web page. Its users, and who may read without a login, are OPC UA's."""
 
     listen: Endpoint = Field("127.0.0.1:8480", description="address:port")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final, cast
 
 from bridge.config.field_types import LIFE_SIGN_MS
-from bridge.config.model import BusTable
+from bridge.config.model import BusTable, Site
 from bridge.tomlfile import Key, RawTable, TomlFile
 
 _RESERVED_NODES: Final = ("bus", "bridge")
@@ -184,7 +184,7 @@ def _check_users(file: TomlFile) -> None:
 
 def _check_ports(file: TomlFile) -> None:
     ports = _Unique(file)
-    for name in ("modbus", "opcua", "page"):
+    for name in Site.model_fields:
         ports.add(file.root.table(name), "listen", "address")
 
 

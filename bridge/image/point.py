@@ -40,7 +40,9 @@ class Point:
 
     ``name`` is the full name, ``<node>/<drive>/<group>/<leaf>`` for what belongs to a drive. ``low``
     and ``high`` are in ``unit``. ``states`` are the codes of an enumeration with their text, ``bits``
-    the names of a word's bits from bit 0 on ("" where a bit has no meaning).
+    the names of a word's bits from bit 0 on ("" where a bit has no meaning). ``added`` is the number of the
+    addition by which the point came, 0 for the first points: registers, which are in the order of the points,
+    put those of each addition behind all before, so that none of these moves.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Point:
     description: str = ""
     states: tuple[tuple[int, str], ...] = ()
     bits: tuple[str, ...] = ()
+    added: int = 0
 
     @property
     def path(self) -> tuple[str, ...]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 import gc
 import logging
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Collection, Iterator, Mapping
 from contextlib import AsyncExitStack, suppress
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from bridge import __version__
 from bridge.base import clock
@@ -33,11 +33,11 @@ from bridge.northbound.gateway.server import GatewayServer
 from bridge.northbound.listening import Port
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
-from bridge.northbound.zenoh.preflight import check_ports
 from bridge.project import Project, count
 from bridge.service.audit_log import AuditLog
 from bridge.service.event_log import log_event
-from bridge.service.front_process import FRONTS, Front
+from bridge.service.front_process import Front
+from bridge.service.fronts import FRONTS, FrontKind, Settings
 from bridge.service.parts import Ports, SupervisedServer, Supervisor
 from bridge.service.plant_condition import PlantCondition
 from bridge.service.preflight import check_files
@@ -76,7 +76,7 @@ class BusProcess:
         project: Project,
         make_bus: MakeBus = make_bus,
         *,
-        fronts: Collection[str] = FRONTS,
+        fronts: Collection[FrontKind[Any]] = FRONTS,
         alarm: WatchdogTimer | None = None,
     ) -> None:
         self.project = project
@@ -116,15 +116,13 @@ class BusProcess:
         self.supervisor = Supervisor(self.plant, self.notifier, clock.now, f"{drives} on {buses}")
         self._opened = Ports()
         self.fronts: list[Front] = []
-        self._ports: dict[str, Port] = {}
+        self._ports: list[Port] = []
         """Listening sockets of the fronts; kept open, so that a restarted front serves at once."""
-        if "opcua" in fronts and site.opcua:
-            self._add_front("opcua", Port(site.opcua.listen, "opcua.listen"))
-        if "page" in fronts and site.page:
-            self._add_front("page", Port(site.page.listen, "page.listen"))
-        self._zenoh = site.zenoh if "zenoh" in fronts else None
-        if self._zenoh:
-            self._add_front("zenoh")
+        self._openings: dict[str, Callable[[], Awaitable[None]]] = {}
+        """Opens or looks at the ports of each front, by its role."""
+        for kind in fronts:
+            if (settings := kind.settings(site)) is not None:
+                self._add_front(kind, settings)
 
     def _make_gateways(self, taps: Mapping[str, Path]) -> dict[str, GatewayServer]:
         """Gateways by bus; ``taps`` are the sockets on which the frames of each are passed on."""
@@ -142,14 +140,18 @@ class BusProcess:
             if table.gateway
         }
 
-    def _add_front(self, role: str, port: Port | None = None) -> None:
-        """Add a front to the parts; ``port`` is the one that this process holds for it."""
-        if port:
-            self._ports[role] = port
-        command = ["run", str(self.project.path), "--role", role]
+    def _add_front(self, kind: FrontKind[Settings], settings: Settings) -> None:
+        """Add a front to the parts, and its ports to those that are opened first."""
+        listening = None
+        if kind.port:
+            port = kind.port(settings)
+            self._ports.append(port)
+            self._openings[kind.role], listening = port.open, port.socket
+        elif kind.check_ports:
+            self._openings[kind.role] = partial(kind.check_ports, settings)
+        command = ["run", str(self.project.path), "--role", kind.role]
         most_mb = self.project.site.site.front_memory_mb
-        listening = port.socket if port else None
-        self.fronts.append(Front(role, command, watched=True, listening=listening, most_mb=most_mb))
+        self.fronts.append(Front(kind.role, command, watched=True, listening=listening, most_mb=most_mb))
 
     async def run(self, ready: Callable[[], None] = lambda: None) -> None:
         """Serve until cancelled; ``ready`` is called as soon as the buses are open.
@@ -185,11 +187,10 @@ class BusProcess:
         if self.modbus:
             stack.push_async_callback(self.modbus.close)
             await ports.open("modbus", self.modbus.start)
-        for role, port in self._ports.items():
+        for port in self._ports:
             stack.callback(port.close)
-            await ports.open(role, port.open)
-        if self._zenoh:
-            await ports.open("zenoh", partial(check_ports, self._zenoh))
+        for role, opening in self._openings.items():
+            await ports.open(role, opening)
         ports.check(needs_all=needs_all)
         await self.mirror.start()
         stack.push_async_callback(self.mirror.close)

@@ -30,12 +30,7 @@ _REASON: Final = b"!"
 _LONGEST_REASON: Final = 1000
 _LONGEST_SHOWN: Final = 300
 _STOP_S: Final = 3.0
-FRONTS: Final = ("opcua", "page", "zenoh")
-"""Roles of all fronts of the service."""
 _NICE: Final = 5
-_PROMPT: Final = ("zenoh",)
-"""Roles whose clients command drives over and over, and wait for each answer: as important as the bus process
-itself, which is ahead of them all the same where its unit gives it a real-time priority."""
 _FIRST_TO_GO: Final = 500
 """``oom_score_adj`` (proc(5)) of fronts: where the machine or the unit has no memory left, the kernel kills a
 front, and not the process that stops the drives."""
@@ -223,9 +218,10 @@ def give_reason(pipe: int, reason: str) -> None:
         os.write(pipe, _REASON + " ".join(reason.split()).encode("utf-8", "replace")[:_LONGEST_REASON])
 
 
-def become_front(parent: int, role: str) -> None:
-    """Called by a front: lower its own priority below the bus process, and end with it."""
-    if role not in _PROMPT:
+def become_front(parent: int, *, is_prompt: bool = False) -> None:
+    """Called by a front: end with the bus process, and lower its own priority below that one's unless it
+    ``is_prompt``."""
+    if not is_prompt:
         with contextlib.suppress(OSError):
             os.nice(_NICE)
     with contextlib.suppress(OSError):

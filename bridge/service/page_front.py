@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
+from collections.abc import Coroutine
 from contextlib import AsyncExitStack
 from importlib.util import find_spec
 from pathlib import Path
 
 from bridge.base import clock
-from bridge.base.errors import OperationFailed
 from bridge.catalogue import Catalogue
 from bridge.config import Site
 from bridge.drive import FaultWords
@@ -17,15 +16,14 @@ from bridge.drive.fault_words import listed_faults
 from bridge.exports import dbc_file, modbus_table, opcua_table, zenoh_table
 from bridge.lint import dictionary_files
 from bridge.mapping import Family
-from bridge.mirror.client import MirrorClient
-from bridge.mirror.endpoint import socket_endpoint
 from bridge.northbound.listening import ListeningSocket, listen
 from bridge.northbound.page.integration import Export
 from bridge.northbound.page.server import PageServer
 from bridge.northbound.page.web import FaultTexts, Page, PageSources
+from bridge.northbound.view import View
 from bridge.parameter.ledger_file import LedgerFile
-from bridge.project import Project
-from bridge.service.front_process import give_signs
+from bridge.project import Project, load_project
+from bridge.service.mirrored import required, serve_mirrored
 from bridge.service.page.buses import Buses
 from bridge.service.page.system_facts import SystemOf
 from bridge.text import render
@@ -82,23 +80,13 @@ def _in_german(family: Family) -> dict[str, dict[str, str]]:
     }
 
 
-async def run_page(project: Project, signs: int | None = None, listening: int | None = None) -> None:
-    """Serve until cancelled, with signs of life on the pipe ``signs`` as soon as it serves; on the socket
-    ``listening`` where the bus process holds the port.
-
-    Raises ``PointsChanged`` where the bus process comes back with other points: this front has to start anew
-    then.
-    """
+def run_page(path: Path, signs: int | None, listening: int | None) -> Coroutine[None, None, None]:
+    """The front of the page of the site file at ``path``, as ``RunFront`` says."""
+    project = load_project(path)
     site = project.site
-    if site.page is None:
-        raise OperationFailed("the site file has no [page] table")
-    async with AsyncExitStack() as stack:
-        endpoint = socket_endpoint(Path(site.site.runtime_dir), site.site.name)
-        mirror = MirrorClient(endpoint, clock.now, "page")
-        await mirror.open()
-        stack.push_async_callback(mirror.close)
-        table = site.page
-        key = "page.listen"
+    table, key = required(site.page, "page"), "page.listen"
+
+    async def open_server(mirror: View, stack: AsyncExitStack) -> PageServer:
         bound = listen(table.listen, key) if listening is None else ListeningSocket(listening, key)
         catalogue = Catalogue.of(site, project.families)
         page = Page(mirror, catalogue, sources_of(project), clock.now, _kept_sessions(site))
@@ -107,9 +95,6 @@ async def run_page(project: Project, signs: int | None = None, listening: int | 
         stack.push_async_callback(server.close)
         scheme = "http" if table.certificate is None else "https"
         _log.info("the page is served on %s://%s", scheme, table.listen)
-        async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(mirror.run(), name="mirror")
-            tasks.create_task(mirror.failed(), name="mirror link")
-            tasks.create_task(server.failed(), name="listening socket")
-            if signs is not None:
-                tasks.create_task(give_signs(signs), name="signs of life")
+        return server
+
+    return serve_mirrored(site, "page", open_server, signs)

@@ -10,9 +10,7 @@ from typing import Final
 
 from bridge.base.errors import Unavailable
 from bridge.config import Site
-from bridge.northbound.opcua.preflight import check_opcua
-from bridge.northbound.page.preflight import check_page
-from bridge.northbound.zenoh.preflight import check_zenoh
+from bridge.service.fronts import FRONTS
 
 _log = logging.getLogger(__name__)
 
@@ -23,14 +21,9 @@ _FULL: Final = (errno.ENOSPC, errno.EDQUOT)
 def check_files(site: Site, path: Path, *, fronts: bool) -> None:
     """Check files and folders of the site at ``path``, with ``fronts`` also what its fronts need. Raises
     ``FileFaults`` and ``Unavailable``."""
-    folder = Path(site.site.state_dir)
-    _check_state_folder(folder)
-    if fronts and site.opcua:
-        check_opcua(site.opcua, folder, path)
-    if fronts and site.page:
-        check_page(site.page, path)
-    if fronts and site.zenoh:
-        check_zenoh(site.zenoh)
+    _check_state_folder(Path(site.site.state_dir))
+    for kind in FRONTS if fronts else ():
+        kind.check_files(site, path)
 
 
 def _check_state_folder(folder: Path) -> None:

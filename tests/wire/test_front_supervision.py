@@ -141,10 +141,10 @@ def test_a_front_that_grows_at_once_is_refused_the_memory() -> None:
 def test_what_the_kernel_kills_where_memory_is_short_is_a_front() -> None:
     look = "print(open('/proc/self/oom_score_adj').read(), os.nice(0))"
     here = int(Path("/proc/self/oom_score_adj").read_text()), os.nice(0)
-    adjusted, nice = as_front(f"import os; become_front(0, 'opcua'); {look}").stdout.split()
+    adjusted, nice = as_front(f"import os; become_front(0); {look}").stdout.split()
     assert int(adjusted) == max(500, here[0])
     assert int(nice) == min(19, here[1] + 5), "ahead of it comes who stops drives"
-    _, nice = as_front(f"import os; become_front(0, 'zenoh'); {look}").stdout.split()
+    _, nice = as_front(f"import os; become_front(0, is_prompt=True); {look}").stdout.split()
     assert int(nice) == here[1], "its clients wait for each answer"
 
 

@@ -15,7 +15,7 @@ from bridge.can.virtual import VirtualWire
 from bridge.command import Event, EventKind
 from bridge.project import load_project
 from bridge.service.bus_process import BusProcess
-from bridge.service.front_process import FRONTS
+from bridge.service.fronts import FRONTS
 from bridge.service.parts import Ports
 from tests.support import sites
 from tests.support.process import free_port

@@ -156,6 +156,7 @@ class DriveMap:
         first = [leaf for name in scaled if (leaf := f"actual/{name}") not in unusual]
         last = [leaf for leaf in unusual if leaf.startswith("actual/")]
         chosen = first + [leaf for leaf in more if leaf not in first and leaf not in last] + last
+        chosen.sort(key=lambda leaf: points[leaf].added)
         self.inputs = value_rows(RegisterTable.INPUT_REGISTER, chosen, points, _NOTHING)
         commands = [value.leaf for value in values if value.group == "command"]
         self.setpoints = value_rows(RegisterTable.HOLDING_REGISTER, commands, points, allows)

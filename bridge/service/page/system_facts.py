@@ -17,7 +17,7 @@ from cryptography.hazmat.primitives.hashes import SHA256
 
 from bridge import __version__
 from bridge.base.errors import BridgeError, Fault, FileFaults
-from bridge.config import Site
+from bridge.config import ListeningTable, Site
 from bridge.lint import Severity, lint
 from bridge.northbound.page.system import CertificateFacts, UnreadablePart
 from bridge.project import Project, load_project
@@ -146,8 +146,8 @@ def _version(package: str) -> str:
 
 def _ports(site: Site) -> Iterator[tuple[int, str]]:
     """Ports that are served, each with its protocol."""
-    for name, table in (("modbus", site.modbus), ("opcua", site.opcua), ("page", site.page)):
-        if table:
+    for name, table in site:
+        if isinstance(table, ListeningTable):
             yield int(table.listen.rpartition(":")[2]), name
     for locator in site.zenoh.listen if site.zenoh else ():
         address = re.match(r"[a-z]+/.*:(\d+)", locator)

@@ -187,10 +187,13 @@ class TestWhatDoesNotGoTogether:
         (fault,) = faults(tmp_path, '[site]\nname = "hall"\n' + bus.format("a") + bus.format("b"))
         assert fault == "10: bus[1].channel: socketcan channel 'can0' is used twice (first used in line 6)"
 
-    def test_two_servers_on_one_port(self, tmp_path: Path):
-        text = f'{SMALL}[modbus]\nlisten = "127.0.0.1:4840"\n[opcua]\nlisten = "127.0.0.1:4840"\n'
+    @pytest.mark.parametrize(
+        ("first", "second"), [("modbus", "opcua"), ("modbus", "page"), ("opcua", "page")]
+    )
+    def test_two_servers_on_one_port(self, tmp_path: Path, first: str, second: str):
+        text = f'{SMALL}[{first}]\nlisten = "127.0.0.1:4840"\n[{second}]\nlisten = "127.0.0.1:4840"\n'
         (fault,) = faults(tmp_path, text)
-        assert fault.startswith("16: opcua.listen: address '127.0.0.1:4840' is used twice")
+        assert fault.startswith(f"16: {second}.listen: address '127.0.0.1:4840' is used twice")
 
     def test_a_user_is_there_once(self, tmp_path: Path):
         user = '[[opcua.user]]\nname = "ann"\nrole = "operator"\npassword_hash = "x"\n'

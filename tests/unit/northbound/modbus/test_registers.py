@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -10,7 +11,7 @@ import pytest
 
 from bridge.command import Drive, Plant
 from bridge.command.drive_link import NodeState
-from bridge.image import Quality
+from bridge.image import DataType, Point, Quality
 from bridge.mapping import family_names
 from bridge.northbound.modbus.dispatch import Dispatcher
 from bridge.northbound.modbus.registers import (
@@ -19,6 +20,7 @@ from bridge.northbound.modbus.registers import (
     MOST_PARAMETERS,
     PARAMETERS,
     VALUE_FLAGS,
+    DriveMap,
     RegisterTable,
     Row,
 )
@@ -79,6 +81,22 @@ def telling(drive: Drive) -> list[int]:
         if meaning.group == "actual" and (word := drive.family.told_by(drive.slot, meaning))
     }
     return [codes.get(place, word) for place, word in enumerate(drive.words)]
+
+
+@pytest.mark.parametrize("mapping", [name for name in family_names() if sites.family(name).slot])
+def test_a_point_that_was_added_later_moves_no_register(mapping: str) -> None:
+    """Wherever it stands among the others, and whatever its drive has."""
+    [spec, *_] = family_plant(mapping).catalogue.drives.values()
+    newest = max(point.added for point in spec.points)
+    later = [
+        Point(name=f"{spec.name}/supervision/{leaf}", data_type=DataType.UINT32, added=newest + added)
+        for leaf, added in (("third", 2), ("first", 1), ("second", 1))
+    ]
+    before, after = DriveMap(spec), DriveMap(replace(spec, points=(*later, *spec.points)))
+    inputs = [row.name for row in after.inputs]
+    assert after.inputs[: len(before.inputs)] == before.inputs
+    assert inputs[len(before.inputs) :] == [f"supervision/{leaf}" for leaf in ("first", "second", "third")]
+    assert set(before.rows) <= set(after.rows)
 
 
 @pytest.mark.parametrize("mapping", family_names())

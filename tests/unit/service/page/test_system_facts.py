@@ -96,6 +96,11 @@ def test_the_audit_log_is_read_from_its_end(tmp_path: Path) -> None:
     assert off.audit(3) == []
 
 
+def test_every_server_with_a_port_is_asked_for_its_clients(tmp_path: Path) -> None:
+    facts = system(tmp_path, "[page]\n[modbus]\n[opcua]\n[zenoh]\n[audit]\n")
+    assert facts.connections().keys() == {"modbus", "opcua", "page", "zenoh"}
+
+
 def test_clients_are_those_of_the_ports_that_are_served(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]

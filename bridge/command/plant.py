@@ -6,7 +6,7 @@ Northbounds read the image and submit requests; the master feeds it. Neither kno
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Final, TypeVar
@@ -34,7 +34,7 @@ from bridge.command.messages.request import (
     Reply,
     Request,
 )
-from bridge.command.node import BusSide, Enforce, Node
+from bridge.command.node import BusSide, Enforcement, Node
 from bridge.command.outputs import Outputs
 from bridge.command.stop_check.state import StopVerdict
 from bridge.config import BusTable, Site
@@ -312,20 +312,23 @@ class Plant:
         index = self.image.index[f"bridge/{leaf}"]
         self.image.set(index, int(self.image[index].value) + by, now)
 
-    def on_time(self, now: float, enforce: Enforce = lambda node, action, why, now: None) -> None:
-        """Let the timers of every channel run and bring the image up to date. ``enforce`` acts on the node of
-        whoever ignores its stop."""
+    def enforcements(self, now: float) -> Iterator[Enforcement]:
+        """What the nodes of those are to be made to do that ignore their stops. The timers of every channel
+        run while it is iterated: do to a node what it is to be made to do before the next one is taken, for
+        what another drive of that node comes to depends on it."""
         for one in self._deadlines.take_due(now):
             for verdict in one.on_time(now):
-                self._conclude(one, verdict, now, enforce)
+                action = self._conclude(one, verdict, now)
+                if action is not None:
+                    yield Enforcement(one.node_name, action, Text.of("stopped_by.plant", name=one.name))
 
-    def _conclude(self, one: Commanded, verdict: StopVerdict, now: float, enforce: Enforce) -> None:
+    def _conclude(self, one: Commanded, verdict: StopVerdict, now: float) -> Action | None:
+        """Report how a stop has ended; what is to be done to the node."""
         conclusion = concluded(self.nodes[one.node_name], one, verdict, now)
         self.audit.stop_ended(one.name, verdict.outcome.label, conclusion.logged, now)
         if conclusion.event is not None:
             self.report(conclusion.event)
-        if conclusion.action is not None:
-            enforce(one.node_name, conclusion.action, Text.of("stopped_by.plant", name=one.name), now)
+        return conclusion.action
 
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""

@@ -417,6 +417,7 @@ def test_a_fault_of_the_drive_is_told_in_the_manuals_words(running: Hall):
     running.pdo(FAULT)
     assert running.value("status/emcy_code") == 0x2310
     assert running.value("status/fault_text") == "3.0 overcurrent of the inverter"
+    running.plant.tell_events()
     assert [event.message for event in running.events if event.kind is EventKind.EMERGENCY] == [
         "emergency 2310h: 3.0 overcurrent of the inverter"
     ]

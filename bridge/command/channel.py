@@ -14,6 +14,7 @@ from dataclasses import replace
 
 from bridge.catalogue.codes import WatchdogState
 from bridge.command.drive_link import DriveLink, NodeState
+from bridge.command.effects import Effects
 from bridge.command.leg import event, owners
 from bridge.command.leg.effect import (
     Answer,
@@ -39,11 +40,9 @@ from bridge.text import Said, Text
 class Channel:
     """The command side of one drive, or of the outputs of one node.
 
-    After any call the caller compares ``output`` and sends it. ``report`` gets the events. ``settled`` is
-    called when what others may see has changed beyond the status word, before outcomes are told: so a client
-    that reads after its outcome sees the new values. ``tripped`` gets the deadline whenever the watchdog
-    trips. ``due`` is told of deadlines that may be earlier than before, ``NOW`` where they are not computed;
-    whoever is told by ``settled`` has to ask for them, too.
+    After any call the caller compares ``output`` and sends it. ``settled`` is called when what others may see
+    has changed beyond the status word, before outcomes are told: so a client that reads after its outcome
+    sees the new values. Everything else that comes of it is collected in ``effects``.
     """
 
     def __init__(
@@ -51,11 +50,8 @@ class Channel:
         name: str,
         leg_settings: LegSettings,
         link: DriveLink,
-        report: Callable[[Event], None],
-        *,
+        effects: Effects,
         settled: Callable[[float], None],
-        tripped: Callable[[float], None],
-        due: Callable[[float], None],
     ) -> None:
         self.name = name
         self.leg_settings = leg_settings
@@ -63,10 +59,8 @@ class Channel:
         self.leg = initial(leg_settings)
         """The state of the leg."""
         self.link = link
-        self._report = report
-        self._settled = settled
-        self._tripped = tripped
-        self.due = due
+        self._effects = effects
+        self._show = settled
         self._followed = frozenset(source for _, source in leg_settings.follows)
         self._start_reply: Reply | None = None
         self.trips = 0
@@ -213,6 +207,10 @@ class Channel:
         connection = event.Connection(identity, is_there, has_others)
         self.leg, _ = step(self.leg_settings, self.leg, connection, now)
 
+    def plan_anew(self) -> None:
+        """Have ``next_deadline`` asked again: it may be earlier than before."""
+        self._effects.due[self.name] = None
+
     def on_refused(self, now: float) -> None:
         """A request about it was refused elsewhere, and counts as one that is refused here."""
         self.refused_writes += 1
@@ -270,10 +268,14 @@ class Channel:
         who, reaction = str(tripped.who), self._reaction()
         said = Text.of("watchdog.tripped", who=who, timeout_ms=tripped.timeout_ms, reaction=reaction)
         self._tell(now, EventKind.WATCHDOG, 900, said)
-        self._tripped(tripped.due)
+        self._effects.tripped(tripped.due)
 
     def _tell(self, now: float, kind: EventKind, severity: int, said: Text) -> None:
-        self._report(Event(now, kind, self.name, severity, said))
+        self._effects.events.report(Event(now, kind, self.name, severity, said))
+
+    def _settled(self, now: float) -> None:
+        self._show(now)
+        self._effects.settled[self.name] = now
 
     # what is different for drives and outputs
 

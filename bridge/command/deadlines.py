@@ -6,7 +6,6 @@ import heapq
 from math import inf
 from typing import Final, Generic, Protocol, TypeVar
 
-NOW: Final = -inf
 _AHEAD_S: Final = 0.005
 """What is to be looked at within this time is looked at before the timer is set: mostly its deadline has been
 put off meanwhile, and nobody has to wake up for that."""
@@ -28,7 +27,7 @@ class Deadlines(Generic[T]):
     """For each of its owners when to look at it, which is never later than its earliest deadline.
 
     A deadline that was put off (each TPDO and telegram does that) is noticed when the old one comes. Of one
-    that was brought forward ``due`` must be told. Times are monotonic seconds.
+    that was brought forward ``touch`` must be told. Times are monotonic seconds.
     """
 
     def __init__(self) -> None:
@@ -46,10 +45,9 @@ class Deadlines(Generic[T]):
         self._owners.append(owner)
         self._planned.append(inf)
 
-    def due(self, place: int, at: float = NOW) -> None:
-        """The owner at ``place`` has a deadline then; ``NOW``: another than it had, whenever that is."""
-        if at < self._planned[place]:
-            self._touched[place] = None
+    def touch(self, place: int) -> None:
+        """The owner at ``place`` may have an earlier deadline than it had."""
+        self._touched[place] = None
 
     @property
     def is_touched(self) -> bool:
@@ -94,7 +92,7 @@ class Deadlines(Generic[T]):
 
     def sweep(self, now: float) -> list[T]:
         """Look at the next few owners, whoever has been told of: all of them in ten calls. Gives those with a
-        deadline of which ``due`` should have been told."""
+        deadline of which ``touch`` should have been told."""
         count = len(self._owners)
         first, self._swept = self._swept, self._swept + -(-count // _SWEEPS)
         missed = [

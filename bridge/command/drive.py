@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -10,11 +10,10 @@ from bridge.catalogue import DriveSpec
 from bridge.catalogue.points import LIFE_SIGN
 from bridge.command.actual import ActualData
 from bridge.command.commanded import WordTiming
-from bridge.command.deadlines import NOW
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.drive_link import FurtherTpdo, NodeState
+from bridge.command.effects import Effects
 from bridge.command.meaning_news import MeaningNews
-from bridge.command.messages.event import Event
 from bridge.command.messages.request import Identity
 from bridge.command.setpoint_doubts import InForce, in_force
 from bridge.command.stop_check.drive_check import DriveStopCheck
@@ -68,15 +67,7 @@ class Drive(WordTiming):
     All that is not process data is shown when the channel says that it has settled.
     """
 
-    def __init__(
-        self,
-        spec: DriveSpec,
-        image: Image,
-        report: Callable[[Event], None],
-        settled: Callable[[Drive, float], None],
-        tripped: Callable[[float], None],
-        due: Callable[[float], None],
-    ) -> None:
+    def __init__(self, spec: DriveSpec, image: Image, effects: Effects) -> None:
         super().__init__(spec.bus)
         self.spec = spec
         self.name, self.node_name = spec.name, spec.node.name
@@ -87,10 +78,8 @@ class Drive(WordTiming):
             family,
             table,
             spec.node.hold_ms,
-            report,
-            settled=lambda now: settled(self, now),
-            tripped=tripped,
-            due=due,
+            effects,
+            self.refresh,
         )
         self.stop_check = DriveStopCheck(self.channel)
         self.identification = Identification()
@@ -108,7 +97,7 @@ class Drive(WordTiming):
         self.on_further_data = self._actual.on_further_data
         self._image = image
         self._find_points()
-        self.news = MeaningNews(self, report)
+        self.news = MeaningNews(self, effects.events)
 
     def _find_points(self) -> None:
         """Where its points stand in the image."""
@@ -340,7 +329,7 @@ class Drive(WordTiming):
 
     def refresh(self, now: float) -> None:
         """Bring every point of the drive up to date; called when something about it has changed."""
-        self.channel.due(NOW)
+        self.channel.plan_anew()
         self.stop_check.on_settled()
         self._actual.refresh(now)
         self._refresh_command(now)

@@ -6,12 +6,13 @@ from collections.abc import Callable, Sequence
 
 from bridge.command.channel import Channel
 from bridge.command.drive_link import DriveLink, NodeState
+from bridge.command.effects import Effects
 from bridge.command.leg import event
 from bridge.command.leg.effect import Tripped
 from bridge.command.leg.settings import leg_settings
 from bridge.command.leg.state import AWAITS_REPORT
 from bridge.command.leg.word_table import control_word
-from bridge.command.messages.event import Event, EventKind
+from bridge.command.messages.event import EventKind
 from bridge.command.messages.telegram import TelegramDecoder
 from bridge.command.setpoint_doubts import SetpointDoubts
 from bridge.command.status import DriveStatus
@@ -31,11 +32,8 @@ class DriveChannel(Channel):
         family: Family,
         settings: DriveTable,
         hold_ms: int,
-        report: Callable[[Event], None],
-        *,
+        effects: Effects,
         settled: Callable[[float], None],
-        tripped: Callable[[float], None],
-        due: Callable[[float], None] = lambda at: None,
     ) -> None:
         self.family = family
         self.settings = settings
@@ -54,7 +52,7 @@ class DriveChannel(Channel):
         ).decode
         link = DriveLink(settings.telegram_downtime_s, hold_ms)
         of_leg = leg_settings(family, settings, decode)
-        super().__init__(name, of_leg, link, report, settled=settled, tripped=tripped, due=due)
+        super().__init__(name, of_leg, link, effects, settled)
 
     # what others may see
 
@@ -171,10 +169,10 @@ class DriveChannel(Channel):
 
     def on_pdo(self, now: float) -> None:
         """A TPDO arrived; what it says comes after this."""
-        deadline_s = self.link.pdo_deadline_s
-        if deadline_s is not None:
-            self.due(now + deadline_s)
-        if self.link.on_pdo(now):
+        link = self.link
+        if link.pdo_deadline_s is not None and link.brings_forward(now):
+            self.plan_anew()
+        if link.on_pdo(now):
             self._status.link_fault = 0.0
             self._happen(self._way(now), now)
 

@@ -97,6 +97,14 @@ class DriveLink:
             return self.node in (NodeState.OPERATIONAL, NodeState.LOST)
         return self.node is NodeState.OPERATIONAL and self._expired_at is None
 
+    def brings_forward(self, now: float) -> bool:
+        """A TPDO that arrives at ``now`` may bring a deadline that is earlier than the one there is: the last
+        one has been judged to be late, or has a later time."""
+        deadline_s, since, last = self.pdo_deadline_s, self._since, self.last_pdo
+        # Asked with every PDO: no call.
+        last_sign = since if last is None or last < since else last
+        return deadline_s is not None and (last_sign + deadline_s <= self._judged_at or now < last_sign)
+
     def on_boot(self, pdo_deadline_s: float | None, further: Sequence[FurtherTpdo]) -> None:
         """What the boot-up has found."""
         self.pdo_deadline_s, self.further = pdo_deadline_s, further

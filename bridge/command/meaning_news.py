@@ -3,11 +3,11 @@ setpoints that are in force."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from bridge.command.drive_channel import DriveChannel
-from bridge.command.messages.event import Event, EventKind
+from bridge.command.messages.event import Event, EventKind, EventQueue
 from bridge.command.setpoint_doubts import InForce
 from bridge.drive import Codes, Key, is_scale, no_scale
 from bridge.mapping.model import Family, Meaning, Slot
@@ -40,9 +40,9 @@ class HasWords(Protocol):
 class MeaningNews:
     """Of one drive; nothing is told of what is read for the first time."""
 
-    def __init__(self, drive: HasWords, report: Callable[[Event], None]) -> None:
+    def __init__(self, drive: HasWords, events: EventQueue) -> None:
         self._drive = drive
-        self._report = report
+        self._events = events
         self._is_commanded_otherwise = False
         """A setpoint that is held was written for another meaning of its words."""
         self.is_to_be_asked = False
@@ -121,7 +121,7 @@ class MeaningNews:
         self, key: Key, setting: float | None, had: float | None, affected: Sequence[Text], now: float
     ) -> None:
         said = _changed(*key, setting, had, tuple(affected))
-        self._report(Event(now, EventKind.CONFIGURATION, self._drive.name, 500, said))
+        self._events.report(Event(now, EventKind.CONFIGURATION, self._drive.name, 500, said))
         self.drop_old_setpoints(now)
         self._drive.refresh(now)
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from bridge.catalogue import MemberSpec, NodeSpec
 from bridge.command.commanded import Commanded
@@ -20,8 +20,13 @@ from bridge.mapping.model import ObjectRef
 from bridge.parameter import Ledger, Names
 from bridge.text import Text
 
-Enforce = Callable[[str, Action, Text, float], None]
-"""Does something to a node in the bridge's own name; the second text says why."""
+
+class Enforcement(NamedTuple):
+    """What a node is to be made to do in the bridge's own name, and why."""
+
+    node: str
+    action: Action
+    why: Text
 
 
 class ParameterHolder(Protocol):

@@ -14,11 +14,11 @@ from typing import Final, NamedTuple
 from bridge.catalogue import DeviceSpec
 from bridge.command.channel import Channel
 from bridge.command.commanded import WordTiming
-from bridge.command.deadlines import NOW
 from bridge.command.drive_link import DriveLink, NodeState
+from bridge.command.effects import Effects
 from bridge.command.leg.settings import LegSettings
 from bridge.command.leg.state import RpdoWords
-from bridge.command.messages.event import Event, EventKind
+from bridge.command.messages.event import EventKind
 from bridge.command.messages.request import Action, Code, Outcome, Reply, Request, refused
 from bridge.command.output_words import ACTIVE, OutputWords
 from bridge.command.stop_check.ignored_texts import ignored_by_outputs
@@ -76,11 +76,8 @@ class OutputChannel(Channel):
         words: OutputWords,
         settings: OutputsTable,
         hold_ms: int,
-        report: Callable[[Event], None],
-        *,
+        effects: Effects,
         settled: Callable[[float], None],
-        tripped: Callable[[float], None],
-        due: Callable[[float], None],
     ) -> None:
         self.output_words = words
         of_leg = LegSettings(
@@ -99,9 +96,7 @@ class OutputChannel(Channel):
             handshake=None,
             acknowledge_resumes=True,
         )
-        super().__init__(
-            name, of_leg, DriveLink(0.0, hold_ms), report, settled=settled, tripped=tripped, due=due
-        )
+        super().__init__(name, of_leg, DriveLink(0.0, hold_ms), effects, settled)
         safe = words.held
         self.leg = self.leg._replace(rest=safe, setpoints=safe, sent=RpdoWords((0, *safe)))
 
@@ -137,15 +132,7 @@ class OutputChannel(Channel):
 class Outputs(WordTiming):
     """The outputs of one node, and where its points stand in the image. Times are monotonic seconds."""
 
-    def __init__(
-        self,
-        spec: DeviceSpec,
-        image: Image,
-        report: Callable[[Event], None],
-        settled: Callable[[Outputs, float], None],
-        tripped: Callable[[float], None],
-        due: Callable[[float], None],
-    ) -> None:
+    def __init__(self, spec: DeviceSpec, image: Image, effects: Effects) -> None:
         super().__init__(spec.bus)
         node = spec.node
         self.name = self.node_name = node.name
@@ -156,10 +143,8 @@ class Outputs(WordTiming):
             self.words,
             spec.table,
             node.hold_ms,
-            report,
-            settled=lambda now: settled(self, now),
-            tripped=tripped,
-            due=due,
+            effects,
+            self.refresh,
         )
         self.stop_check = OutputStopCheck()
         self._telling: dict[ObjectRef, Telling] = {}
@@ -299,7 +284,7 @@ class Outputs(WordTiming):
 
     def _judged(self, now: float) -> None:
         self._refresh_follows(now)
-        self.channel.due(NOW)
+        self.channel.plan_anew()
 
     # time
 
@@ -317,7 +302,7 @@ class Outputs(WordTiming):
     def refresh(self, now: float) -> None:
         """Bring every point up to date; called when something has changed."""
         channel = self.channel
-        channel.due(NOW)
+        channel.plan_anew()
         is_active = self.is_active
         if is_active:
             self.words.take(channel.output.words[1:])

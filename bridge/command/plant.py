@@ -6,9 +6,8 @@ Northbounds read the image and submit requests; the master feeds it. Neither kno
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Final, TypeVar
 
 from bridge.base.guard import Guard
@@ -21,6 +20,7 @@ from bridge.command.commanded import Commanded
 from bridge.command.deadlines import Deadlines
 from bridge.command.device import Device
 from bridge.command.drive import Drive
+from bridge.command.effects import Effects
 from bridge.command.ignored_stop import concluded
 from bridge.command.messages.event import Event, EventGate, EventKind, EventQueue
 from bridge.command.messages.request import (
@@ -34,7 +34,7 @@ from bridge.command.messages.request import (
     Reply,
     Request,
 )
-from bridge.command.node import BusSide, Enforce, Node
+from bridge.command.node import BusSide, Enforcement, Node
 from bridge.command.outputs import Outputs
 from bridge.command.stop_check.state import StopVerdict
 from bridge.config import BusTable, Site
@@ -52,13 +52,6 @@ def on_no_bus(request: Request, now: float, reply: Reply) -> bool:
 
 
 One = TypeVar("One", bound=Commanded)
-Told = tuple[
-    Callable[[Event], None],
-    Callable[[Commanded, float], None],
-    Callable[[float], None],
-    Callable[[float], None],
-]
-"""Callbacks of one that is commanded: ``report``, ``settled``, ``tripped`` and ``due``."""
 _LONGEST_NAME: Final = 80
 """Clients may call anything a drive."""
 _SEVERITY_MISSED, _MISSED_EVENTS, _MISSED_EVERY_S = 700, 3, 60.0
@@ -84,7 +77,7 @@ class Plant:
         """Drives and outputs with a stop that has not been handed to the bus yet."""
         self.because: Callable[[Event], Said] = lambda event: ""
         """Finds what has caused an event."""
-        self._stop_due: float | None = None
+        self._effects = Effects(self.events)
         self._changed: dict[str, set[str]] = {bus.name: set() for bus in catalogue.site.bus}
         self._deadlines = Deadlines[Commanded]()
         self._missed_limit = RateLimit(_MISSED_EVENTS, _MISSED_EVERY_S)
@@ -93,6 +86,7 @@ class Plant:
         self._gate, self._guard = EventGate(), Guard("event")
         self._refused_by_others = 0
         self._is_closing = False
+        self._deadline_places: dict[str, int] = {}
         self._commanded: dict[str, Commanded] = {}
         """All drives, and the outputs of devices by their nodes."""
         self.nodes = {name: self._node(spec) for name, spec in catalogue.nodes.items()}
@@ -104,13 +98,13 @@ class Plant:
 
     def _node(self, spec: NodeSpec) -> Node:
         """A node with what it commands."""
-        drives = [self._added(Drive(one, self.image, *self._told())) for one in spec.drives]
+        drives = [self._added(Drive(one, self.image, self._effects)) for one in spec.drives]
         devices = [Device(one, self.image, self._outputs(one)) for one in spec.devices]
         return Node(spec, drives, devices)
 
     def _outputs(self, spec: DeviceSpec) -> Sequence[Outputs]:
         """The outputs of a device as one that is commanded; none where it has none."""
-        return [self._added(Outputs(spec, self.image, *self._told()))] if spec.is_commanded else []
+        return [self._added(Outputs(spec, self.image, self._effects))] if spec.is_commanded else []
 
     def _places_of_node(self, name: str) -> tuple[int, int, int]:
         """Places in the image of the state of a node, its present fault and its last one."""
@@ -132,7 +126,9 @@ class Plant:
             for member in node.members:
                 member.begin(began)
                 for one in member.commanded:
-                    self._on_settled(one, began)
+                    one.refresh(began)
+                    self._effects.settled[one.name] = began
+        self.settle()
         self.set("bridge/version", version, began)
         self.set("bridge/drives_configured", len(self.drives), began)
         for leaf in CONNECTION_COUNTS:
@@ -142,12 +138,8 @@ class Plant:
     def site(self) -> Site:
         return self.catalogue.site
 
-    def _told(self) -> Told:
-        """Callbacks of the next one that is added."""
-        due = partial(self._deadlines.due, len(self._commanded))
-        return self.report, self._on_settled, self._tripped, due
-
     def _added(self, one: One) -> One:
+        self._deadline_places[one.name] = len(self._deadline_places)
         self._deadlines.add(one)
         self._commanded[one.name] = one
         return one
@@ -162,9 +154,7 @@ class Plant:
         self._is_closing = True
         for one in self._commanded.values():
             one.channel.on_bridge_gap(now)
-
-    def _tripped(self, due: float) -> None:
-        self._stop_due = due if self._stop_due is None else min(due, self._stop_due)
+        self._conclude()
 
     def side_of(self, bus: BusTable) -> BusSide:
         """The plant as the nodes of this bus have it."""
@@ -174,7 +164,7 @@ class Plant:
     def take_stop_due(self) -> float | None:
         """Time at which the first stop was due of those that were handed to a bus since the last call, of
         drives that had tripped; None where there was none."""
-        due, self._stop_due = self._stop_due, None
+        due, self._effects.stop_due = self._effects.stop_due, None
         return due
 
     def on_event(self, listener: Callable[[Event], None]) -> None:
@@ -225,7 +215,7 @@ class Plant:
         if request.action in NODE_ACTIONS:
             reply = self._counting_refusals(request, now, reply)
             is_taken = carry_out(request, now, reply)
-            self.tell_events()
+            self._conclude()
             if not is_taken:
                 reply(Outcome(Code.UNKNOWN_TARGET, Text.of("request.no_node", node=request.target)))
             return is_taken
@@ -236,7 +226,7 @@ class Plant:
             return False
         if request.action in PARAMETER_ACTIONS:
             is_taken = carry_out(request, now, reply)
-            self.tell_events()
+            self._conclude()
             if not is_taken:
                 reply = self._counting_refusals(request, now, reply)
                 said = Text.of("request.on_no_bus", target=request.target)
@@ -249,6 +239,7 @@ class Plant:
             return False
         before, until = one.channel.wired, one.channel.until
         one.channel.handle(request, now, reply)
+        self._conclude()
         is_changed = one.channel.wired != before or request.action in _BRINGS_TIMERS_FORWARD
         # The bus may have been told to stop the drive by itself: not any more, its owner is there.
         return is_changed or (until is not None and until < now + one.burst_s)
@@ -312,23 +303,30 @@ class Plant:
         index = self.image.index[f"bridge/{leaf}"]
         self.image.set(index, int(self.image[index].value) + by, now)
 
-    def on_time(self, now: float, enforce: Enforce = lambda node, action, why, now: None) -> None:
-        """Let the timers of every channel run and bring the image up to date. ``enforce`` acts on the node of
-        whoever ignores its stop."""
+    def enforcements(self, now: float) -> Iterator[Enforcement]:
+        """What the nodes of those are to be made to do that ignore their stops. The timers of every channel
+        run while it is iterated: do to a node what it is to be made to do before the next one is taken, for
+        what another drive of that node comes to depends on it."""
+        self.settle()
         for one in self._deadlines.take_due(now):
-            for verdict in one.on_time(now):
-                self._conclude(one, verdict, now, enforce)
+            verdicts = one.on_time(now)
+            self.settle()
+            for verdict in verdicts:
+                action = self._stop_ended(one, verdict, now)
+                if action is not None:
+                    yield Enforcement(one.node_name, action, Text.of("stopped_by.plant", name=one.name))
 
-    def _conclude(self, one: Commanded, verdict: StopVerdict, now: float, enforce: Enforce) -> None:
+    def _stop_ended(self, one: Commanded, verdict: StopVerdict, now: float) -> Action | None:
+        """Report how a stop has ended; what is to be done to the node."""
         conclusion = concluded(self.nodes[one.node_name], one, verdict, now)
         self.audit.stop_ended(one.name, verdict.outcome.label, conclusion.logged, now)
         if conclusion.event is not None:
-            self.report(conclusion.event)
-        if conclusion.action is not None:
-            enforce(one.node_name, conclusion.action, Text.of("stopped_by.plant", name=one.name), now)
+            self.events.report(conclusion.event)
+        return conclusion.action
 
     def refresh(self, now: float) -> None:
         """The slow part: ages, counters and the faults of the nodes; a few times a second."""
+        self.settle()
         for one in self._deadlines.sweep(now):
             if self._missed_limit.allows(now):
                 said = Text.of("watchdog.deadline_missed")
@@ -342,21 +340,33 @@ class Plant:
         refused = sum(member.refused_writes for member in self.members.values())
         self.set("bridge/refused_writes", refused + self._refused_by_others, now)
 
-    def _on_settled(self, one: Commanded, now: float) -> None:
-        """Something about what is commanded has changed: show it, and with it the node's 102.0.
+    def _conclude(self) -> None:
+        """Apply and tell what has come of a call."""
+        self.settle()
+        self.tell_events()
 
-        102.0 is there while a controller is silent; it clears by itself and is then the last fault, as
-        P170 does.
-        """
-        node = self.nodes[one.node_name]
-        self._changed[node.bus.name].add(node.name)
-        one.refresh(now)
-        if one.stop_check.awaits_sending:
-            self.unsent_stops.add(one)
-        self._show_node(node, node.commanded[0].channel.link.node, now)
+    def settle(self) -> None:
+        """Apply the effects of drives and outputs since the last call."""
+        effects = self._effects
+        if not (effects.settled or effects.due):
+            return
+        settled, due = effects.settled, effects.due
+        effects.settled, effects.due = {}, {}
+        for name, at in settled.items():
+            one = self._commanded[name]
+            node = self.nodes[one.node_name]
+            self._changed[node.bus.name].add(node.name)
+            if one.stop_check.awaits_sending:
+                self.unsent_stops.add(one)
+            self._show_node(node, node.commanded[0].channel.link.node, at)
+        for name in due:
+            self._deadlines.touch(self._deadline_places[name])
 
     def _show_node(self, node: Node, is_now: NodeState, now: float) -> None:
-        silent = any(one.channel.is_tripped and one.channel.controller_is_overdue for one in node.commanded)
+        """Show a node's state and its 102.0, which is there while a controller is silent; it clears by itself
+        and is then the last fault, as P170 does."""
+        channels = [one.channel for one in node.commanded]
+        silent = [one for one in channels if one.is_tripped and one.controller_is_overdue]
         fault = node.family.faults.bridge_timeout if silent else 0.0
         state, current, last = self._node_points[node.name]
         self.image.set(state, NODE_CODES[is_now], now)
@@ -366,15 +376,20 @@ class Plant:
         self.image.set(current, fault, now)
 
     def next_deadline(self, now: float) -> float | None:
+        self.settle()
         return self._deadlines.next(now)
 
     @property
     def has_news(self) -> bool:
         """Since the last round something has come of a drive beside its values."""
-        return self._deadlines.is_touched or any(self._changed.values()) or bool(self._outcomes)
+        effects = self._effects
+        if effects.settled or effects.due or self._outcomes:
+            return True
+        return self._deadlines.is_touched or any(self._changed.values())
 
     def take_changed(self, bus: str) -> set[str]:
         """The nodes of this bus with a drive that may be sent something else since the last call."""
+        self.settle()
         changed = self._changed[bus]
         if changed:
             self._changed[bus] = set()

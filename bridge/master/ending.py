@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from bridge.command import Action, Commanded, Plant
 from bridge.command.commanded import has_followed
-from bridge.command.node import Enforce
+from bridge.command.node import Enforcement
 from bridge.text import Text, render
 
 
@@ -15,7 +15,8 @@ from bridge.text import Text, render
 class Ending:
     """Number of what is ``commanded``, of which so many are ``drives`` and the others outputs; and names of
     both. ``ignoring`` were heard and do not follow their stop; ``unheard`` were not heard; ``unproven`` are
-    outputs whose node does not let them be read, each with the reason."""
+    outputs whose node does not let them be read, each with the reason. ``nodes_stopped`` get NMT stop, or had
+    it."""
 
     drives: int = 0
     commanded: int = 0
@@ -53,9 +54,8 @@ def waits_for(plant: Plant) -> bool:
     )
 
 
-def end(plant: Plant, now: float, enforce: Enforce, *, can_send: bool = True) -> Ending:
-    """NMT stop for the nodes of what has not followed, unless the site file exempts them. A master that has
-    failed (not ``can_send``) sends nothing and hears nobody."""
+def end(plant: Plant, *, can_send: bool = True) -> Ending:
+    """Report of the end. A master that has failed (not ``can_send``) sends nothing and hears nobody."""
     ignoring = [one for one in plant.commanded if can_send and _ignores(one)]
     left = [one for one in plant.commanded if one not in ignoring]
     unproven = {one.name: one.unproven for one in left if one.unproven is not None}
@@ -70,16 +70,20 @@ def end(plant: Plant, now: float, enforce: Enforce, *, can_send: bool = True) ->
         tuple(one.name for one in ignoring),
         tuple(unheard),
         tuple(f"{name} ({render(why)})" for name, why in unproven.items()),
-        tuple(dict.fromkeys(_stopped(ignoring, now, enforce))),
+        tuple(dict.fromkeys(one.node_name for one in ignoring if _gets_nmt_stop(one))),
     )
 
 
-def _stopped(ignoring: Sequence[Commanded], now: float, enforce: Enforce) -> Iterator[str]:
-    for one in ignoring:
-        if one.table.reacts_to_ignored_stop != "report":
-            if one.stop_check.is_judged:
-                enforce(one.node_name, Action.STOP_NODE, Text.of("stopped_by.end", name=one.name), now)
-            yield one.node_name
+def nmt_stops(plant: Plant, ending: Ending) -> Iterator[Enforcement]:
+    """NMT stop for the nodes of what has not followed, unless the site file exempts them. Do each before the
+    next one is taken: a node that is stopped by then gets no other for its next drive."""
+    for one in plant.commanded:
+        if one.name in ending.ignoring and _gets_nmt_stop(one) and one.stop_check.is_judged:
+            yield Enforcement(one.node_name, Action.STOP_NODE, Text.of("stopped_by.end", name=one.name))
+
+
+def _gets_nmt_stop(one: Commanded) -> bool:
+    return one.table.reacts_to_ignored_stop != "report"
 
 
 def _ignores(one: Commanded) -> bool:

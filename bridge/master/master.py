@@ -17,8 +17,9 @@ from bridge.base.errors import OperationFailed
 from bridge.base.guard import Guard
 from bridge.can import open_all
 from bridge.can.interface import Bus, ControllerState
-from bridge.command import Action, Event, EventKind, Plant, Reply, Request
-from bridge.master.ending import Ending, end, waits_for
+from bridge.command import Event, EventKind, Plant, Reply, Request
+from bridge.command.node import Enforcement
+from bridge.master.ending import Ending, end, nmt_stops, waits_for
 from bridge.master.lateness import Lateness
 from bridge.master.line import RENEWALS, BusLine
 from bridge.master.network import Network
@@ -114,7 +115,9 @@ class Master:
             if not self._running or has_stopped or self._clock() > now + _DRIVES_FOLLOW_S:
                 break
             await asyncio.sleep(_LOOK_S)
-        ending = end(self._plant, self._clock(), self._enforce, can_send=self._running)
+        ending = end(self._plant, can_send=self._running)
+        for enforcement in nmt_stops(self._plant, ending):
+            self._enforce(enforcement, self._clock())
         if ending.nodes_stopped:
             self.wake()
             await asyncio.sleep(_STOP_DRIVES_S)
@@ -230,7 +233,7 @@ class Master:
             self._lateness.on_round(self._due, now)
             self._due = None
         now = self._receive(now)
-        self._plant.on_time(now, self._enforce)
+        self._run_timers(now)
         for line in self._lines:
             line.network.on_time(now)
             self._watch_bus(line, now)
@@ -244,7 +247,7 @@ class Master:
         self._last_round = now
         now = self._clock()
         self._check_gap(now)
-        self._plant.on_time(now, self._enforce)
+        self._run_timers(now)
         for line in self._lines:
             line.flush(now)
             if not line.stood_still(now):
@@ -263,9 +266,13 @@ class Master:
             with self._replies:
                 self._plant.deliver_outcomes()
 
-    def _enforce(self, node: str, action: Action, why: Text, now: float) -> None:
+    def _run_timers(self, now: float) -> None:
+        for enforcement in self._plant.enforcements(now):
+            self._enforce(enforcement, now)
+
+    def _enforce(self, enforcement: Enforcement, now: float) -> None:
         for line in self._lines:
-            line.network.enforce(node, action, why, now)
+            line.network.enforce(enforcement, now)
 
     def _check_gap(self, now: float) -> None:
         """After a pause longer than the dead-man time, or a suspended machine, all bursts have ended: nothing

@@ -18,6 +18,7 @@ from bridge.canopen.sync import SyncWindow
 from bridge.canopen.time_stamp import TimeProducer
 from bridge.command import Action, BusSide, Code, Commanded, Event, EventKind, Outcome, Reply, Request
 from bridge.command.messages.request import NODE_ACTIONS
+from bridge.command.node import Enforcement
 from bridge.config import BusTable
 from bridge.config.download import Download
 from bridge.master.bus_points import BusPoints
@@ -234,11 +235,11 @@ class Network:
                     return True
         return False
 
-    def enforce(self, name: str, action: Action, why: Text, now: float) -> None:
-        """Do this to the node ``name``, if it is on this bus."""
+    def enforce(self, enforcement: Enforcement, now: float) -> None:
+        """Do this to its node, if that is on this bus."""
         for node in self.nodes:
-            if node.node.name == name:
-                node.enforce(action, why, now)
+            if node.node.name == enforcement.node:
+                node.enforce(enforcement.action, enforcement.why, now)
 
     # as its nodes see it
 

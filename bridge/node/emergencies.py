@@ -3,8 +3,8 @@ history as points."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 from bridge.canopen import emcy
 from bridge.canopen.frame import Frame
@@ -19,43 +19,43 @@ _GONE: Final = 100
 """Severities of an emergency message, as of a drive's."""
 
 
-class Emergencies:
-    """``reject`` is called with what is no emergency message, ``told`` with each drive that one was
-    about."""
+class Concerned(NamedTuple):
+    """A drive that an emergency message is about, and when that came."""
 
-    def __init__(
-        self,
-        node: Node,
-        side: BusSide,
-        reject: Callable[[Frame, Text], None],
-        told: Callable[[Drive, float], None] = lambda drive, now: None,
-    ) -> None:
+    drive: Drive
+    at: float
+
+
+class Emergencies:
+    """Emergency messages of one node, in its points and its drives."""
+
+    def __init__(self, node: Node, side: BusSide) -> None:
         self._node = node
         self._image = side.image
         self._events = side.events
-        self._reject = reject
-        self._told = told
         self._reader = EmergencyReader(node.family)
         self._log = EmergencyLog()
 
-    def on_frame(self, frame: Frame) -> None:
+    def on_frame(self, frame: Frame) -> Sequence[Concerned] | None:
+        """Drives that it is about, as far as it is told now; None where it is no emergency message."""
         emergency = emcy.decode(frame.data)
         if emergency is None:
-            self._reject(frame, Text.of("frame.emergency_length"))
-            return
+            return None
         byte = self._node.family.emcy.drive_byte
         number = frame.data[byte] if byte is not None and byte < len(frame.data) else None
         if self._log.add(emergency, number, frame.time):
-            self._tell(emergency, number, frame.time)
+            return self._tell(emergency, number, frame.time)
+        return ()
 
-    def on_time(self, now: float) -> None:
-        for emergency, number, at in self._log.on_time(now):
-            self._tell(emergency, number, at)
+    def on_time(self, now: float) -> Sequence[Concerned]:
+        """Drives that messages are about which were held back and are told now."""
+        told = self._log.on_time(now)
+        return [one for emergency, number, at in told for one in self._tell(emergency, number, at)]
 
     def next_deadline(self) -> float | None:
         return self._log.next_deadline()
 
-    def _tell(self, emergency: emcy.Emergency, number: int | None, at: float) -> None:
+    def _tell(self, emergency: emcy.Emergency, number: int | None, at: float) -> Sequence[Concerned]:
         told = self._reader.read(emergency.code, emergency.vendor)
         concerned = [one for one in self._node.drives if one.slot.emcy_drive in (None, number)]
         is_of_one_drive = len(concerned) == 1 or any(one.slot.emcy_drive is not None for one in concerned)
@@ -66,7 +66,7 @@ class Emergencies:
         for drive in concerned:
             drive.channel.on_emcy(told, at, is_its_own=is_of_one_drive)
             drive.refresh(at)
-            self._told(drive, at)
+        return [Concerned(drive, at) for drive in concerned]
 
     def _report(self, source: str, told: EmergencyMeaning, at: float) -> None:
         severity = _GONE if told.is_gone else _COMES

@@ -5,7 +5,6 @@ What is known of the state is what the node has said, never what it was told.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from enum import Enum
 
 from bridge.canopen import nmt
@@ -30,12 +29,13 @@ class Sign(Enum):
 
 
 class ErrorControl:
-    """``duplicate`` is called where two devices seem to have this node id."""
+    """Error control of the node of ``table``."""
 
-    def __init__(self, table: NodeTable, duplicate: Callable[[DuplicateSign, float], None]) -> None:
+    def __init__(self, table: NodeTable) -> None:
         self._table = table
-        self._duplicate = duplicate
         self._duplicates = DuplicateCheck()
+        self.duplicate: DuplicateSign | None = None
+        """Sign in the frame that came last that two devices have this node id."""
         self.boot_loop = BootLoop()
         self.state = NmtState.UNKNOWN
         self._toggle_errors_before = 0
@@ -62,6 +62,7 @@ class ErrorControl:
         return self._supervisor.toggle_errors if isinstance(self._supervisor, NodeGuard) else 0
 
     def on_frame(self, frame: Frame) -> Sign:
+        self.duplicate = None
         if len(frame.data) != 1:
             return Sign.MALFORMED
         state = nmt.state_of(frame.data[0])
@@ -71,9 +72,7 @@ class ErrorControl:
             return Sign.BOOT_UP
         if self._supervisor and not self._supervisor.on_frame(frame):
             return Sign.WRONG_TOGGLE
-        found = self._duplicates.on_heartbeat(state, frame.time)
-        if found:
-            self._duplicate(found, frame.time)
+        self.duplicate = self._duplicates.on_heartbeat(state, frame.time)
         if state is self.state:
             return Sign.SAME
         self.state = state
@@ -102,9 +101,7 @@ class ErrorControl:
 
     def on_reply(self, frame: Frame, *, matched: bool) -> None:
         """An SDO answer; ``matched`` where it belonged to a request of ours."""
-        found = self._duplicates.on_reply(frame.data, frame.time, matched=matched)
-        if found:
-            self._duplicate(found, frame.time)
+        self.duplicate = self._duplicates.on_reply(frame.data, frame.time, matched=matched)
 
     def produces_every(self, period_s: float | None) -> None:
         """The heartbeat period that the node has kept at boot-up; None where there is none."""

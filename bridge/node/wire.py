@@ -18,7 +18,7 @@ from bridge.command import BusSide, Commanded, Event, EventKind
 from bridge.command.device import Device
 from bridge.command.node import Node
 from bridge.node import boot
-from bridge.node.emergencies import Emergencies
+from bridge.node.emergencies import Concerned, Emergencies
 from bridge.node.error_control import ErrorControl, Sign
 from bridge.node.fault_reading import FaultReading
 from bridge.node.meaning_watch import MeaningWatch
@@ -72,9 +72,9 @@ class NodeWire:
         outputs = [one for device in node.devices for one in device.commanded]
         self._read_backs = [ReadBack(one, self.sdo) for one in outputs]
         self._timed = (*node.devices, *self._read_backs)
-        self._emergencies = Emergencies(node, side, self.reject, self.faults.on_emcy)
-        self.error_control = ErrorControl(node.table, listener.on_duplicate)
-        self.polling = Polling(node.family.poll, self.sdo.for_polls, self._show_poll)
+        self._emergencies = Emergencies(node, side)
+        self.error_control = ErrorControl(node.table)
+        self.polling = Polling(node.family.poll, self.sdo.for_polls, side.image, f"{node.name}/node")
         self.drives: dict[str, DrivePdos] = {}
         self.output_pdos: dict[str, OutputPdos] = {}
         """The PDOs of outputs, by their names, as ``drives`` has those of drives."""
@@ -164,6 +164,7 @@ class NodeWire:
             self.habits.note(Odd.SDO_LENGTH, len(frame.data), _SDO_BYTES)
         if channel.late == late:
             self.error_control.on_reply(frame, matched=channel.unmatched == unmatched)
+            self._tell_duplicate(frame.time)
         else:
             late_ms, timeout_ms = round(1000 * channel.lateness_s), round(1000 * channel.timeout_s)
             self.habits.note(Odd.SDO_LATE, late_ms, timeout_ms)
@@ -171,16 +172,29 @@ class NodeWire:
         self._listener.touch()
 
     def _on_emcy(self, frame: Frame) -> None:
-        self._emergencies.on_frame(frame)
+        concerned = self._emergencies.on_frame(frame)
+        if concerned is None:
+            self.reject(frame, Text.of("frame.emergency_length"))
+        else:
+            self._look_for_faults(concerned)
         self._listener.touch()
+
+    def _look_for_faults(self, concerned: Sequence[Concerned]) -> None:
+        for one in concerned:
+            self.faults.on_emcy(one.drive, one.at)
 
     def _on_error_control(self, frame: Frame) -> None:
         sign = self.error_control.on_frame(frame)
+        self._tell_duplicate(frame.time)
         if sign is Sign.MALFORMED:
             self.habits.note(Odd.HEARTBEAT_LENGTH, len(frame.data), 1)
             self.reject(frame, Text.of("frame.error_control_length"))
         else:
             self._listener.on_sign(sign, frame.time)
+
+    def _tell_duplicate(self, at: float) -> None:
+        if self.error_control.duplicate is not None:
+            self._listener.on_duplicate(self.error_control.duplicate, at)
 
     def reject(self, frame: Frame, why: Text) -> None:
         """A frame that does not fit: counted, told at most once a minute, nothing changed."""
@@ -194,7 +208,7 @@ class NodeWire:
         self._events.report(Event(frame.time, EventKind.CONFIGURATION, self._node.name, 300, said))
 
     def on_time(self, now: float) -> None:
-        self._emergencies.on_time(now)
+        self._look_for_faults(self._emergencies.on_time(now))
         self.faults.on_time(now)
         self.meanings.on_time(now)
         for one in self._timed:
@@ -237,9 +251,6 @@ class NodeWire:
         self.polling.stop()
         self.faults.stop()
         self.meanings.stop()
-
-    def _show_poll(self, name: str, value: int, now: float) -> None:
-        self._image.put(f"{self._node.name}/node/{name}", value, now)
 
     def connect(self, result: boot.BootResult, now: float) -> None:
         """Take over what the boot-up found."""

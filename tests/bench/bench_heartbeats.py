@@ -7,6 +7,7 @@ from pathlib import Path
 from bridge.canopen.frame import Frame
 from bridge.command.drive_link import NodeState
 from tests.bench.figures import cpu_us, show
+from tests.support.node_states import run_timers
 from tests.support.quick import Quick, quick_site
 
 NODES = 127
@@ -30,7 +31,7 @@ def test_127_nodes_with_100_ms_heartbeats(tmp_path: Path) -> None:
                 now += step_s
                 network.on_frames([Frame(0x700 + node_id, b"\x05", now)], now)
                 if one_round:
-                    plant.on_time(now)
+                    run_timers(plant, now)
                     network.on_time(now)
                     network.take_routes()
                     network.take_frames()

@@ -17,6 +17,7 @@ from bridge.catalogue import Catalogue
 from bridge.command import Action, Event, Identity, Outcome, Plant, PlantView, Request, Source, command_of
 from bridge.config import Site, load_site
 from bridge.mapping import Family, load_family
+from bridge.master.ending import Ending, end, nmt_stops
 from bridge.master.master import Master
 from bridge.master.network import Network
 from bridge.master.standby import Standby, listen_s
@@ -207,6 +208,13 @@ class Bench:
             self.bus.on_time(self.now)
             self.node.on_time(self.now)
             self._from_node()
+
+    def end(self) -> Ending:
+        """What the master reports at its end, and does about what has not followed."""
+        ending = end(self.plant)
+        for enforcement in nmt_stops(self.plant, ending):
+            self.network.enforce(enforcement, self.now)
+        return ending
 
     def write(self, drive: str = "conveyor/fu1", identity: Identity = PLC, **values: int | float) -> Outcome:
         return self.ask(Action.WRITE, drive, identity, values=values)

@@ -6,12 +6,12 @@ from bridge.command import Action, Event, Request, command_of
 from bridge.command.audit import AuditEntry
 from bridge.command.drive import Drive
 from bridge.command.drive_link import NodeState
+from bridge.command.node import Enforcement
 from bridge.command.stop_check.state import LastStop
 from bridge.image import Value
-from bridge.text import Text
 from tests.support import sites
 from tests.support.leg_words import NORD_TU4, LegWords
-from tests.support.node_states import hand_over, node_goes
+from tests.support.node_states import hand_over, node_goes, run_timers
 from tests.support.rig import PLC
 
 BEGIN = 1024.0
@@ -43,7 +43,7 @@ class JudgedPlant:
         self.now = BEGIN
         self.events: list[Event] = []
         self.entries: list[AuditEntry] = []
-        self.enforced: list[tuple[str, Action, Text]] = []
+        self.enforced: list[Enforcement] = []
         self.plant.on_event(self.events.append)
         self.plant.audit.tell_to(self.entries.append)
         self.drive: Drive = self.plant.drives[f"conveyor/{names[0]}"]
@@ -99,7 +99,7 @@ class JudgedPlant:
         self.looks()
 
     def looks(self) -> None:
-        self.plant.on_time(self.now, lambda node, action, why, now: self.enforced.append((node, action, why)))
+        self.enforced += run_timers(self.plant, self.now)
         self._settle()
 
     # its owner

@@ -7,8 +7,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
-from bridge.command import Action, Do, Outcome, Request, Write
+from bridge.command import Action, Do, EventQueue, Outcome, Request, Write
 from bridge.command.drive_link import NodeState
+from bridge.command.effects import Effects
 from bridge.command.leg.event import BridgeGap, Event, StartAnew, Time
 from bridge.command.leg.state import LegState
 from bridge.command.messages.request import STOP_ACTIONS
@@ -47,10 +48,8 @@ class OutputSpace:
             self.words,
             table,
             2000,
-            lambda event: None,
-            settled=lambda now: self._settled(),
-            tripped=lambda due: None,
-            due=lambda at: None,
+            Effects(EventQueue()),
+            lambda now: self._settled(),
         )
         self.channel.on_node(NodeState.OPERATIONAL, NOW)
         self.safe = tuple(0 if value == "hold" else int(value) for value in on_expiry)

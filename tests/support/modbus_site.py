@@ -9,7 +9,7 @@ from bridge.command import Drive, Identity, Plant, Source
 from bridge.command.drive_link import NodeState
 from bridge.config import WordOrder
 from tests.support import sites
-from tests.support.node_states import node_goes
+from tests.support.node_states import node_goes, run_timers
 from tests.support.views import dispatcher_of, view_of
 
 _OF_FU3 = "fieldbus_timeout_writable = true\nstop_by_anyone = false"
@@ -59,7 +59,7 @@ class Rig:
 
     def pass_time(self, seconds: float) -> None:
         self.now += seconds
-        self.plant.on_time(self.now)
+        run_timers(self.plant, self.now)
 
     def ask(self, pdu: bytes | str, unit: int = 1, caller: Identity = PLC) -> bytes:
         """The answer to one request PDU, which may be given in hexadecimal."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from bridge.command import Commanded, Node, Plant
 from bridge.command.drive_link import NodeState
+from bridge.command.node import Enforcement
 from bridge.node.node_view import NodeView
 
 
@@ -15,7 +16,16 @@ def node_goes(plant: Plant, node: Node, state: NodeState, now: float, *, tell: b
     node.on_state(state, now)
     if tell:
         view.went(state, now)
+    plant.settle()
     plant.tell_events()
+
+
+def run_timers(plant: Plant, now: float) -> list[Enforcement]:
+    """The timers of a plant run that has no master; what that would have made its nodes do."""
+    enforcements = list(plant.enforcements(now))
+    plant.settle()
+    plant.tell_events()
+    return enforcements
 
 
 def hand_over(plant: Plant, one: Commanded, now: float) -> None:

@@ -16,7 +16,7 @@ from bridge.command.messages.request import DONE, NODE_ACTIONS, Code, Reply
 from bridge.config import OpcUaTable
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support import sites
-from tests.support.node_states import node_goes
+from tests.support.node_states import node_goes, run_timers
 
 SITE = sites.site(
     sites.bus(
@@ -84,7 +84,7 @@ class LocalView(PlantView):
             for drive in self.plant.drives.values():
                 if self.answers:
                     drive.on_process_data(_answer(drive.channel.output.words), now)
-            self.plant.on_time(now)
+            run_timers(self.plant, now)
             self.plant.deliver_outcomes()
             await asyncio.sleep(0.005)
 

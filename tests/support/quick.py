@@ -168,7 +168,8 @@ class Quick:
                 node.on_time(self.now)
         self.deliver()
         self.network.on_time(self.now)
-        self.plant.on_time(self.now, self.network.enforce)
+        for enforcement in self.plant.enforcements(self.now):
+            self.network.enforce(enforcement, self.now)
         if self.now >= self.refresh_at:
             self.refresh_at = self.now + 0.1
             self.plant.refresh(self.now)

@@ -9,6 +9,7 @@ from bridge.command import (
     Code,
     Event,
     EventKind,
+    EventQueue,
     Identity,
     Outcome,
     Request,
@@ -18,6 +19,7 @@ from bridge.command import (
 )
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.drive_link import NodeState
+from bridge.command.effects import Effects
 from bridge.config import DriveTable
 from bridge.drive import EmergencyMeaning, EmergencyReader, LinearScale
 from bridge.image import Value
@@ -66,16 +68,11 @@ class Rig:
         family = NORD if words is NORD_TU4 else load_family(words.mapping)
         slot = family.slot[0].name
         given = {"slot": slot, "control": "modbus", "fieldbus_timeout_ms": 200, **settings}
-        self.events: list[Event] = []
+        self.effects = Effects(EventQueue())
+        self.events: list[Event] = self.effects.events.waiting
         table = DriveTable.model_validate(given)
         self.channel = DriveChannel(
-            f"conveyor/{slot}",
-            family,
-            table,
-            hold_ms,
-            self.events.append,
-            settled=lambda now: None,
-            tripped=lambda due: None,
+            f"conveyor/{slot}", family, table, hold_ms, self.effects, lambda now: None
         )
         meanings = self.channel.meanings
         meanings.scales.setdefault("command/frequency", LinearScale(50.0, 16384, 2.0))

@@ -32,7 +32,7 @@ from bridge.zenohlink import Sample, zenoh_config
 from bridge.zenohlink.worker import Worker
 from tests.support import sites
 from tests.support.bench import Bench, write_site
-from tests.support.node_states import node_goes
+from tests.support.node_states import node_goes, run_timers
 from tests.support.quiet import QuietLog, quiet_log
 from tests.support.rig import ENABLE, ENGINEER, OTHER_PLC, PLC, SHUT_DOWN, emergency
 from tests.support.views import dispatcher_of, view_of
@@ -69,7 +69,7 @@ class Hall:
 
     def step(self) -> None:
         self.log.now += STEP_S
-        self.plant.on_time(self.now)
+        run_timers(self.plant, self.now)
 
     def ask(self, action: Action, who: Identity = PLC, target: str = FU1, **more: object) -> None:
         request = Request(who, target, command_of(action, **more))
@@ -121,7 +121,7 @@ def leases_taken_away(hall: Hall, number: int) -> None:
 def leases_that_run_out(hall: Hall, number: int) -> None:
     hall.ask(Action.TAKE_CONTROL, Identity(Source.OPCUA, "ann"), FU2, ttl_ms=100)
     hall.log.now += 0.001
-    hall.plant.on_time(hall.now + 0.2)
+    run_timers(hall.plant, hall.now + 0.2)
 
 
 def stops_by_others(hall: Hall, number: int) -> None:
@@ -131,7 +131,7 @@ def stops_by_others(hall: Hall, number: int) -> None:
 
 def trips(hall: Hall, number: int) -> None:
     hall.ask(Action.WRITE, values={"control_word": SHUT_DOWN})
-    hall.plant.on_time(hall.now + 0.3)
+    run_timers(hall.plant, hall.now + 0.3)
     hall.ask(Action.RESET_FAULT)
 
 
@@ -150,7 +150,7 @@ def lost_nodes(hall: Hall, number: int) -> None:
 def late_process_data(hall: Hall, number: int) -> None:
     hall.plant.drives[FU1].channel.link.pdo_deadline_s = 0.01
     hall.plant.drives[FU1].on_process_data([0, 0, 0, 0], hall.now)
-    hall.plant.on_time(hall.now + 5)
+    run_timers(hall.plant, hall.now + 5)
 
 
 @pytest.mark.landing(5)

@@ -24,7 +24,7 @@ from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.zenoh import ZenohServer
 from tests.support import sites
 from tests.support.modbus_site import ENABLED, READY, SWITCH_ON_INHIBITED
-from tests.support.node_states import node_goes
+from tests.support.node_states import node_goes, run_timers
 from tests.support.opcua_site import OPEN, LocalView
 from tests.support.views import view_of
 from tests.support.zenoh_peer import free_port
@@ -65,7 +65,7 @@ async def running(plant: Plant) -> AsyncIterator[list[float]]:
             now = time.monotonic()
             if enables(plant):
                 last[0] = now
-            plant.on_time(now)
+            run_timers(plant, now)
             await asyncio.sleep(0.002)
 
     task = asyncio.create_task(look())

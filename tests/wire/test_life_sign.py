@@ -12,6 +12,7 @@ from pymodbus.client import AsyncModbusTcpClient
 from bridge.command import Plant
 from tests.support import sites
 from tests.support.modbus_site import READY
+from tests.support.node_states import run_timers
 from tests.support.opcua_client import node, word, write
 from tests.support.opcua_site import OPEN, serving
 from tests.wire.test_modbus import drive_says, on_the_bus, pymodbus
@@ -34,7 +35,7 @@ def plant_of(control: str, more: str = "") -> Plant:
 
 
 def runs(plant: Plant) -> bool:
-    plant.on_time(time.monotonic())
+    run_timers(plant, time.monotonic())
     return on_the_bus(plant)[0] & 0xF == 0xF
 
 

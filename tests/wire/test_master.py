@@ -16,8 +16,8 @@ DEADMAN_S = 0.5
 
 async def test_a_fault_of_our_own_leaves_no_drive_running_and_is_told(tmp_path: Path) -> None:
     async with loaded(tmp_path) as load:
-        master, network = load.service.master, load.service.plant
-        network.on_time = broken  # type: ignore[method-assign]
+        master, plant = load.service.master, load.service.plant
+        plant.enforcements = broken  # type: ignore[method-assign]
         broke = time.monotonic()
         told = "the master has failed: ZeroDivisionError"
         with pytest.raises(OperationFailed, match=told):

@@ -194,7 +194,7 @@ async def test_drives_stop_first_when_the_service_is_cancelled_again_and_again(t
 
 async def test_a_fault_in_a_round_of_the_master_stops_the_drives_in_that_round(tmp_path: Path) -> None:
     async with moving(tmp_path) as move:
-        move.service.master._plant.on_time = broken  # type: ignore[method-assign]
+        move.service.master._plant.enforcements = broken  # type: ignore[method-assign]
         assert "the master has failed" in str(await move.end())
         assert move.ends() == ["stopped", "front ends"]
 

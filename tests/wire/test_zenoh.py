@@ -15,6 +15,7 @@ from bridge.config import ZenohTable
 from bridge.northbound.zenoh import ZenohServer
 from bridge.zenohlink import Value
 from bridge.zenohlink.publishers import Publishers
+from tests.support.node_states import run_timers
 from tests.support.views import view_of
 from tests.support.zenoh_peer import free_port, until, zenoh_peer
 from tests.support.zenoh_rig import FU3, TOP, rig
@@ -262,7 +263,7 @@ async def test_a_trip_is_seen_and_has_to_be_acknowledged() -> None:
         assert (await r.peer.command(f"{FU3}/command/control_word", 0x047E))["ok"]
         assert (await r.peer.command(f"{FU3}/command/control_word", 0x047F))["ok"]
         drive_says(r.fu3, ENABLED)
-        r.plant.on_time(time.monotonic() + 1.1)
+        run_timers(r.plant, time.monotonic() + 1.1)
         await r.sees(f"{FU3}/status/state", s="fault")
         await r.sees(f"{FU3}/supervision/current_fault", v=10.3)
         await r.sees(f"{TOP}/@/event/watchdog", source="conveyor/fu3")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.command.deadlines import NOW
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.drive_link import NodeState
 from bridge.command.stop_check.event import (
@@ -86,17 +85,17 @@ class DriveStopCheck:
         """What was to be sent has been handed to the bus. ``rpdo_period_ms`` is how long it may take to the
         drive, ``own`` what the drive does when we fall silent."""
         self._tell(HandedOver(now, self._bounds(rpdo_period_ms, own)))
-        self._channel.due(NOW)
+        self._channel.plan_anew()
 
     def on_cut_off(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
         """The bridge takes the node out of operation: the drive will not be heard any more."""
         self._tell(CutOff(now, self._bounds(rpdo_period_ms, own)))
-        self._channel.due(NOW)
+        self._channel.plan_anew()
 
     def on_node_stopped(self, now: float) -> None:
         """The node has said that it is in a state in which its drives do not run."""
         self._tell(NodeStopped(now))
-        self._channel.due(NOW)
+        self._channel.plan_anew()
 
     def on_restart(self) -> None:
         """The node has started: what it was told before is over."""
@@ -127,7 +126,7 @@ class DriveStopCheck:
         last, deadline_s = link.last_pdo, link.pdo_deadline_s
         if last is not None and deadline_s is not None and now - last > deadline_s:
             self._tell(TelegramGap(now))
-            self._channel.due(NOW)
+            self._channel.plan_anew()
 
     def after_pdo(self, now: float) -> None:
         """The channel has the status word of the TPDO."""
@@ -135,7 +134,7 @@ class DriveStopCheck:
         if word != self._status_word or not self._state.is_informed:
             self._status_word = word
             self._tell(StatusChange(self._says(word), now))
-            self._channel.due(NOW)
+            self._channel.plan_anew()
 
     def on_telegram(self, now: float, speed: float | None) -> None:
         """The TPDO that ``after_pdo`` knows, changed or not. ``speed`` is the actual speed or
@@ -145,7 +144,7 @@ class DriveStopCheck:
         before = self._state.last_stop
         self._tell(TelegramHeard(now, speed))
         if self._state.last_stop is not before:
-            self._channel.due(NOW)
+            self._channel.plan_anew()
 
     def _says(self, word: int) -> Says:
         state = self._channel.state

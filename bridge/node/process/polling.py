@@ -9,18 +9,19 @@ from collections.abc import Callable, Iterable
 from bridge.canopen.datatypes import INTEGERS
 from bridge.canopen.frame import Frame
 from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
+from bridge.image import Image
 from bridge.mapping.model import Poll
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.process.remote_polling import RemotePolling
 
 
 class Polling:
-    """The polls of one mapping file. ``show`` gets name, value and the time of the answer."""
+    """The polls of one mapping file, each with its point ``place``/NAME in the image."""
 
-    def __init__(self, polls: list[Poll], sdo: SdoChannel, show: Callable[[str, int, float], None]) -> None:
+    def __init__(self, polls: list[Poll], sdo: SdoChannel, image: Image, place: str) -> None:
         self._polls = polls
         self._sdo = sdo
-        self._show = show
+        self._image, self._place = image, place
         self._due: list[tuple[float, int]] = []
         self._asked: set[int] = set()
         """Polls that wait for their answer: of a node that is slow, no more of them pile up."""
@@ -38,6 +39,9 @@ class Polling:
         """A PDO has brought this value: it is not asked for before ``until``."""
         self._spared[name] = until
         self._show(name, value, now)
+
+    def _show(self, name: str, value: int, now: float) -> None:
+        self._image.put(f"{self._place}/{name}", value, now)
 
     def stop(self) -> None:
         self._due = []

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from bridge.command import Action, Event, EventKind, Outcome
+from bridge.command import Action, EventKind, EventQueue, Outcome
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.drive_link import NodeState
+from bridge.command.effects import Effects
 from bridge.config import DriveTable
 from bridge.text import render
 from tests.support.leg_words import ALL
@@ -252,12 +253,8 @@ class Watched:
     def __init__(self) -> None:
         self.seen: list[tuple[object, ...]] = []
         table = DriveTable.model_validate({"slot": "fu1", "control": "modbus", "fieldbus_timeout_ms": 200})
-        self.due: list[float] = []
-        self.channel = DriveChannel(
-            "conveyor/fu1", NORD, table, 2000, self.on_event, settled=self.on_settled, tripped=self.due.append
-        )
-
-    def on_event(self, event: Event) -> None: ...
+        self.effects = Effects(EventQueue())
+        self.channel = DriveChannel("conveyor/fu1", NORD, table, 2000, self.effects, self.on_settled)
 
     def on_settled(self, now: float) -> None:
         channel = self.channel
@@ -289,11 +286,12 @@ def test_a_trip_gives_the_moment_at_which_it_was_due() -> None:
     rig = Rig()
     rig.channel = watched.channel
     rig.run()
-    assert watched.due == []
+    assert watched.effects.stop_due is None
     watched.channel.on_time(rig.now + 0.5)
-    assert watched.due == [pytest.approx(rig.now + 0.2)]
+    assert watched.effects.stop_due == pytest.approx(rig.now + 0.2)
+    watched.effects.stop_due = None
     outcomes: list[Outcome] = rig.submit(Action.KEEP_ALIVE)
     assert [outcome.ok for outcome in outcomes] == [True]
     rig.drive_says(INHIBITED)
     rig.drive_says(ENABLED)
-    assert len(watched.due) == 1
+    assert watched.effects.stop_due is None

@@ -98,3 +98,27 @@ def test_the_age_is_in_milliseconds_and_has_a_number_for_never(
     if pdo_at is not None:
         link.on_pdo(pdo_at)
     assert link.age_ms(now) == age_ms
+
+
+@pytest.mark.parametrize(
+    ("deadline_s", "pdo_at", "judged_at", "now", "is_earlier"),
+    [
+        (None, None, 1000.0, 1000.0, False),
+        (DEADLINE_S, None, 1.0625, 2.0, False),
+        (DEADLINE_S, None, 1.125, 2.0, True),
+        (DEADLINE_S, 0.5, 1.0625, 2.0, False),
+        (DEADLINE_S, 1.5, 1.5625, 1.5, False),
+        (DEADLINE_S, 1.5, 1.625, 2.0, True),
+        (DEADLINE_S, 1.5, 1.5625, 1.4375, True),
+    ],
+)
+def test_a_tpdo_after_a_late_one_or_out_of_order_may_bring_an_earlier_deadline(
+    deadline_s: float | None, pdo_at: float | None, judged_at: float, now: float, is_earlier: bool
+) -> None:
+    link = DriveLink(0.5, 2000)
+    link.on_boot(deadline_s, ())
+    link.on_node(NodeState.OPERATIONAL, 1.0)
+    if pdo_at is not None:
+        link.on_pdo(pdo_at)
+    link.on_time(judged_at)
+    assert link.brings_forward(now) is is_earlier

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.command import Event
+from bridge.command import EventQueue
 from bridge.command.meaning_news import MeaningNews
 from tests.support import sites
 
@@ -17,13 +17,11 @@ class Case:
     def __init__(self) -> None:
         self.plant = sites.plant_of(sites.site(sites.bus(sites.node(sites.drive("fu1", "lease", 200, "")))))
         self.drive = self.plant.drives[DRIVE]
-        self.events: list[Event] = []
-        self.news = MeaningNews(self.drive, self.events.append)
+        self.events = EventQueue()
+        self.news = MeaningNews(self.drive, self.events)
 
     def told(self) -> list[str]:
-        found = [event.message for event in self.events]
-        self.events.clear()
-        return found
+        return [event.message for event in self.events.take()]
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ from bridge.command.drive_link import REASONS, NodeState
 from bridge.command.worst_case import Wire
 from bridge.image import Quality, Reading, Value
 from tests.support import sites
-from tests.support.node_states import node_goes
+from tests.support.node_states import node_goes, run_timers
 from tests.support.rig import (
     ACKNOWLEDGE,
     ENABLE,
@@ -94,7 +94,7 @@ class Hall:
     def at(self, now: float) -> None:
         """The master's round at this time."""
         self.now = now
-        self.plant.on_time(now)
+        run_timers(self.plant, now)
 
     def pdo(self, *words: int) -> None:
         self.drive.on_process_data((*words, 0, 0, 0)[:4], self.now)
@@ -418,6 +418,7 @@ def test_a_fault_of_the_drive_is_told_in_the_manuals_words(running: Hall):
     running.pdo(FAULT)
     assert running.value("status/emcy_code") == 0x2310
     assert running.value("status/fault_text") == "3.0 overcurrent of the inverter"
+    running.plant.tell_events()
     assert [event.message for event in running.events if event.kind is EventKind.EMERGENCY] == [
         "emergency 2310h: 3.0 overcurrent of the inverter"
     ]

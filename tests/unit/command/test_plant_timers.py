@@ -8,7 +8,7 @@ from bridge.command import Action, Plant, Request, Write
 from bridge.command.drive_link import NodeState
 from bridge.image import Quality, Value
 from tests.support import sites
-from tests.support.node_states import hand_over, node_goes
+from tests.support.node_states import hand_over, node_goes, run_timers
 from tests.support.rig import PLC, READY
 from tests.unit.command.test_plant import SITE, Hall
 
@@ -29,15 +29,15 @@ def test_a_drive_that_was_heard_again_is_stale_at_its_next_deadline(nodes: int) 
     drive.channel.link.pdo_deadline_s = 0.1
     node_goes(plant, plant.nodes["n1"], NodeState.OPERATIONAL, 100.0)
     drive.on_process_data((READY, 0, 0, 0), 100.0)
-    plant.on_time(100.1)
+    run_timers(plant, 100.1)
     assert drive.quality is Quality.STALE
-    plant.on_time(100.2)
+    run_timers(plant, 100.2)
     drive.on_unchanged_data(100.2)
     assert drive.quality is Quality.GOOD
     now, times = 100.2, 0
     while (due := plant.next_deadline(now)) is not None and due <= 100.31:
         now = max(now, due)
-        plant.on_time(now)
+        run_timers(plant, now)
         times += 1
         assert drive.quality is (Quality.GOOD if now < 100.3 else Quality.STALE)
     assert drive.quality is Quality.STALE

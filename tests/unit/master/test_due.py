@@ -49,6 +49,8 @@ class Everything:
         times = (drive.next_deadline(now) for drive in self._drives)
         return min((at for at in times if at is not None), default=None)
 
+    def touch(self, place: int) -> None: ...
+
     def sweep(self, now: float) -> list[Drive]:
         return []
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bridge.master.ending import Ending, end, waits_for
+from bridge.master.ending import Ending, waits_for
 from tests.support.bench import Bench
 from tests.support.output_block import (
     block_bench,
@@ -17,7 +17,7 @@ from tests.support.output_block import (
 def ended(bench: Bench, for_s: float) -> Ending:
     bench.master.halt(bench.now)
     bench.run(for_s)
-    return end(bench.plant, bench.now, bench.network.enforce)
+    return bench.end()
 
 
 def test_the_end_waits_for_outputs_and_says_that_all_are_stopped(tmp_path: Path) -> None:
@@ -26,7 +26,7 @@ def test_the_end_waits_for_outputs_and_says_that_all_are_stopped(tmp_path: Path)
     assert waits_for(bench.plant)
     bench.run(0.1)
     assert not waits_for(bench.plant)
-    ending = end(bench.plant, bench.now, bench.network.enforce)
+    ending = bench.end()
     assert (ending.is_good, ending.lines) == (True, ["all drives and outputs are stopped"])
 
 

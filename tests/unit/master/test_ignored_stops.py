@@ -13,7 +13,7 @@ from bridge.command.audit import AuditEntry
 from bridge.command.drive_link import NodeState
 from bridge.command.stop_check.state import LastStop
 from bridge.image import Quality
-from bridge.master.ending import end, waits_for
+from bridge.master.ending import waits_for
 from tests.support.bench import Bench, write_site
 
 RPDO1, RPDO2 = 0x205, 0x305
@@ -219,7 +219,7 @@ def test_the_end_waits_for_ramps_and_names_who_does_not_follow(bench: DeafBench)
     assert waits_for(bench.plant), "on its ramp"
     bench.run(3.0)
     assert not waits_for(bench.plant)
-    ending = end(bench.plant, bench.now, bench.network.enforce)
+    ending = bench.end()
     assert ending.is_good
     assert ending.lines == ["all drives are stopped"]
 
@@ -229,7 +229,7 @@ def test_the_end_names_a_deaf_drive(bench: DeafBench) -> None:
     bench.plant.close(bench.now)
     bench.run(5.0)
     assert waits_for(bench.plant)
-    ending = end(bench.plant, bench.now, bench.network.enforce)
+    ending = bench.end()
     bench.run(0.1)
     assert ending.lines == [
         "NOT STOPPED: conveyor/fu1 did not follow the stop; NMT stop was sent to conveyor",
@@ -244,7 +244,7 @@ def test_the_end_knows_nothing_of_a_drive_that_is_not_heard(bench: DeafBench) ->
     bench.plant.close(bench.now)
     bench.run(0.1)
     assert not waits_for(bench.plant)
-    assert end(bench.plant, bench.now, bench.network.enforce).lines == [
+    assert bench.end().lines == [
         "not heard, may be running or not: conveyor/fu1, conveyor/fu2",
         "0 of 2 drives are stopped",
     ]

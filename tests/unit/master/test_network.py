@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,8 @@ from bridge.can.burstend import Burst
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtState
-from bridge.command import Action, Code, Outcome, ReadParameter, Request
-from bridge.command.node import Enforce
+from bridge.command import Action, Code, Outcome, Plant, ReadParameter, Request
+from bridge.command.node import Enforcement
 from bridge.image import Quality
 from bridge.mapping.model import IdentityRule
 from bridge.master.line import BusLine
@@ -207,17 +208,15 @@ def test_a_process_stopped_within_a_round_sends_nothing_that_was_right_before(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     running(bench)
-    judge = bench.plant.on_time
+    judge = bench.plant.enforcements
 
-    def judge_and_stand_still(now: float, enforce: Enforce) -> None:
-        judge(now, enforce)
+    def judge_and_stand_still(plant: Plant, now: float) -> Iterator[Enforcement]:
+        yield from judge(now)
         bench.now += 1.0
 
     bench.log.clear()
     with monkeypatch.context() as patched:
-        patched.setattr(
-            type(bench.plant), "on_time", lambda _, now, enforce: judge_and_stand_still(now, enforce)
-        )
+        patched.setattr(Plant, "enforcements", judge_and_stand_still)
         bench.write(control_word=0x047F, setpoint_1=0x2100)
     bench.run(0.5)
     assert bench.sent(RPDO1)

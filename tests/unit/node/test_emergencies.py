@@ -17,17 +17,16 @@ class Case:
         drives = [sites.drive(slot, "none", 0, "") for slot in slots]
         text = sites.site(sites.bus(sites.node(*drives, mapping=mapping)))
         self.plant = sites.plant_of(text, mapping)
-        self.rejected: list[str] = []
+        self.rejected = 0
         self.about: list[str] = []
         self.emergencies = Emergencies(
-            self.plant.nodes["conveyor"],
-            self.plant.side_of(self.plant.site.bus[0]),
-            lambda frame, why: self.rejected.append(str(why)),
-            lambda drive, now: self.about.append(drive.name),
+            self.plant.nodes["conveyor"], self.plant.side_of(self.plant.site.bus[0])
         )
 
     def comes(self, data: str, time: float = 10.0) -> None:
-        self.emergencies.on_frame(Frame(0x085, bytes.fromhex(data), time))
+        concerned = self.emergencies.on_frame(Frame(0x085, bytes.fromhex(data), time))
+        self.rejected += concerned is None
+        self.about += [one.drive.name for one in concerned or ()]
 
     @property
     def events(self) -> list[Event]:
@@ -77,7 +76,7 @@ def test_where_a_family_names_none_it_is_the_only_drives() -> None:
 def test_what_is_too_short_is_rejected(data: str) -> None:
     case = Case("fu1")
     case.comes(data)
-    assert case.rejected == ["an emergency message has 8 bytes"]
+    assert case.rejected == 1
     assert case.about == []
 
 
@@ -98,6 +97,6 @@ def test_of_a_babbling_node_the_last_is_told_later() -> None:
     assert due is not None
     told = len(case.about)
     assert 0 < told < 200
-    case.emergencies.on_time(due)
+    case.about += [one.drive.name for one in case.emergencies.on_time(due)]
     assert len(case.about) == told + 1
     assert case.code("fu1") == 0x2310, "the newest"

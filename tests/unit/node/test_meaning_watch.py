@@ -177,6 +177,7 @@ def test_two_setpoints_that_the_drive_adds_are_none(tmp_path: Path) -> None:
 def test_a_setting_that_is_written_through_the_bridge_counts_at_once(tmp_path: Path) -> None:
     bench = made(tmp_path)
     bench.plant.drives[DRIVE].on_parameter("P105", 100.0, bench.now)
+    bench.plant.tell_events()
     assert "P105 of parameter set 1 is 100, it was 50" in bench.events[-1].message
 
 

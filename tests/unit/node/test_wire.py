@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.canopen.frame import Frame
 from bridge.drive.own_judgement import judge
 from bridge.master.network import Network
 from bridge.node.boot.actions import BootResult, DrivePlan, WordFacts
@@ -51,3 +52,12 @@ def test_the_reason_is_that_of_the_last_boot_up(tmp_path: Path) -> None:
         told.append(why_not_carried(core))
     assert told[0].startswith("no PDOs of the drive can be used: ")
     assert told[1] == "no PDOs of the drive can be used"
+
+
+def test_an_emergency_message_that_is_too_short_is_rejected_with_the_reason(tmp_path: Path) -> None:
+    quick = Quick(quick_site(tmp_path, 1))
+    wire = quick.core(1).wire
+    wire.routes[0x081](Frame(0x081, b"\x10\x23", 1.0))
+    assert wire.rejected == 1
+    (event,) = quick.plant.events.take()
+    assert event.message.endswith(": an emergency message has 8 bytes")

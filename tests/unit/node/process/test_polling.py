@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from bridge.canopen.sdo import Priority, Result, SdoChannel, SdoError
+from bridge.image import Image
 from bridge.mapping.model import Poll
 from bridge.node.process.polling import Polling
 
@@ -32,8 +33,12 @@ class Case:
             for name, ref, ms in polls
         ]
         channel = cast("SdoChannel", self.channel)
-        self.polling = Polling(models, channel, lambda *shown: self.shown.append(shown))
+        self.polling = Polling(models, channel, cast("Image", self), "io/node")
         self.polling.start([], 10.0)
+
+    def put(self, name: str, value: int, now: float) -> None:
+        """As the image."""
+        self.shown.append((name, value, now))
 
     def at(self, now: float) -> list[tuple[int, int]]:
         """What is asked then."""
@@ -60,7 +65,7 @@ def test_the_answer_is_shown_with_its_sign_and_the_time_of_the_last_round() -> N
     case.at(10.0)
     case.at(10.25)
     case.channel.open[0](b"\xfe\xff")
-    assert case.shown == [("heat", -2, 10.25)]
+    assert case.shown == [("io/node/heat", -2, 10.25)]
 
 
 def test_of_a_slow_node_no_more_questions_pile_up() -> None:
@@ -84,7 +89,7 @@ def test_a_time_out_is_asked_again_and_a_refusal_is_the_last_word() -> None:
 def test_what_a_pdo_brings_is_not_asked_for_meanwhile() -> None:
     case = Case(HEAT)
     case.polling.on_pdo("heat", 7, 10.0, 12.0)
-    assert case.shown == [("heat", 7, 10.0)]
+    assert case.shown == [("io/node/heat", 7, 10.0)]
     assert case.at(10.0) == []
     assert case.polling.next_deadline() == 12.0
     assert case.at(12.0) == [(0x2000, 1)]

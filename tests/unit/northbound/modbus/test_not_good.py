@@ -22,7 +22,7 @@ from tests.support import sites
 from tests.support.invented import SPIN, spin_bench, spindle
 from tests.support.modbus_site import PLC
 from tests.support.nightly import examples
-from tests.support.node_states import node_goes
+from tests.support.node_states import node_goes, run_timers
 from tests.support.views import dispatcher_of
 
 UNIT = 1
@@ -103,7 +103,7 @@ class Model:
     def step(self, step: str | int | float) -> None:
         if isinstance(step, float):
             self.clock[0] += step
-            self.plant.on_time(self.now)
+            run_timers(self.plant, self.now)
         elif step == 0:
             self.came[0] = self.now
             words = [self.telling.get(place, word) for place, word in enumerate(self.drive.words)]

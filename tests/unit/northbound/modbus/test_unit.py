@@ -83,7 +83,9 @@ def test_a_node_whose_first_drive_has_no_process_data_is_not_in_operation():
     node_goes(rig.plant, node, NodeState.OPERATIONAL, 100.0)
     assert rig.read(4, 0, 1, 255)[0] & 0x03 == 0x02
     node.drives[1].channel.on_node(NodeState.CONFIG_ERROR, 100.0)
+    rig.plant.settle()
     assert rig.read(4, 0, 1, 255)[0] & 0x03 == 0x02, "the first one has them"
     node.drives[0].channel.on_node(NodeState.CONFIG_ERROR, 100.0)
+    rig.plant.settle()
     assert rig.read(4, 0, 1, 255)[0] & 0x03 == 0x01, "starting"
     assert rig.plant.image.read("conveyor/node/state").value == 6

@@ -32,6 +32,7 @@ class Deadlines(Generic[T]):
 
     def __init__(self) -> None:
         self._owners: list[T] = []
+        self._places: dict[T, int] = {}
         self._planned: list[float] = []
         self._touched: dict[int, None] = {}
         self._heap: list[tuple[float, int]] = []
@@ -40,14 +41,14 @@ class Deadlines(Generic[T]):
         """Number of deadlines that ``sweep`` has found without having been told of them."""
 
     def add(self, owner: T) -> None:
-        """It gets the next place, from 0."""
-        self._touched[len(self._owners)] = None
+        self._places[owner] = place = len(self._owners)
+        self._touched[place] = None
         self._owners.append(owner)
         self._planned.append(inf)
 
-    def touch(self, place: int) -> None:
-        """The owner at ``place`` may have an earlier deadline than it had."""
-        self._touched[place] = None
+    def touch(self, owner: T) -> None:
+        """The owner may have an earlier deadline than it had."""
+        self._touched[self._places[owner]] = None
 
     @property
     def is_touched(self) -> bool:

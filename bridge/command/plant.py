@@ -86,7 +86,6 @@ class Plant:
         self._gate, self._guard = EventGate(), Guard("event")
         self._refused_by_others = 0
         self._is_closing = False
-        self._deadline_places: dict[str, int] = {}
         self._commanded: dict[str, Commanded] = {}
         """All drives, and the outputs of devices by their nodes."""
         self.nodes = {name: self._node(spec) for name, spec in catalogue.nodes.items()}
@@ -139,7 +138,6 @@ class Plant:
         return self.catalogue.site
 
     def _added(self, one: One) -> One:
-        self._deadline_places[one.name] = len(self._deadline_places)
         self._deadlines.add(one)
         self._commanded[one.name] = one
         return one
@@ -360,7 +358,7 @@ class Plant:
                 self.unsent_stops.add(one)
             self._show_node(node, node.commanded[0].channel.link.node, at)
         for name in due:
-            self._deadlines.touch(self._deadline_places[name])
+            self._deadlines.touch(self._commanded[name])
 
     def _show_node(self, node: Node, is_now: NodeState, now: float) -> None:
         """Show a node's state and its 102.0, which is there while a controller is silent; it clears by itself

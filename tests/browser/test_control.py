@@ -45,8 +45,9 @@ def test_a_drive_is_taken_started_stopped_and_given_back(desk: Desk) -> None:
 def test_a_tab_that_is_closed_stops_its_drive_in_the_published_time(desk: Desk) -> None:
     with desk.sits("operator") as watcher:
         to_drive(watcher)
-        expect(watcher.locator(".chain")).to_contain_text("the bridge stops the drive: disable voltage. At most")
-        published = re.search(r"At most ([\d,]+)", watcher.locator(".chain").inner_text())
+        chain = watcher.locator(".chain")
+        expect(chain).to_contain_text("the bridge stops the drive: disable voltage. At most")
+        published = re.search(r"At most ([\d,]+)", chain.inner_text())
         assert published
         with desk.sits("operator") as page:
             to_drive(page)

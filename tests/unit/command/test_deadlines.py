@@ -41,7 +41,7 @@ class Several:
     def put(self, place: int, at: float, *, told: bool = True) -> None:
         self.owners[place].at = at
         if told:
-            self.deadlines.touch(place)
+            self.deadlines.touch(self.owners[place])
 
     def due(self, now: float) -> list[int]:
         return [owner.name for owner in self.deadlines.take_due(now)]
@@ -98,7 +98,7 @@ def test_nobody_has_to_wake_up_for_what_was_put_off_a_moment_before_it(several: 
 def test_who_is_brought_forward_alone_is_asked_anew(several: Several) -> None:
     several.asked  # noqa: B018 - from zero
     several.owners[7].at = 1.5
-    several.deadlines.touch(7)
+    several.deadlines.touch(several.owners[7])
     assert several.deadlines.next(1.0) == 1.5
     assert several.asked == 1
 

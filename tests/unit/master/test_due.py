@@ -49,7 +49,7 @@ class Everything:
         times = (drive.next_deadline(now) for drive in self._drives)
         return min((at for at in times if at is not None), default=None)
 
-    def touch(self, place: int) -> None: ...
+    def touch(self, owner: Drive) -> None: ...
 
     def sweep(self, now: float) -> list[Drive]:
         return []

@@ -8,6 +8,7 @@ from itertools import chain
 from typing import NamedTuple, Protocol
 
 from bridge.catalogue import MemberSpec, NodeSpec
+from bridge.catalogue.codes import NODE_CODES
 from bridge.command.commanded import Commanded
 from bridge.command.device import Device
 from bridge.command.drive import Drive, Identification
@@ -22,7 +23,7 @@ from bridge.text import Text
 
 
 class Enforcement(NamedTuple):
-    """What a node is to be made to do in the bridge's own name, and why."""
+    """Action on a node in the bridge's own name, and its reason."""
 
     node: str
     action: Action
@@ -95,7 +96,9 @@ class Member(ParameterHolder, Protocol):
 class Node:
     """A configured node with its drives, or the device that it is instead."""
 
-    def __init__(self, spec: NodeSpec, drives: Sequence[Drive], devices: Sequence[Device]) -> None:
+    def __init__(
+        self, spec: NodeSpec, drives: Sequence[Drive], devices: Sequence[Device], image: Image
+    ) -> None:
         self.spec = spec
         self.name = spec.name
         self.bus, self.table, self.family = spec.bus, spec.table, spec.family
@@ -104,6 +107,33 @@ class Node:
         self.commanded: Sequence[Commanded] = tuple(
             chain.from_iterable(one.commanded for one in self.members)
         )
+        self._image = image
+        self._state, self._current_fault, self._last_fault = (
+            image.index[f"{spec.name}/node/{leaf}"] for leaf in ("state", "current_fault", "last_fault")
+        )
+
+    def begin(self, now: float) -> None:
+        """Show what is known from the start."""
+        self._image.set(self._state, NODE_CODES[NodeState.ABSENT], now)
+        self._image.set(self._current_fault, 0.0, now)
+        self._image.set(self._last_fault, 0.0, now)
+        for member in self.members:
+            member.begin(now)
+        for one in self.commanded:
+            one.refresh(now)
+
+    def show(self, now: float) -> None:
+        """Show the state of a node that has something commanded and its 102.0, which is there while a
+        controller is silent; it clears by itself and is then the last fault, as P170 does."""
+        channels = [one.channel for one in self.commanded]
+        silent = [one for one in channels if one.is_tripped and one.controller_is_overdue]
+        fault = self.family.faults.bridge_timeout if silent else 0.0
+        image = self._image
+        image.set(self._state, NODE_CODES[channels[0].link.node], now)
+        before = image[self._current_fault].value
+        if before and not fault:
+            image.set(self._last_fault, before, now)
+        image.set(self._current_fault, fault, now)
 
     @property
     def names(self) -> Names:

@@ -13,7 +13,6 @@ from typing import Final, TypeVar
 from bridge.base.guard import Guard
 from bridge.base.ratelimit import RateLimit
 from bridge.catalogue import Catalogue, DeviceSpec, NodeSpec
-from bridge.catalogue.codes import NODE_CODES, NodeState
 from bridge.catalogue.points import CONNECTION_COUNTS
 from bridge.command.audit import AuditTrail, Rejection
 from bridge.command.commanded import Commanded
@@ -36,6 +35,7 @@ from bridge.command.messages.request import (
 )
 from bridge.command.node import BusSide, Enforcement, Node
 from bridge.command.outputs import Outputs
+from bridge.command.refusals import Refusals
 from bridge.command.stop_check.state import StopVerdict
 from bridge.config import BusTable, Site
 from bridge.image import Image, Quality, Value
@@ -52,8 +52,6 @@ def on_no_bus(request: Request, now: float, reply: Reply) -> bool:
 
 
 One = TypeVar("One", bound=Commanded)
-_LONGEST_NAME: Final = 80
-"""Clients may call anything a drive."""
 _SEVERITY_MISSED, _MISSED_EVENTS, _MISSED_EVERY_S = 700, 3, 60.0
 _BRINGS_TIMERS_FORWARD: Final = (Action.SET_TIMEOUT, Action.TAKE_CONTROL)
 
@@ -84,7 +82,7 @@ class Plant:
         self._listeners: list[Callable[[Event], None]] = []
         self._outcomes: deque[tuple[Reply, Outcome]] = deque()
         self._gate, self._guard = EventGate(), Guard("event")
-        self._refused_by_others = 0
+        self._refusals = Refusals(catalogue, self.events)
         self._is_closing = False
         self._commanded: dict[str, Commanded] = {}
         """All drives, and the outputs of devices by their nodes."""
@@ -92,41 +90,24 @@ class Plant:
         self.drives = {drive.name: drive for node in self.nodes.values() for drive in node.drives}
         self.members = {one.name: one for node in self.nodes.values() for one in node.members}
         """Drives, and nodes that are none."""
-        self._node_points = {name: self._places_of_node(name) for name in self.nodes}
         self._begin(version)
 
     def _node(self, spec: NodeSpec) -> Node:
         """A node with what it commands."""
         drives = [self._added(Drive(one, self.image, self._effects)) for one in spec.drives]
         devices = [Device(one, self.image, self._outputs(one)) for one in spec.devices]
-        return Node(spec, drives, devices)
+        return Node(spec, drives, devices, self.image)
 
     def _outputs(self, spec: DeviceSpec) -> Sequence[Outputs]:
         """The outputs of a device as one that is commanded; none where it has none."""
         return [self._added(Outputs(spec, self.image, self._effects))] if spec.is_commanded else []
 
-    def _places_of_node(self, name: str) -> tuple[int, int, int]:
-        """Places in the image of the state of a node, its present fault and its last one."""
-        index = self.image.index
-        return (
-            index[f"{name}/node/state"],
-            index[f"{name}/node/current_fault"],
-            index[f"{name}/node/last_fault"],
-        )
-
     def _begin(self, version: str) -> None:
         """Show what is known from the start."""
         began = self.began
         for node in self.nodes.values():
-            state, current, last = self._node_points[node.name]
-            self.image.set(state, NODE_CODES[NodeState.ABSENT], began)
-            self.image.set(current, 0.0, began)
-            self.image.set(last, 0.0, began)
-            for member in node.members:
-                member.begin(began)
-                for one in member.commanded:
-                    one.refresh(began)
-                    self._effects.settled[one.name] = began
+            node.begin(began)
+            self._effects.settled |= dict.fromkeys((one.name for one in node.commanded), began)
         self.settle()
         self.set("bridge/version", version, began)
         self.set("bridge/drives_configured", len(self.drives), began)
@@ -206,38 +187,40 @@ class Plant:
 
         Returns True if a round must run now.
         """
+        is_urgent = self._submit(request, now, reply, carry_out)
+        self._conclude()
+        return is_urgent
+
+    def _submit(self, request: Request, now: float, reply: Reply, carry_out: CarryOut) -> bool:
         reply = self.audit.follow(request, now, reply)
         if self._is_closing and request.action not in STOP_ACTIONS:
             reply(Outcome(Code.NOT_READY, Text.of("request.bridge_ends"), forwarded=False))
             return False
         if request.action in NODE_ACTIONS:
-            reply = self._counting_refusals(request, now, reply)
+            reply = self._refusals.counted(request, now, reply)
             is_taken = carry_out(request, now, reply)
-            self._conclude()
             if not is_taken:
                 reply(Outcome(Code.UNKNOWN_TARGET, Text.of("request.no_node", node=request.target)))
             return is_taken
         one = self._commanded.get(request.target)
         if request.target not in self.members:
-            reply = self._counting_refusals(request, now, reply)
+            reply = self._refusals.counted(request, now, reply)
             reply(Outcome(Code.UNKNOWN_TARGET, Text.of("request.no_drive", drive=request.target)))
             return False
         if request.action in PARAMETER_ACTIONS:
             is_taken = carry_out(request, now, reply)
-            self._conclude()
             if not is_taken:
-                reply = self._counting_refusals(request, now, reply)
+                reply = self._refusals.counted(request, now, reply)
                 said = Text.of("request.on_no_bus", target=request.target)
                 reply(Outcome(Code.NOT_READY, said, forwarded=False))
             return is_taken
         if one is None:
-            reply = self._counting_refusals(request, now, reply)
+            reply = self._refusals.counted(request, now, reply)
             said = Text.of("request.no_outputs", target=request.target)
             reply(Outcome(Code.READ_ONLY, said, forwarded=False))
             return False
         before, until = one.channel.wired, one.channel.until
         one.channel.handle(request, now, reply)
-        self._conclude()
         is_changed = one.channel.wired != before or request.action in _BRINGS_TIMERS_FORWARD
         # The bus may have been told to stop the drive by itself: not any more, its owner is there.
         return is_changed or (until is not None and until < now + one.burst_s)
@@ -271,30 +254,10 @@ class Plant:
         """What a protocol has refused by itself, ``count`` times: counted, told and written to the audit log
         as what a drive refuses."""
         self.audit.rejected(rejection, now, count)
-        self._report_refusal(
+        self._refusals.report(
             rejection.action, rejection.identity, rejection.target, rejection.said, now, count
         )
-
-    def _report_refusal(
-        self, what: str, identity: Identity, target: str, why: Said, now: float, count: int = 1
-    ) -> None:
-        is_bus = target.removeprefix("bus/") in self._changed and target.startswith("bus/")
-        is_known = is_bus or target in self.drives or target in self.nodes
-        source = target.removeprefix("bus/") if is_known else "bridge"
-        unknown = "" if is_known else target[:_LONGEST_NAME]
-        who = str(identity) if identity.user else identity.source.label
-        self._refused_by_others += count
-        self.report(Event(now, EventKind.REFUSED, source, 300, _refused(what, unknown, who, why)))
-
-    def _counting_refusals(self, request: Request, now: float, reply: Reply) -> Reply:
-        """``reply`` for what no drive refuses by itself: a refusal is an event and counts as a drive's."""
-
-        def conclude(outcome: Outcome) -> None:
-            if not outcome.ok and request.action is not Action.READ_PARAMETER:
-                self._report_refusal(request.action, request.identity, request.target, outcome.said, now)
-            reply(outcome)
-
-        return conclude
+        self._conclude()
 
     def count(self, leaf: str, now: float, by: int) -> None:
         """Count up a point of the bridge's own, such as ``modbus_refused_connections``."""
@@ -302,9 +265,9 @@ class Plant:
         self.image.set(index, int(self.image[index].value) + by, now)
 
     def enforcements(self, now: float) -> Iterator[Enforcement]:
-        """What the nodes of those are to be made to do that ignore their stops. The timers of every channel
-        run while it is iterated: do to a node what it is to be made to do before the next one is taken, for
-        what another drive of that node comes to depends on it."""
+        """Enforcements on the nodes of those that ignore their stops. The timers of every channel run while it
+        is iterated: carry each out before the next is taken, for it decides what becomes of another drive of
+        that node."""
         self.settle()
         for one in self._deadlines.take_due(now):
             verdicts = one.on_time(now)
@@ -336,7 +299,7 @@ class Plant:
         good = sum(drive.quality is Quality.GOOD for drive in self.drives.values())
         self.set("bridge/drives_good", good, now)
         refused = sum(member.refused_writes for member in self.members.values())
-        self.set("bridge/refused_writes", refused + self._refused_by_others, now)
+        self.set("bridge/refused_writes", refused + self._refusals.count, now)
 
     def _conclude(self) -> None:
         """Apply and tell what has come of a call."""
@@ -356,22 +319,9 @@ class Plant:
             self._changed[node.bus.name].add(node.name)
             if one.stop_check.awaits_sending:
                 self.unsent_stops.add(one)
-            self._show_node(node, node.commanded[0].channel.link.node, at)
+            node.show(at)
         for name in due:
             self._deadlines.touch(self._commanded[name])
-
-    def _show_node(self, node: Node, is_now: NodeState, now: float) -> None:
-        """Show a node's state and its 102.0, which is there while a controller is silent; it clears by itself
-        and is then the last fault, as P170 does."""
-        channels = [one.channel for one in node.commanded]
-        silent = [one for one in channels if one.is_tripped and one.controller_is_overdue]
-        fault = node.family.faults.bridge_timeout if silent else 0.0
-        state, current, last = self._node_points[node.name]
-        self.image.set(state, NODE_CODES[is_now], now)
-        before = self.image[current].value
-        if before and not fault:
-            self.image.set(last, before, now)
-        self.image.set(current, fault, now)
 
     def next_deadline(self, now: float) -> float | None:
         self.settle()
@@ -442,18 +392,3 @@ class PlantView:
 
     def on_connection(self, identity: Identity, *, is_there: bool, has_others: bool = False) -> None:
         self._plant.on_connection(identity, self._clock(), is_there=is_there, has_others=has_others)
-
-
-def _refused(what: str, target: str, who: str, why: Said) -> Text:
-    """``what`` is empty where several requests that differ in it are told as one, ``target`` where the event
-    is of it."""
-    action = Text.plain(what) if what else Text.of("request.several")
-    if what in Action.__members__.values():
-        action = Text.word("action", what)
-    if target and why:
-        return Text.of("request.refused_on", action=action, target=target, who=who, why=why)
-    if target:
-        return Text.of("request.refused_on_unsaid", action=action, target=target, who=who)
-    if why:
-        return Text.of("request.refused", action=action, who=who, why=why)
-    return Text.of("request.refused_unsaid", action=action, who=who)

@@ -33,7 +33,7 @@ PHONE: ViewportSize = {"width": 360, "height": 740}
 DESKTOP: ViewportSize = {"width": 1280, "height": 900}
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing
 @pytest.mark.parametrize(
     ("scheme", "language", "user"),
     [

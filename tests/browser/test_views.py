@@ -25,6 +25,7 @@ from tests.wire.test_page import Browser as Client
 from tests.wire.test_page import Tab
 
 
+@pytest.mark.landing
 def test_the_register_map_is_searched_and_downloaded(desk: Desk) -> None:
     with desk.sits("observer") as page:
         page.get_by_role("link", name="Integration").click()

@@ -64,6 +64,7 @@ class TestTokens:
         seeds = {LifeSign.at_random() for _ in range(50)}
         assert len(seeds) == 50
         assert all(math.gcd(life.step, 65_535) == 1 for life in seeds)
+        assert all(1000 <= life.step <= 64_535 for life in seeds), "no program counts so far"
 
 
 class Drive(Leg):

@@ -13,7 +13,7 @@ from bridge.command.drive_link import NodeState
 from bridge.command.messages.telegram import Refusal
 from bridge.image import Value
 from bridge.text import Text
-from tests.support.rig import ENABLE, HALF_SPEED, PLC, SHUT_DOWN, Rig
+from tests.support.rig import ENABLE, ENABLED, HALF_SPEED, PLC, SHUT_DOWN, Rig
 
 
 @pytest.fixture
@@ -223,3 +223,11 @@ class TestAnotherParameterSet:
         )
         assert rig.write(SHUT_DOWN | self.SET_2).ok
         assert rig.channel.setpoints == (0, 0, 0, 0), "and one that is to stop gets zero"
+
+    def test_a_drive_that_is_in_another_one_takes_no_scaled_value_for_something_else(self, rig: Rig):
+        rig.channel.meanings.on_scale("P105", 100.0, 2)
+        rig.drive_says(ENABLED | self.SET_2)
+        assert rig.write(ENABLE, frequency=10.0).code is Code.NOT_READY
+        assert rig.write(ENABLE, 0x1000).ok, "a raw word is the same in each"
+        assert rig.write(SHUT_DOWN, frequency=10.0).ok
+        assert rig.channel.setpoints == (0, 0, 0, 0)

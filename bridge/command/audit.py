@@ -187,8 +187,7 @@ class AuditTrail:
     """Follows requests as soon as somebody wants to be told."""
 
     def __init__(self, image: Image) -> None:
-        self._listener: Callable[[AuditEntry], None] | None = None
-        self._every_telegram = False
+        self.tell_to(None)
         self._image = image
         self._telegrams: dict[str, _Telegrams] = {}
         self._shares: dict[tuple[str, ...], _Share] = {}

@@ -125,14 +125,20 @@ def hear(draft: Draft, request: Request) -> None:
 def _renew(draft: Draft, at: float) -> None:
     """The owner has shown that it is there: its lease runs anew."""
     identity, lease_s, lease_until, *times, alive_until = draft.owner
-    quiet_until = None
     if draft.settings.control == "lease":
         lease_until = at + lease_s
-    elif not draft.timer.timeout_ms:
-        quiet_until = at + GONE_S
-    elif times == _NO_TIMES:
+    elif draft.timer.timeout_ms and times == _NO_TIMES:
         return
+    quiet_until = _quiet_until(draft, at)
     draft.owner = Owner(identity, lease_s, lease_until, quiet_until=quiet_until, alive_until=alive_until)
+
+
+def _quiet_until(draft: Draft, heard_at: float) -> float | None:
+    """The time from which an owner heard last at ``heard_at`` is quiet; None where a watchdog or the end of
+    its lease judges that."""
+    if draft.timer.timeout_ms or draft.settings.control == "lease":
+        return None
+    return heard_at + GONE_S
 
 
 def _hand_over(draft: Draft, identity: Identity, lease_s: float | None = None) -> None:
@@ -197,8 +203,7 @@ def set_timeout(draft: Draft, identity: Identity, timeout_ms: int) -> None:
         alive_until += (timeout_ms - timer.timeout_ms) / 1000
         deadline = deadline and min(deadline, alive_until)
     draft.timer = Timer(timeout_ms, timer.heard_at, deadline, timer.is_overdue)
-    judges_by_itself = timeout_ms > 0 or settings.control == "lease"
-    quiet_until = None if judges_by_itself else (timer.heard_at or draft.now) + GONE_S
+    quiet_until = _quiet_until(draft, timer.heard_at or draft.now)
     draft.owner = draft.owner._replace(quiet_until=quiet_until, alive_until=alive_until)
     said = Text.of("owner.timeout_set", timeout_ms=timeout_ms, who=str(identity))
     draft.tell(EventKind.CONFIGURATION, 400, said)

@@ -162,7 +162,7 @@ class TelegramDecoder:
         and with any other, which may be a stop, it gets zero. Raises ``Refusal``."""
         in_set, status = self._set.of(word), self._reported()
         reported = in_set if status is None else self._reported_set.of(status)
-        if reported == in_set or leaf not in self._values:
+        if reported == in_set:
             return written
         try:
             same = self._written(leaf, value, reported) == written

@@ -56,3 +56,14 @@ def test_a_scale_that_is_none_is_told_as_that(case: Case) -> None:
     case.news.on_parameter("P105", 0.0, 11.0)
     (message,) = case.told()
     assert "P105 is 0 in the drive, which is no scale" in message
+
+
+def test_what_a_word_carries_is_told_when_it_changes(case: Case) -> None:
+    (meaning, *_) = case.drive.family.meaning
+    case.news.on_code(meaning, 1, 10.0)
+    case.told()
+    case.news.on_code(meaning, 1, 11.0)
+    assert case.told() == []
+    case.news.on_code(meaning, 0, 12.0)
+    (message,) = case.told()
+    assert message.startswith("P546[1] of parameter set 1 is 0, it was 1: ")

@@ -264,6 +264,19 @@ def test_of_a_drive_that_has_just_begun_its_quick_stop_leads_it_out_of_it(runnin
     is_led_from_inhibited(running, outcomes)
 
 
+def test_of_an_unheard_drive_in_its_quick_stop_lets_the_ramp_run(running: Rig):
+    """It was running when its node restarted, and says only after the start that it is braking."""
+    restart_the_node(running)
+    outcomes = running.submit(Action.START)
+    running.wait(0.5)
+    running.drive_says(QUICK_STOPPING)
+    running.wait(0.4)
+    assert running.sent & 0x0002, "the ramp of the quick stop is let run"
+    running.wait(0.1)
+    assert running.sent & 0x0002 == 0, "disable voltage, 1 s after the start"
+    is_led_from_inhibited(running, outcomes)
+
+
 @pytest.mark.parametrize("direction", [2, -2])
 def test_knows_two_directions(rig: Rig, direction: int):
     assert codes(rig.submit(Action.START, direction=direction)) == [Code.OUT_OF_RANGE]

@@ -12,6 +12,8 @@ from bridge.command.messages.request import Command, Do, Request
 from bridge.drive import DriveState
 from tests.support.leg import PLC, SHUT_DOWN, Leg, draft_of, running_nord, settings_of
 
+SHUTDOWN, OPERATION = 0x0006, 0x000F
+"""CiA 402-2, control word."""
 READER = Identity(Source.OPCUA, "reader", Role.OBSERVER)
 
 
@@ -57,6 +59,33 @@ def test_a_refused_request_changes_nothing(who: Identity, command: Command, code
     leg.asks(command, who)
     assert leg.outcome.code is code
     assert leg.state is before
+
+
+class TestADriveThatHasJustStoppedWhereNobodyKnows:
+    """Its position was lost while it ran; its owner's stop has closed the way since the last event."""
+
+    @pytest.fixture
+    def leg(self) -> Leg:
+        leg = Leg(settings_of("cia402/cyclic-position", fieldbus_timeout_ms=1000))
+        leg.writes(SHUTDOWN)
+        leg.writes(OPERATION)
+        leg.says(DriveState.OPERATION_ENABLED)
+        leg.happens(leg.state.way._replace(why_unplaced="its position is late"))
+        leg.writes(SHUTDOWN)
+        return leg
+
+    def test_is_not_started(self, leg: Leg) -> None:
+        heard = leg.state.timer
+        leg.now += 0.5
+        leg.asks(Start())
+        assert (leg.outcome.code, leg.outcome.message) == (Code.NOT_READY, "its position is late")
+        assert leg.state.timer == heard, "what is refused is no sign of life"
+
+    def test_gets_no_setpoints(self, leg: Leg) -> None:
+        leg.writes(position=0.0)
+        assert leg.outcome.ok
+        assert not leg.outcome.forwarded
+        assert leg.outcome.message == "its position is late"
 
 
 def test_a_refused_start_is_none_and_no_sign_of_life() -> None:

@@ -13,7 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Do, Identity, Request, Source, TakeControl, command_of
-from bridge.command.messages.freshness import BOUND_MS, GRAIN_MS, NEVER, Inflow, LoopPulse, is_stale
+from bridge.command.messages.freshness import (
+    BOUND_MS,
+    GRAIN_MS,
+    NEVER,
+    NOW_S,
+    Inflow,
+    LoopPulse,
+    is_stale,
+    way_ms,
+)
 from tests.support.nightly import examples
 from tests.support.rig import ACKNOWLEDGE, ENABLE, HALF_SPEED, OTHER_PLC, PLC, SHUT_DOWN, Rig
 
@@ -280,3 +289,25 @@ def test_giving_control_back_is_never_too_late():
     assert ask(rig, Action.RELEASE_CONTROL, 60.0) is Code.OK
     assert rig.channel.owner is None
     assert not rig.enables
+
+
+@pytest.mark.parametrize(("control", "ms"), [("none", 0), ("modbus", 25), ("opcua", 25), ("zenoh", 125)])
+def test_a_telegram_may_be_older_where_its_connection_is_not_seen(control: str, ms: int) -> None:
+    """By the time for which a hang goes unnoticed; of a drive that nobody commands there is none."""
+    assert way_ms(control) == ms
+
+
+@pytest.mark.parametrize(("began", "counts"), [(0.999, False), (1.0, True)])
+def test_an_unseen_connection_that_begins_within_a_second_of_a_hang_brings_what_may_have_waited(
+    began: float, counts: bool
+) -> None:
+    look = LoopPulse(began, steady_since=0.0)
+    arrived = Inflow(began, look, is_hidden=True).arrive(began, look)
+    assert arrived == (began if counts else NEVER)
+
+
+@pytest.mark.parametrize(("late_s", "assumed"), [(0.0, "now"), (0.0001, "then")])
+def test_what_cannot_have_waited_for_longer_than_is_assumed_came_now(late_s: float, assumed: str) -> None:
+    look = LoopPulse(0.0, 0.0)
+    now = GRAIN_MS / 1000 - NOW_S + late_s
+    assert Inflow(0.0, look).arrive(now, look) == (now if assumed == "now" else 0.0)

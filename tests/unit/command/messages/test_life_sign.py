@@ -44,6 +44,12 @@ class TestTokens:
         offered = math.floor(max(now - ago, 0.0))
         assert life.issued_at(life.token(offered), now) == offered
 
+    @pytest.mark.parametrize("token", [1, 65_535])
+    def test_the_least_and_the_greatest_are_known_as_well(self, token: int):
+        life = LifeSign(start=token - 1, step=20_002)
+        assert life.token(0.5) == token
+        assert life.issued_at(token, 1.5) == 0.0
+
     @pytest.mark.parametrize("number", [0, -1, 65_536])
     def test_a_number_that_is_none_was_never_offered(self, number: int):
         assert TOKENS.issued_at(number, 1000.0) is None
@@ -58,6 +64,7 @@ class TestTokens:
         seeds = {LifeSign.at_random() for _ in range(50)}
         assert len(seeds) == 50
         assert all(math.gcd(life.step, 65_535) == 1 for life in seeds)
+        assert all(1000 <= life.step <= 64_535 for life in seeds), "no program counts so far"
 
 
 class Drive(Leg):

@@ -12,7 +12,8 @@ from bridge.command import Code
 from bridge.command.drive_link import NodeState
 from bridge.command.messages.telegram import Refusal
 from bridge.image import Value
-from tests.support.rig import ENABLE, HALF_SPEED, PLC, SHUT_DOWN, Rig
+from bridge.text import Text
+from tests.support.rig import ENABLE, ENABLED, HALF_SPEED, PLC, SHUT_DOWN, Rig
 
 
 @pytest.fixture
@@ -171,3 +172,62 @@ def test_half_a_telegram_is_not_applied(rig: Rig):
     assert rig.write(SHUT_DOWN, 1, 70_000).code is Code.OUT_OF_RANGE
     assert rig.sent == ENABLE
     assert rig.sent_setpoints == (HALF_SPEED, 0, 0, 0)
+
+
+@pytest.mark.parametrize("values", [{"setpoint_1": 7}, {"frequency": 25.0}])
+def test_a_word_that_the_node_does_not_take_is_refused_raw_and_scaled(rig: Rig, values: dict[str, Value]):
+    rig.channel.unserved["command/setpoint_1"] = Text.of("boot.pdo_without_it", pdo="RPDO1")
+    (leaf,) = values
+    outcome = rig.write(**values)
+    assert outcome.code is Code.NOT_CONFIGURED
+    assert outcome.message.startswith(f"{leaf}: ")
+    assert rig.write(setpoint_2=7).ok, "the others are taken"
+
+
+class TestAnotherParameterSet:
+    """A control word that switches it (BU 2500 §6.5.1, bits 14 and 15). In set 2 the frequency comes with the
+    second setpoint, in the scale of that set."""
+
+    SET_2 = 0x4000
+
+    @pytest.fixture
+    def rig(self) -> Rig:
+        rig = Rig()
+        rig.run()
+        codes = {"command/setpoint_1": (1, 0, 0, 0), "command/setpoint_2": (0, 1, 0, 0)}
+        rig.channel.meanings.on_codes({**rig.channel.meanings.codes, **codes})
+        rig.channel.meanings.on_scale("P105", 50.0)
+        rig.write(ENABLE, frequency=25.0)
+        return rig
+
+    def test_a_value_keeps_its_size_in_its_unit(self, rig: Rig):
+        rig.channel.meanings.on_scale("P105", 100.0, 2)
+        assert rig.write(ENABLE | self.SET_2).ok
+        assert rig.sent_setpoints == (0, HALF_SPEED // 2, 0, 0)
+
+    def test_what_the_telegram_itself_writes_is_not_overwritten_by_it(self, rig: Rig):
+        rig.channel.meanings.on_scale("P105", 100.0, 2)
+        assert rig.write(SHUT_DOWN | self.SET_2, setpoint_2=7).ok
+        assert rig.channel.setpoints == (0, 7, 0, 0)
+
+    def test_a_value_whose_word_the_telegram_writes_is_not_brought_over(self, rig: Rig):
+        rig.channel.meanings.on_scale("P105", 100.0, 2)
+        assert rig.write(ENABLE | self.SET_2, 0).ok
+        assert rig.sent_setpoints == (0, 0, 0, 0)
+
+    def test_where_its_scale_is_not_known_a_drive_that_is_to_run_is_not_switched(self, rig: Rig):
+        outcome = rig.write(ENABLE | self.SET_2)
+        assert outcome.code is Code.NOT_CONFIGURED
+        assert outcome.message == (
+            "what setpoint_1 means in parameter set 2 is not known: write it with the switch"
+        )
+        assert rig.write(SHUT_DOWN | self.SET_2).ok
+        assert rig.channel.setpoints == (0, 0, 0, 0), "and one that is to stop gets zero"
+
+    def test_a_drive_that_is_in_another_one_takes_no_scaled_value_for_something_else(self, rig: Rig):
+        rig.channel.meanings.on_scale("P105", 100.0, 2)
+        rig.drive_says(ENABLED | self.SET_2)
+        assert rig.write(ENABLE, frequency=10.0).code is Code.NOT_READY
+        assert rig.write(ENABLE, 0x1000).ok, "a raw word is the same in each"
+        assert rig.write(SHUT_DOWN, frequency=10.0).ok
+        assert rig.channel.setpoints == (0, 0, 0, 0)

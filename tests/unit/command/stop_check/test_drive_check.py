@@ -6,14 +6,15 @@ from typing import Any
 
 import pytest
 
-from bridge.command import Action
+from bridge.command import Action, Request, command_of
 from bridge.command.drive_link import NodeState
 from bridge.command.stop_check.state import LastStop
 from bridge.drive import OwnJudgement, OwnVerdict
 from bridge.drive.own_judgement import DriveWatch
 from tests.support.judged_plant import JudgedPlant
 from tests.support.leg_words import LENZE, NORD_TU4, LegWords
-from tests.support.rig import FAULT, FAULT_REACTION, QUICK_STOPPING
+from tests.support.node_states import hand_over
+from tests.support.rig import FAULT, FAULT_REACTION, PLC, QUICK_STOPPING
 
 ABOUT_S = 0.00001
 OFF, RAMP = Action.DISABLE_VOLTAGE, Action.STOP
@@ -174,3 +175,32 @@ def test_a_node_that_says_that_it_is_stopped_or_starts_speaks_for_a_drive_that_w
     line.is_silent(10.0)
     assert line.last_stop is LastStop.FORWARDED
     assert not line.told
+
+
+# when the plant is asked next
+
+
+class TestThePlantWakesUp:
+    """By the clock alone: the drive sends changes, and nothing of what it is asked here."""
+
+    @pytest.fixture
+    def line(self) -> JudgedPlant:
+        return JudgedPlant(deadline_s=None).enables()
+
+    def wakes_after(self, line: JudgedPlant) -> float | None:
+        at = line.plant.next_deadline(line.now)
+        return None if at is None else at - line.now
+
+    def test_when_the_bound_of_a_stop_is_over_from_when_it_was_handed_over(self, line: JudgedPlant) -> None:
+        request = Request(PLC, line.drive.name, command_of(OFF))
+        line.plant.submit(request, line.now, lambda outcome: None)
+        assert self.wakes_after(line) is None
+        hand_over(line.plant, line.drive, line.now)
+        assert self.wakes_after(line) == pytest.approx(3 * 0.5 + 0.010 + 0.250)
+
+    def test_at_once_where_the_node_says_that_it_is_stopped(self, line: JudgedPlant) -> None:
+        line.asks(OFF)
+        line.is_cut_off()
+        assert self.wakes_after(line)
+        line.drive.stop_check.on_node_stopped(line.now)
+        assert self.wakes_after(line) == 0

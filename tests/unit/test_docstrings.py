@@ -26,6 +26,7 @@ ROOMS = (
     "image",
     "lint",
     "mirror",
+    "node",
     "northbound",
     "parameter",
     "service",

@@ -1,4 +1,4 @@
-"""Which nodes may be started when: mandatory nodes and start order (CiA 302-2, NMT start-up). Pure."""
+"""Start gate of a bus: mandatory nodes and start order (CiA 302-2, NMT start-up). Pure."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class StartGate:
         """Names of the nodes that the others wait for."""
 
     def stopped_by(self, node: Neighbour) -> None:
-        """All nodes were stopped because this one was lost: they wait until it is ready again."""
+        """Make all nodes wait until this one is ready again: they were stopped because it was lost."""
         if node not in self._awaited:
             self._awaited.append(node)
 

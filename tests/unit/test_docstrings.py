@@ -25,6 +25,7 @@ ROOMS = (
     "eds",
     "image",
     "lint",
+    "master",
     "mirror",
     "node",
     "northbound",

@@ -12,7 +12,7 @@ from bridge.mapping.entry_types import Decimal, EmcyCode, FaultNumber, Table, Wo
 from bridge.text import Words
 
 FORM_FIELD: Final = re.compile(r"\{(number|group|hex|bits (\d{1,2})-(\d{1,2}))(?::(\d))?\}")
-"""What may stand in a ``FaultForm``, with the least number of its digits."""
+"""Fields of a ``FaultForm``, with the least number of their digits."""
 _NAME: Final = re.compile(r"\d{1,10}(\.\d{1,3})?|[0-9A-F]{2}(?:[0-9A-F]{2}|xx)h")
 
 
@@ -67,7 +67,7 @@ class EmcyTable(Table):
 
 
 class Explanation(Table):
-    """What a manual says of a fault, in one language; empty where it says nothing."""
+    """A manual's explanation of a fault, in one language; empty where it gives none."""
 
     cause: str = ""
     remedy: str = ""

@@ -25,6 +25,7 @@ ROOMS = (
     "eds",
     "image",
     "lint",
+    "mapping",
     "master",
     "mirror",
     "node",

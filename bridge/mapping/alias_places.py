@@ -22,7 +22,7 @@ class Alias:
 
 
 def aliases(family: Family) -> Iterator[Alias]:
-    """Every parameter, and every element of one, that stands for other objects.
+    """Parameters, and elements of parameters, that stand for other objects.
 
     Raises ValueError for a name that is no parameter of the family; the mapping's checks find that first.
     """

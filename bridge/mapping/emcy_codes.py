@@ -75,6 +75,6 @@ def text(code: int) -> Text:
 
 
 def register_text(register: int) -> Text:
-    """The error register in words: ``generic error, communication``."""
+    """Error register in words: ``generic error, communication``."""
     bits = tuple(said for bit, said in enumerate(_REGISTER) if register >> bit & 1)
     return Text.of("emcy.register", bits=bits) if bits else Text.of("emcy.none")

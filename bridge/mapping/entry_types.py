@@ -146,7 +146,7 @@ States = dict[Annotated[int, BeforeValidator(_state), WithJsonSchema({"type": "s
 
 
 def pattern_bits(pattern: str) -> tuple[int, int]:
-    """``"0XX1000"`` as (mask, value): the word matches where ``word & mask == value``."""
+    """Mask and value of a pattern such as ``"0XX1000"``: a word matches where ``word & mask == value``."""
     mask = int("".join("0" if c == "X" else "1" for c in pattern), 2)
     value = int(pattern.replace("X", "0"), 2)
     return mask, value

@@ -33,7 +33,7 @@ FaultName = Annotated[str, AfterValidator(_fault_name)]
 
 
 class EmcyEvent(Table):
-    """An event number in the emergency message, which decides; the code comes second."""
+    """Event number in the emergency message: it decides, and the code comes second."""
 
     byte: int = Field(ge=3, le=7)
     cause_byte: int | None = Field(None, ge=3, le=7)
@@ -41,7 +41,7 @@ class EmcyEvent(Table):
 
 
 class EmcyNumber(Table):
-    """An error number in the manufacturer's bytes, where the code is one of ``codes``."""
+    """Error number in the manufacturer's bytes, where the code is one of ``codes``."""
 
     codes: list[EmcyCode] = Field(min_length=1)
     byte: int = Field(ge=3, le=7)
@@ -61,7 +61,7 @@ class EmcyTable(Table):
     )
 
     def text(self, code: int) -> Words:
-        """The text of an EMCY code, or of its group: the family's own, else that of CiA 301."""
+        """Text of an EMCY code, or of its group: the family's own, else that of CiA 301."""
         name = f"{code:04X}"
         return self.codes.get(name) or self.codes.get(f"{name[:2]}xx") or emcy_codes.text(code)
 
@@ -83,7 +83,7 @@ class FaultEntry(Table):
 
 
 class Advised(Table):
-    """General advice in one language; both sentences are there."""
+    """General advice in one language, always with both sentences."""
 
     cause: str = Field(min_length=1, description="what it often is, as the rest of a sentence")
     remedy: str = Field(min_length=1, description="what to do, in whole sentences")

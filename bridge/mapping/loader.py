@@ -107,8 +107,8 @@ def family_of(text: str, path: Path, folders: Sequence[Path] = ()) -> Family:
 
 
 def lineage(name: str, folders: Sequence[Path] = ()) -> list[str]:
-    """The mapping ``name`` and those it extends, by their names. Raises ``FileFaults`` where one is
-    missing; there must be a mapping of this name."""
+    """Names of the mapping ``name`` and of those it extends. Raises ``FileFaults`` where one is missing;
+    there must be a mapping of this name."""
     folders = folders or mapping_folders()
     files = _files(folders)
     by_path = {path.resolve(): known for known, paths in files.items() for path in paths}
@@ -117,7 +117,7 @@ def lineage(name: str, folders: Sequence[Path] = ()) -> list[str]:
 
 
 def _chain(first: TomlFile, folders: Sequence[Path]) -> list[TomlFile]:
-    """The file and those it extends, the last of those first."""
+    """Files from the one that extends nothing to ``first``, each extended by the next."""
     chain = [first]
     files = _files(folders)
     while isinstance(name := chain[0].data.get("extends"), str):

@@ -54,7 +54,7 @@ class MergedFile:
             self.data["family"].pop("preferred", None)
 
     def _leave_out(self, file: TomlFile) -> None:
-        """Take what ``file`` is ``without`` out of what it extends."""
+        """Remove from what ``file`` extends what it is ``without``."""
         without: object = file.data.get("without")
         for n, entry in enumerate(cast("list[object]", without) if isinstance(without, list) else []):
             if not isinstance(entry, str):
@@ -96,7 +96,7 @@ class MergedFile:
         return value
 
     def _drop(self, at: Key) -> None:
-        """Forget what stood below ``at``: it is replaced."""
+        """Forget the places at and below ``at``: it is replaced."""
         for key in [key for key in self._places if key[: len(at)] == at]:
             del self._places[key]
 

@@ -171,8 +171,8 @@ def _no_status_word() -> StatusWord:
 
 
 class Family(Table):
-    """One mapping file, merged with those it extends: of drives, or, without slots, of a device that is none
-    and has inputs instead of process data, control word and status word."""
+    """One mapping file, merged with those it extends: a family of drives or, without slots, a device that is
+    no drive and has inputs instead of process data, control word and status word."""
 
     extends: str | None = Field(None, description='another mapping, such as "nord/sk-tu4-cao"')
     without: list[str] = Field(
@@ -225,7 +225,7 @@ class Family(Table):
         return ObjectRef(on_axis(ref.index, self._axis), ref.sub)
 
     def is_per_axis(self, ref: ObjectRef) -> bool:
-        """Whether each axis of the node has an object of its own for the one that the file names."""
+        """Whether each axis of the node has an object of its own for this one of the file."""
         return ref.index in STANDARDISED and any(slot.axis > 1 for slot in self.slot)
 
     @property
@@ -316,7 +316,7 @@ class Family(Table):
         return [value for value in self.value if may_have(value)]
 
     def is_usual(self, slot: Slot, value: ProcessValue) -> bool:
-        """Whether this drive's words carry the value where they are set as the mapping file takes them."""
+        """Whether this drive's words carry the value while their codes are the mapping file's defaults."""
         runs = self.meanings_of(slot, value.group)
         if value.word_names:
             codes = {one.word: one.default for run in runs for one in run}
@@ -341,8 +341,8 @@ class Family(Table):
         return None
 
     def needed_bits(self, group: str) -> int:
-        """Bits of the control word, or for the group ``actual`` of the status word, without which a drive
-        cannot be commanded, or would be shown in a state that it is not in."""
+        """Bits of the control word (of the status word for the group ``actual``) without which a drive cannot
+        be commanded, or would be shown in a state that it is not in."""
         control, status = self.control_word, self.status_word
         handshake = [control.handshake] if control.handshake else []
         if group == "actual":

@@ -48,8 +48,11 @@ def _name_pattern(text: str) -> str:
 
 
 class ParameterNames(Table):
-    """index = ``index`` + ``letter_step`` × (letter − A) + ``number_step`` × number;
-    sub-index = ``sub`` + ``element_step`` × (element − ``element_first``) + ``set_step`` × set."""
+    """Rule by which names of parameters become objects.
+
+    index = ``index`` + ``letter_step`` × (letter − A) + ``number_step`` × number;
+    sub-index = ``sub`` + ``element_step`` × (element − ``element_first``) + ``set_step`` × set.
+    """
 
     pattern: Annotated[str, AfterValidator(_name_pattern)] = Field(
         description="a regular expression with the groups number, letter, element, set"

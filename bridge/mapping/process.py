@@ -73,7 +73,7 @@ class Pdo(Table):
 
 
 class NodeTpdo(Table):
-    """A TPDO that belongs to no drive: where the node has it switched on, it saves polling."""
+    """A TPDO that belongs to no drive: where the node has it switched on, its objects need no polling."""
 
     number: int = Field(ge=1, le=512)
 
@@ -148,7 +148,7 @@ class Slot(Table):
 
 
 class SdoServer(Table):
-    """A further SDO server of the node, beside the first, which every node has at 600h and 580h."""
+    """A further SDO server of the node, besides the first, which every node has at 600h and 580h."""
 
     number: int = Field(ge=2, le=128, description="2 is object 1201h")
     request: int = Field(ge=0, le=0x7FF, description="COB-ID to the node without the node id, such as 0x640")
@@ -160,8 +160,8 @@ class SdoServer(Table):
 
 
 class Scale(Table):
-    """value = word × full / at, with ``full`` a parameter of the drive such as P105, divided by another one,
-    ``over``, where there is one; or value = word × factor + offset."""
+    """Scale of a value = word × full / at, with ``full`` a parameter of the drive such as P105, divided by
+    another one, ``over``, where there is one; or value = word × factor + offset."""
 
     full: str | None = None
     at: int | None = Field(None, gt=0)
@@ -201,7 +201,7 @@ class Meaning(Table):
 
 
 class ProcessValue(Table):
-    """A value beside the raw words it is made from: a number with a unit, an enumeration, named bits or
+    """A value made from raw words and shown beside them: a number with a unit, an enumeration, named bits or
     one bit."""
 
     name: Name

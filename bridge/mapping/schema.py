@@ -49,7 +49,7 @@ def _plain(node: Any) -> Any:
 
 
 def _without_required(node: Any) -> Any:
-    """A copy in which no key must be there, and which refers to such copies."""
+    """A copy in which no key is required, and which refers to such copies."""
     if isinstance(node, list):
         return [_without_required(item) for item in cast("list[Any]", node)]
     if not isinstance(node, dict):

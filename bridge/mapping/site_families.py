@@ -43,7 +43,7 @@ def modules_of(key: str) -> tuple[str, ...]:
 
 
 def load_site_and_families(path: Path, describe: Describe | None = None) -> tuple[Site, dict[str, Family]]:
-    """A site file and every mapping it names; ``describe`` makes those of device descriptions. Raises
+    """Site file and every mapping it names; ``describe`` gives those of device descriptions. Raises
     ``FileFaults`` with all faults of all files."""
     file, site = read_site(path)
     families: dict[str, Family] = {}

@@ -281,7 +281,7 @@ class Intruders:
 
 @dataclass(slots=True)
 class _Series:
-    """Answers to an intruder that goes on."""
+    """Series of answers to an intruder that goes on."""
 
     node: NodeCore
     since: float

@@ -274,7 +274,7 @@ class Network:
         self._watch.on_duplicate(node.table.id, sign, now)
 
     def is_taken(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether another node of the bus has a PDO, or anything else, on this identifier."""
+        """Whether another node of the bus uses this identifier, for a PDO or anything else."""
         return any(
             cob_id in other.wire.routes
             or any(cob_id == rpdo.cob_id for pdos in other.wire.pdos for rpdo in pdos.rpdos)
@@ -283,7 +283,7 @@ class Network:
         )
 
     def is_foreign(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether an identifier is that of another node, or will be."""
+        """Whether this identifier is another node's, or will be by the site's files."""
         others = (other for other in self.nodes if other is not node)
         return self.is_taken(node, cob_id) or any(cob_id in one.wire.stop_words.given_ids for one in others)
 
@@ -346,8 +346,8 @@ class Network:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
     def on_handed_over(self, unsent: set[Commanded], now: float) -> None:
-        """Begin the bounds of stops, and have outputs read back: the bus repeats what it is to repeat. Those
-        whose stop is sent by that are taken out of ``unsent``."""
+        """Begin the time bounds of stops, and have outputs read back: the bus repeats what it is to repeat.
+        Those whose stop is sent by that are taken out of ``unsent``."""
         for node in self.nodes:
             for one in node.node.commanded:
                 is_sent = node.sends_process_data and node.wire.carries(one)

@@ -9,7 +9,7 @@ from bridge.node.neighbours import Neighbour
 
 
 class StartGate:
-    """Judges all nodes of a bus at once, when ``judge`` is called; ``may_start`` answers by that."""
+    """Gate of one bus: ``judge`` judges all its nodes at once, and ``may_start`` answers by that."""
 
     def __init__(self, policy: MandatoryMissing, nodes: Sequence[Neighbour]) -> None:
         self._policy = policy
@@ -18,7 +18,7 @@ class StartGate:
         self._awaited: list[Neighbour] = []
         self._order = 0
         self.missing: list[str] = []
-        """Names of the nodes that the others wait for."""
+        """Names of the nodes for which the others wait."""
 
     def stopped_by(self, node: Neighbour) -> None:
         """Make all nodes wait until this one is ready again: they were stopped because it was lost."""

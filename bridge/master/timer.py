@@ -22,7 +22,7 @@ _FLOOR_S: Final = 1e-6
 
 
 class LoopTimer:
-    """Calls ``wake`` at the armed time; one time is armed at a time, the newest counts."""
+    """Timer that calls ``wake`` at the armed time; one time is armed at a time, the newest counts."""
 
     def __init__(
         self, loop: asyncio.AbstractEventLoop, clock: Callable[[], float], wake: Callable[[], None]

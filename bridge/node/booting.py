@@ -1,4 +1,4 @@
-"""Runs a node's boot-up generator: carries its questions to the SDO channel, brings the answers back."""
+"""Runner of a node's boot-up generator: it carries requests to the SDO channel, and the answers back."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Booted(Protocol):
 
 
 class Booting:
-    """One boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
+    """Runner of one boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
     channel's own bookkeeping."""
 
     def __init__(self, node: Booted, make: Callable[[], boot.Boot], sdo: SdoChannels) -> None:

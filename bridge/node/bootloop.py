@@ -1,4 +1,4 @@
-"""A node that keeps restarting is booted less and less often, and reported once a minute."""
+"""Boot loops: a node that keeps restarting is booted less and less often, and reported once a minute."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LAST_PAUSE_S: Final = 60.0
 
 
 class BootLoop:
-    """Counts the restarts of one node by its boot-up messages."""
+    """Restarts of one node, counted by its boot-up messages."""
 
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=_MANY)

@@ -37,7 +37,7 @@ class Leaving:
 
     @property
     def is_stopped_by_nmt(self) -> bool:
-        """Whether the node's drives do not run in the state Stopped."""
+        """Whether NMT stop stops the node's drives: they do not run in the state Stopped."""
         return self._node.family.family.stopped_by == "stop_node"
 
     @property

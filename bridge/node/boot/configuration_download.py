@@ -1,7 +1,7 @@
 """Download of a node's configuration in order, compared first and read back (CiA 302-2, CiA 302-3).
 
-A node that keeps a configuration date and time (1020h) is asked for it first: where it has ours, nothing
-is downloaded. The date the bridge writes is made from the configuration itself, so that a changed site
+A node that keeps a configuration date and time (1020h) is asked for it first: if it is ours, nothing is
+downloaded. The date that the bridge writes is derived from the configuration itself, so that a changed site
 file is never taken for the one the node has.
 """
 
@@ -32,9 +32,9 @@ _DAYS: Final = 0xFFFF
 
 
 def configuration_stamp(downloads: Sequence[Download]) -> tuple[int, int]:
-    """Date (days since 1984-01-01) and time (ms) that stand for this configuration in 1020h.
+    """Date (days since 1984-01-01) and time (ms) that identify this configuration in 1020h.
 
-    Those in the list, where a DCF brings its own; else made from the content.
+    Those in the list, where a DCF brings its own; else derived from the content.
     """
     given = {download.sub: number(download.data) for download in downloads if download.index == _VERIFY}
     if 1 in given and 2 in given:
@@ -48,8 +48,8 @@ def configuration_stamp(downloads: Sequence[Download]) -> tuple[int, int]:
 
 
 def configure(downloads: Sequence[Download], *, store: bool, result: BootResult) -> Do:
-    """Bring the node's objects to ``downloads``; ``store`` saves them with 1010h:1 if one was written, now
-    or in a boot-up before this one that did not come to it.
+    """Bring the node's objects to ``downloads``; ``store`` saves them with 1010h:1 if one was written, now or
+    in an earlier boot-up that did not get as far as storing.
 
     Raises BootError J with object, expected and read. A value that the node does not keep is written once.
     """

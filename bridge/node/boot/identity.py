@@ -47,7 +47,7 @@ class IdentityCheck:
 
 
 def _rules(expected: object, where: Text, table: str) -> list[tuple[IdentityCheck, Text]]:
-    """The rules of an identity table; the mapping's has fewer keys than the site file's."""
+    """Rules of an identity table; the mapping's has fewer keys than the site file's."""
     rules: list[tuple[IdentityCheck, Text]] = []
     for letter, index, sub, name in (
         ("C", 0x1000, 0, "device_type"),

@@ -1,4 +1,4 @@
-"""Runs procedures that read and write parameters on SDO channels. Sans-IO."""
+"""Runner of procedures that read and write parameters on SDO channels. Sans-IO."""
 
 from __future__ import annotations
 

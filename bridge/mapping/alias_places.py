@@ -1,4 +1,4 @@
-"""Where the parameters stand that are other names of communication objects."""
+"""Places of the parameters that are other names of communication objects."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from bridge.mapping.parameters import object_of
 
 @dataclass(frozen=True, slots=True)
 class Alias:
-    """``name`` is the parameter that the mapping file names, with "…" for one of its further elements;
-    ``ref`` is where it stands in the object dictionary."""
+    """Parameter that stands for other objects. ``name`` is that in the mapping file, with "…" for one of its
+    further elements; ``ref`` is its place in the object dictionary."""
 
     name: str
     ref: ObjectRef
@@ -22,7 +22,7 @@ class Alias:
 
 
 def aliases(family: Family) -> Iterator[Alias]:
-    """Every parameter, and every element of one, that stands for other objects.
+    """Parameters, and elements of parameters, that stand for other objects.
 
     Raises ValueError for a name that is no parameter of the family; the mapping's checks find that first.
     """
@@ -35,7 +35,7 @@ def aliases(family: Family) -> Iterator[Alias]:
 
 
 def place_of(family: Family, name: str) -> ObjectRef:
-    """Where the parameter stands that an alias names. Raises ValueError where it is none."""
+    """Object of the parameter that an alias names. Raises ValueError where there is none."""
     for parameter in family.parameter:
         if parameter.name == name and parameter.object is not None:
             return parameter.object

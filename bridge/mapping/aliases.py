@@ -13,7 +13,7 @@ COMMUNICATION: Final = range(0x1000, 0x2000)
 
 
 def _split(value: object) -> object:
-    """A text, or a list of texts, of objects apart by spaces."""
+    """Objects in a text, or in a list of texts, separated by spaces. Raises ValueError."""
     texts = cast("list[object]", value) if isinstance(value, list) else [value]
     if not texts or not all(isinstance(text, str) and text.split() for text in texts):
         raise ValueError('must be objects as "1400:02", apart by spaces, or a list with one for each element')
@@ -30,8 +30,8 @@ Targets = Annotated[
 
 
 class Aliases(Table):
-    """By the maker's name: the objects for which a parameter stands. A list goes on with the next elements
-    of the parameter. ``same`` holds the object's value, ``related`` decides it in another form."""
+    """Objects for which a parameter stands, by the maker's name. A list goes on with the next elements of the
+    parameter. ``same`` holds the object's value, ``related`` decides it in another form."""
 
     same: dict[str, Targets] = Field(default_factory=dict[str, Targets])
     related: dict[str, Targets] = Field(default_factory=dict[str, Targets])

@@ -1,4 +1,4 @@
-"""What the entries of a mapping file say together."""
+"""Checks that the entries of a mapping file agree with each other."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ NODE_POINTS: Final = (
     "emcy_history",
     "emcy_suppressed",
 )
-"""What every node has beside what is polled."""
+"""Points that every node has beside the polled ones."""
 
 
 def check(family: Family, file: MergedFile) -> None:
-    """Note in ``file`` what does not go together."""
+    """Note in ``file`` all entries that do not go together."""
     facts = family.family
     if facts.node_id_low > facts.node_id_high:
         file.fault(("family", "node_id_low"), f"is above node_id_high, {facts.node_id_high}")
@@ -116,7 +116,7 @@ def _check_polls(family: Family, file: MergedFile) -> None:
 
 
 def _check_bits(family: Family, file: MergedFile) -> None:
-    """Each bit is shown under its name, beside the others of its word."""
+    """Check that the bits of a word have different names: each is shown beside the others."""
     named: list[tuple[list[str], Key]] = [
         (family.control_word.bits, ("control_word", "bits")),
         (family.status_word.bits, ("status_word", "bits")),
@@ -173,7 +173,7 @@ def _check_handshake(family: Family, file: MergedFile) -> None:
 
 
 def _check_states(family: Family, file: MergedFile) -> None:
-    """The word that is served while tripped must decode as *fault*, and every state be told at all."""
+    """Check that the word that is served while tripped decodes as *fault*, and that every state can occur."""
     states = family.status_word.state
     if not any(state.name == "operation_enabled" for state in states):
         hint = "without it the bridge never knows that the drive moves"
@@ -195,7 +195,7 @@ def _check_states(family: Family, file: MergedFile) -> None:
 
 
 def _check_shadows(family: Family, told: list[int], file: MergedFile) -> None:
-    """A pattern all of whose words match an earlier one is never told. ``told`` are checked already."""
+    """Check that no pattern has only words that match an earlier one. ``told`` are checked already."""
     states = family.status_word.state
     bits = [pattern_bits(state.pattern) for state in states]
     for s, (mask, value) in enumerate(bits):

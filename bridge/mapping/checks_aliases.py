@@ -1,4 +1,4 @@
-"""Communication objects under whatever name: that aliases are some, and that no drive's start writes one."""
+"""Checks of communication objects under any name: aliases are some, and no drive's start writes one."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _are_known(family: Family, file: MergedFile) -> bool:
 
 
 def _check_starts(family: Family, file: MergedFile) -> None:
-    """What the boot-up sets by itself is not written beside it (PDOs, error control, identifiers)."""
+    """Check that no start write sets what the boot-up sets by itself (PDOs, error control, identifiers)."""
     known = {(one.ref.index, one.ref.sub): one for one in aliases(family)}
     for s, slot in enumerate(family.slot):
         for n, start in enumerate(slot.start):

@@ -1,4 +1,4 @@
-"""What a mapping file of a device that is no drive says together."""
+"""Checks of a mapping file of a device that is no drive."""
 
 from __future__ import annotations
 

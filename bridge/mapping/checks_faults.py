@@ -1,4 +1,4 @@
-"""What the emergencies and faults of a mapping file say together."""
+"""Checks of the emergencies and faults of a mapping file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _WIDEST: Final = 32
 
 
 def check_faults(family: Family, file: MergedFile) -> None:
-    """Note in ``file`` what does not go together."""
+    """Note in ``file`` all entries that do not go together."""
     emcy, faults = family.emcy, family.faults
     if emcy.events and emcy.event is None and emcy.number is None:
         file.fault(("emcy", "events"), "has no meaning without emcy.event or emcy.number")
@@ -45,13 +45,13 @@ def check_faults(family: Family, file: MergedFile) -> None:
 
 
 def known_faults(family: Family) -> dict[str, str]:
-    """Every fault that has a text, in English, by the name that a ``[[fault]]`` would have."""
+    """Faults that have a text, with it in English, by the name that a ``[[fault]]`` would have."""
     codes = {f"{code}h": text for code, text in family.emcy.codes.items()}
     return {**family.faults.texts, **family.emcy.events, **codes}
 
 
 def _check_languages(one: FaultEntry, key: Key, file: MergedFile) -> None:
-    """What is said in one language is said in the other."""
+    """Check that a cause or remedy in one language is there in the other."""
     for what in ("cause", "remedy"):
         for language, other in (("en", "de"), ("de", "en")):
             if getattr(getattr(one, language), what) and not getattr(getattr(one, other), what):

@@ -1,4 +1,4 @@
-"""What a mapping file says of the drives' own supervision."""
+"""Checks of the drives' own supervision in a mapping file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the words, PDOs and slots of a mapping file say together."""
+"""Checks of the words, PDOs and slots of a mapping file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def twice(names: Iterable[tuple[str, Key]], what: str, file: MergedFile) -> None
 
 
 def check_parameter(name: str, family: Family, key: Key, file: MergedFile) -> bool:
-    """``name`` must be a parameter that is listed."""
+    """Check that ``name`` is a listed parameter."""
     known = sorted(parameter.name for parameter in family.parameter)
     if name not in known:
         file.fault(key, f"there is no parameter {name!r}", f"known: {', '.join(known)}")
@@ -60,7 +60,7 @@ def check_slots(family: Family, file: MergedFile) -> None:
 
 
 def _check_direction(family: Family, pdos: list[Pdo], process: list[str], key: Key, file: MergedFile) -> None:
-    """All PDOs of one direction of a slot."""
+    """Check all PDOs of one direction of a slot."""
     keys = [file.item(key, p) for p in range(len(pdos))]
     named = list(zip(pdos, keys, strict=True))
     twice(((f"{pdo.number}", (*at, "number")) for pdo, at in named), f"{str(key[-1]).upper()} number", file)
@@ -102,7 +102,7 @@ def _check_pdo(family: Family, pdo: Pdo, process: list[str], key: Key, file: Mer
 
 
 def _check_neighbours(pdo: Pdo, words: list[str], process: list[str], key: Key, file: MergedFile) -> None:
-    """An object that fills several words fills them from one on, low words first."""
+    """Check that an object that fills several words fills successive ones, low words first."""
     places = [process.index(word) if word in process else None for word in words]
     for w in range(1, min(len(places), len(pdo.objects))):
         before, here = places[w - 1], places[w]
@@ -117,7 +117,7 @@ def _direction(key: Key) -> str:
 
 
 def _run(pdo: Pdo, word: int, layout: int) -> int:
-    """How many words in a row this object is named for."""
+    """Number of words in a row that this object is named for."""
 
     def ref(place: int) -> tuple[ObjectRef, ...]:
         refs = pdo.objects[place]

@@ -1,4 +1,4 @@
-"""What the values of a mapping file say together with its words, slots and parameters."""
+"""Checks of the values of a mapping file, with its words, slots and parameters."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from bridge.tomlfile import Key
 
 _TEXTS: Final = ("string", "bytes")
 _OF_MODE: Final = (10, 12, 13)
-"""Bits of a status word that the mode of operation gives their meaning (CiA 402, 6041h)."""
+"""Bits of a status word whose meaning depends on the mode of operation (CiA 402, 6041h)."""
 
 
 def check_values(family: Family, file: MergedFile) -> None:
-    """Note in ``file`` what does not go together."""
+    """Note in ``file`` all entries that do not go together."""
     process = family.process
     seen: dict[str, Key] = {
         **{f"command/{word}": ("process", "rpdo") for word in reversed(process.rpdo)},
@@ -35,7 +35,7 @@ def check_values(family: Family, file: MergedFile) -> None:
 
 
 def check_meanings(family: Family, file: MergedFile) -> None:
-    """Each is of a word that there is, and its parameter has an object."""
+    """Check that each meaning is of a word that exists, and that its parameter has an object."""
     for m, meaning in enumerate(family.meaning):
         key: Key = ("meaning", m)
         # The status word's bits may mean something in one mode of operation only.
@@ -78,7 +78,7 @@ def _check_words(family: Family, value: ProcessValue, key: Key, file: MergedFile
 
 
 def _check_code(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
-    """Something tells the codes of the words that it may be made from."""
+    """Check that meanings tell the codes of the words that a value may be made from."""
     told = [meaning.word for meaning in family.meaning if meaning.group == value.group]
     untold = [word for word in value.word_names if word not in told]
     if untold or not told:
@@ -89,7 +89,7 @@ def _check_code(family: Family, value: ProcessValue, key: Key, file: MergedFile)
 
 
 def _check_kind(value: ProcessValue, key: Key, file: MergedFile) -> None:
-    """One meaning, and a type that goes with it."""
+    """Check that a value has one meaning, and a type that goes with it."""
     kinds = {
         "scale": value.scale is not None,
         "states": bool(value.states),
@@ -172,14 +172,14 @@ def _check_scale(family: Family, value: ProcessValue, key: Key, file: MergedFile
 
 
 def _check_number(name: str, family: Family, key: Key, file: MergedFile) -> None:
-    """``name`` is a parameter that is listed and holds a number."""
+    """Check that ``name`` is a listed parameter that holds a number."""
     if check_parameter(name, family, key, file) and family.parameter_named(name).data_type in _TEXTS:
         file.fault(key, f"{name} is a text")
 
 
 def _check_conditions(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
-    """What decides whether there is such a value can be read, and one of two that share a bit says when it is
-    meant."""
+    """Check that the parameters that decide whether there is such a value can be read, and that values which
+    share a bit say when they are meant."""
     for name in value.when:
         _check_number(name, family, (*key, "when", name), file)
     for place, name in enumerate(value.steady):
@@ -203,8 +203,8 @@ def _check_conditions(family: Family, value: ProcessValue, key: Key, file: Merge
 
 
 def _check_shared_bit(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
-    """A bit that two values are made of means the one or the other: each says when. So does a bit of a status
-    word that the drive's mode of operation gives its meaning, as soon as one of its values says so."""
+    """Check that each of two values that share a bit says when it is meant; so does a value of a status word
+    bit that depends on the mode of operation, as soon as one value of that word says so."""
     if value.bit is None or value.is_conditional:
         return
     for other in family.value:

@@ -1,4 +1,5 @@
-"""A node that is no drive: an encoder (CiA 406), inputs and outputs (CiA 401), anything that sends PDOs."""
+"""Signals of a node that is no drive: an encoder (CiA 406), inputs and outputs (CiA 401), anything that sends
+PDOs."""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ _REALS: Final = {"real32": struct.Struct("<f"), "real64": struct.Struct("<d")}
 
 
 class Signal(Table):
-    """One object of a PDO: value = what is received × factor + offset."""
+    """One object of a PDO: value = number received × factor + offset."""
 
     name: Name
     object: Ref
@@ -50,21 +51,21 @@ class Signal(Table):
 
     @property
     def size(self) -> int:
-        """How many bits it has in a PDO."""
+        """Number of bits in a PDO."""
         return 1 if self.data_type == "bool" else int("".join(filter(str.isdigit, self.data_type)))
 
     @property
     def value_type(self) -> DataType:
-        """The type of its point."""
+        """Type of its point."""
         return DataType.FLOAT if self.is_scaled else VALUE_TYPES[self.data_type]
 
     @property
     def is_real(self) -> bool:
-        """It is a floating-point number on the wire."""
+        """Whether it is a floating-point number on the wire."""
         return self.data_type in _REALS
 
     def decode(self, raw: int) -> Value:
-        """``raw`` is the entry of a PDO as an integer, with its sign where the type has one."""
+        """Value of a PDO entry; ``raw`` is its integer, with a sign where the type has one."""
         if self.data_type == "bool":
             return bool(raw)
         real = _REALS.get(self.data_type)
@@ -74,7 +75,7 @@ class Signal(Table):
         return float(number) if self.value_type is DataType.FLOAT else number
 
     def encode(self, value: object) -> int:
-        """The entry of a PDO as an integer without sign. Raises ``ValueNotTaken`` with what it takes
+        """PDO entry of a value, as an unsigned integer. Raises ``ValueNotTaken`` with what it takes
         instead."""
         if self.data_type == "bool":
             if value not in (0, 1):
@@ -102,7 +103,7 @@ OnExpiry = bool | int | float | Literal["hold"]
 
 
 class Output(Signal):
-    """One object of a PDO that the node receives: what is sent = (value − offset) / factor."""
+    """One object of a PDO that the node receives: number sent = (value − offset) / factor."""
 
     on_expiry: OnExpiry = Field(
         0, description='what it gets when its controller falls silent: a value, or "hold" for the last one'
@@ -114,5 +115,5 @@ class Output(Signal):
 
 
 def no_process() -> Process:
-    """What a family without slots has instead of process data of drives."""
+    """Stand-in for the process data of drives, in a family without slots."""
     return Process.model_validate({"rpdo": ["control_word"], "tpdo": ["status_word"]})

@@ -1,4 +1,4 @@
-"""Emergency error codes in the words of CiA 301 (§7.2.7.1): for those that a family has no text for."""
+"""Emergency error codes in the words of CiA 301 (§7.2.7.1), for those that a family has no text for."""
 
 from __future__ import annotations
 
@@ -47,9 +47,10 @@ _GROUPS: Final = {
     0xF0: Text.of("emcy.functions"),
     0xFF: Text.of("emcy.device_specific"),
 }
-"""By the code's high byte."""
+"""Groups of codes, by their high byte."""
 _LAST_CLASS: Final = 0x90
-"""Up to here the first digit is a class of its own: 43xxh has to do with temperature, whatever it is."""
+"""Last high byte whose first digit is a class of its own: 43xxh has to do with temperature, whatever it
+is."""
 
 _REGISTER: Final = (
     Text.of("emcy.generic"),
@@ -65,7 +66,7 @@ _REGISTER: Final = (
 
 
 def text(code: int) -> Text:
-    """What CiA 301 says of this code, or of the nearest group that it belongs to."""
+    """Text of CiA 301 for this code, or for the nearest group that it belongs to."""
     high = code >> 8
     found = _CODES.get(code) or _GROUPS.get(high)
     if found is None and high & 0xF0 <= _LAST_CLASS:
@@ -74,6 +75,6 @@ def text(code: int) -> Text:
 
 
 def register_text(register: int) -> Text:
-    """The error register in words: ``generic error, communication``."""
+    """Error register in words: ``generic error, communication``."""
     bits = tuple(said for bit, said in enumerate(_REGISTER) if register >> bit & 1)
     return Text.of("emcy.register", bits=bits) if bits else Text.of("emcy.none")

@@ -1,4 +1,4 @@
-"""What single entries of a mapping file look like: objects, patterns, codes, numbers."""
+"""Types of single entries in a mapping file: objects, patterns, codes, numbers."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class ObjectRef:
 
 
 class MappedObject(Table):
-    """What may stand for one word: one object, or several shorter ones, the first in the lowest bits.
+    """Content of one word: one object, or several shorter ones, the first in the lowest bits.
 
-    ``bits`` has the length of each part where it is given; 0 is 16 for one object (times the words that
-    it fills) and 8 for each of several.
+    ``bits`` has the length of each part where it is given; 0 is 16 for one object (times the words that it
+    fills) and 8 for each of several.
     """
 
     parts: tuple[ObjectRef, ...]
@@ -53,7 +53,7 @@ class MappedObject(Table):
 
     @property
     def lengths(self) -> tuple[int, ...]:
-        """Bits of each part, of an object that fills one word."""
+        """Bits of each part, for an object that fills one word."""
         default = WORD_BITS // 2 if self.is_composite else WORD_BITS
         return tuple(bits or default for bits in self.bits)
 
@@ -142,11 +142,11 @@ EmcyCode = Annotated[str, AfterValidator(_code)]
 FaultNumber = Annotated[str, AfterValidator(_number)]
 Decimal = Annotated[str, AfterValidator(_decimal)]
 States = dict[Annotated[int, BeforeValidator(_state), WithJsonSchema({"type": "string"})], str]
-"""Number to text; TOML writes the numbers as keys."""
+"""Texts by number; TOML writes the numbers as keys."""
 
 
 def pattern_bits(pattern: str) -> tuple[int, int]:
-    """``"0XX1000"`` as (mask, value): the word matches where ``word & mask == value``."""
+    """Mask and value of a pattern such as ``"0XX1000"``: a word matches where ``word & mask == value``."""
     mask = int("".join("0" if c == "X" else "1" for c in pattern), 2)
     value = int(pattern.replace("X", "0"), 2)
     return mask, value

@@ -12,7 +12,7 @@ from bridge.mapping.entry_types import Decimal, EmcyCode, FaultNumber, Table, Wo
 from bridge.text import Words
 
 FORM_FIELD: Final = re.compile(r"\{(number|group|hex|bits (\d{1,2})-(\d{1,2}))(?::(\d))?\}")
-"""What may stand in a ``FaultForm``, with the least number of its digits."""
+"""Fields of a ``FaultForm``, with the least number of their digits."""
 _NAME: Final = re.compile(r"\d{1,10}(\.\d{1,3})?|[0-9A-F]{2}(?:[0-9A-F]{2}|xx)h")
 
 
@@ -33,7 +33,7 @@ FaultName = Annotated[str, AfterValidator(_fault_name)]
 
 
 class EmcyEvent(Table):
-    """An event number in the emergency message, which decides; the code comes second."""
+    """Event number in the emergency message: it decides, and the code comes second."""
 
     byte: int = Field(ge=3, le=7)
     cause_byte: int | None = Field(None, ge=3, le=7)
@@ -41,7 +41,7 @@ class EmcyEvent(Table):
 
 
 class EmcyNumber(Table):
-    """An error number in the manufacturer's bytes, where the code is one of ``codes``."""
+    """Error number in the manufacturer's bytes, where the code is one of ``codes``."""
 
     codes: list[EmcyCode] = Field(min_length=1)
     byte: int = Field(ge=3, le=7)
@@ -61,13 +61,13 @@ class EmcyTable(Table):
     )
 
     def text(self, code: int) -> Words:
-        """The text of an EMCY code, or of its group: the family's own, else that of CiA 301."""
+        """Text of an EMCY code, or of its group: the family's own, else that of CiA 301."""
         name = f"{code:04X}"
         return self.codes.get(name) or self.codes.get(f"{name[:2]}xx") or emcy_codes.text(code)
 
 
 class Explanation(Table):
-    """What a manual says of a fault, in one language; empty where it says nothing."""
+    """A manual's explanation of a fault, in one language; empty where it gives none."""
 
     cause: str = ""
     remedy: str = ""
@@ -83,7 +83,7 @@ class FaultEntry(Table):
 
 
 class Advised(Table):
-    """General advice in one language; both sentences are there."""
+    """General advice in one language, always with both sentences."""
 
     cause: str = Field(min_length=1, description="what it often is, as the rest of a sentence")
     remedy: str = Field(min_length=1, description="what to do, in whole sentences")

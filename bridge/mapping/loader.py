@@ -1,4 +1,4 @@
-"""Finding and reading drive-family files.
+"""Search and reading of drive-family files.
 
 Mappings are looked up in the folder ``mappings/`` beside the site file first, then in the program's own.
 """
@@ -19,22 +19,22 @@ _SITE_FOLDER: Final = "mappings"
 
 
 def mappings_dir() -> Path:
-    """The folder of the families that come with the program: inside the installed package, or at the
-    top of a checkout."""
+    """Folder of the families that come with the program: inside the installed package, or at the top of a
+    checkout."""
     package = Path(__file__).resolve().parents[1]
     installed = package / "families"
     return installed if installed.is_dir() else package.parent / "mappings"
 
 
 def mapping_folders(site: Path | None = None) -> tuple[Path, ...]:
-    """Where the mappings of a site are looked up, in this order."""
+    """Folders in which the mappings of a site are looked up, in this order."""
     own = mappings_dir()
     beside = None if site is None else site.resolve().parent / _SITE_FOLDER
     return (own,) if beside is None or beside == own or not beside.is_dir() else (beside, own)
 
 
 def _files(folders: Sequence[Path]) -> dict[str, list[Path]]:
-    """Every mapping by its name, in the order in which the folders have it."""
+    """Files of each mapping by its name, in the order of the folders."""
     found: dict[str, list[Path]] = {}
     for folder in folders:
         for path in sorted(folder.rglob("*.toml")):
@@ -43,7 +43,8 @@ def _files(folders: Sequence[Path]) -> dict[str, list[Path]]:
 
 
 def is_template(path: Path) -> bool:
-    """Whether a mapping file says that it can only be extended. What cannot be read is none."""
+    """Whether a mapping file says that it can only be extended. A file that cannot be read is no such
+    template."""
     try:
         family = TomlFile(path).root.table("family")
     except FileFaults:
@@ -52,13 +53,13 @@ def is_template(path: Path) -> bool:
 
 
 def family_names(folders: Sequence[Path] = ()) -> list[str]:
-    """Every family that a site can use, as the site file names it."""
+    """Families that a site can use, as the site file names them."""
     files = _files(folders or mapping_folders())
     return sorted(name for name, paths in files.items() if not is_template(paths[0]))
 
 
 def load_family(name: str, folders: Sequence[Path] = ()) -> Family:
-    """The family called ``name`` (``nord/sk-tu4-cao``). Raises ``FileFaults`` with every fault in it."""
+    """Family called ``name`` (``nord/sk-tu4-cao``). Raises ``FileFaults`` with every fault in it."""
     folders = folders or mapping_folders()
     paths = _files(folders).get(name)
     if not paths or is_template(paths[0]):
@@ -75,12 +76,12 @@ def is_family(name: str, folders: Sequence[Path]) -> bool:
 
 
 def missing(name: str, *, template: bool) -> str:
-    """Why no site can use a mapping of this name."""
+    """Reason why no site can use a mapping of this name."""
     return f"{name!r} is a template: it can only be extended" if template else f"there is no mapping {name!r}"
 
 
 def template_names(folders: Sequence[Path] = ()) -> list[str]:
-    """The mappings that can only be extended."""
+    """Mappings that can only be extended."""
     files = _files(folders or mapping_folders())
     return sorted(name for name, paths in files.items() if is_template(paths[0]))
 
@@ -101,13 +102,13 @@ def _checked(file: MergedFile) -> Family:
 
 
 def family_of(text: str, path: Path, folders: Sequence[Path] = ()) -> Family:
-    """The family that was made of the file in ``path`` as the text of a mapping. Raises ``FileFaults``."""
+    """Family in the mapping ``text`` that was made of the file in ``path``. Raises ``FileFaults``."""
     return _checked(MergedFile(_chain(TomlFile(path, text), folders or mapping_folders())))
 
 
 def lineage(name: str, folders: Sequence[Path] = ()) -> list[str]:
-    """The mapping ``name`` and those it extends, by their names. Raises ``FileFaults`` where one is
-    missing; there must be a mapping of this name."""
+    """Names of the mapping ``name`` and of those it extends. Raises ``FileFaults`` where one is missing;
+    there must be a mapping of this name."""
     folders = folders or mapping_folders()
     files = _files(folders)
     by_path = {path.resolve(): known for known, paths in files.items() for path in paths}
@@ -116,7 +117,7 @@ def lineage(name: str, folders: Sequence[Path] = ()) -> list[str]:
 
 
 def _chain(first: TomlFile, folders: Sequence[Path]) -> list[TomlFile]:
-    """The file and those it extends, the last of those first."""
+    """Files from the one that extends nothing to ``first``, each extended by the next."""
     chain = [first]
     files = _files(folders)
     while isinstance(name := chain[0].data.get("extends"), str):

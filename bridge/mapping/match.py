@@ -1,4 +1,4 @@
-"""Which mapping file fits a node that was found on a bus."""
+"""Choice of the mapping file for a node that was found on a bus."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ALL: Final = 0xFFFF_FFFF
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a node says of itself; None where it does not say."""
+    """Identity that a node reports; None where it reports none."""
 
     device_type: int | None = None
     vendor: int | None = None
@@ -25,14 +25,14 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """``by`` names the keys of ``[identity]`` that fit."""
+    """Mapping that fits a node; ``by`` names the keys of ``[identity]`` that fit."""
 
     mapping: str
     by: tuple[str, ...]
 
 
 def best_match(found: Found, families: Mapping[str, Family]) -> Match | None:
-    """The family most of whose identity rules fit, all of them; None where no family says anything.
+    """Family with the most identity rules of those whose rules all fit; None where no family has such rules.
 
     Where two fit equally well, one that is ``preferred``, then the first in the order of the names.
     """
@@ -45,12 +45,12 @@ def best_match(found: Found, families: Mapping[str, Family]) -> Match | None:
 
 
 def _weight(by: tuple[str, ...]) -> tuple[int, bool]:
-    """A profile that many makers' devices have says less than anything else."""
+    """Weight of the keys that fit: a profile that many makers' devices have says less than anything else."""
     return len(by), by != ("device_type",)
 
 
 def _fits(found: Found, rule: IdentityRule) -> tuple[str, ...]:
-    """The keys that fit, or nothing where one of them does not."""
+    """Keys that fit; none where one of them does not."""
     by: list[str] = []
     for key, want, mask, have in (
         ("device_type", rule.device_type, rule.device_type_mask, found.device_type),

@@ -26,7 +26,7 @@ _Place = tuple[TomlFile, Key]
 
 
 class MergedFile:
-    """``files`` in the order in which they are laid over each other, the extended one first."""
+    """Merger of ``files``, in the order in which they are laid over each other, the extended one first."""
 
     def __init__(self, files: Sequence[TomlFile]) -> None:
         self._last = files[-1]
@@ -43,7 +43,7 @@ class MergedFile:
         return self._last.path
 
     def _forget_own(self) -> None:
-        """What a file says of itself is not inherited: what it extends and leaves out, and that it is a
+        """Drop the file's own keys, which are not inherited: what it extends and leaves out, and that it is a
         template or preferred."""
         self.data.pop("extends", None)
         self.data.pop("without", None)
@@ -54,7 +54,7 @@ class MergedFile:
             self.data["family"].pop("preferred", None)
 
     def _leave_out(self, file: TomlFile) -> None:
-        """Take what ``file`` is ``without`` out of what it extends."""
+        """Remove from what ``file`` extends what it is ``without``."""
         without: object = file.data.get("without")
         for n, entry in enumerate(cast("list[object]", without) if isinstance(without, list) else []):
             if not isinstance(entry, str):
@@ -77,7 +77,7 @@ class MergedFile:
         return cast("list[Any]", items) if isinstance(items, list) else []
 
     def _remove(self, kind: str, place: int) -> None:
-        """One item of a list; those behind it move up."""
+        """Remove one item of a list; those behind it move up."""
         items = self._items(kind)
         self.data = {**self.data, kind: items[:place] + items[place + 1 :]}
         self._drop((kind, place))
@@ -85,7 +85,7 @@ class MergedFile:
             self._move((kind, n), (kind, n - 1))
 
     def _put(self, value: Any, at: Key, source: Key, file: TomlFile) -> Any:
-        """``value``, all of it from ``file``."""
+        """Copy of ``value``, all of it noted as from ``file``."""
         self._places[at] = (file, source)
         if isinstance(value, dict):
             items = cast("dict[str, Any]", value).items()
@@ -96,19 +96,19 @@ class MergedFile:
         return value
 
     def _drop(self, at: Key) -> None:
-        """Forget what stood below ``at``: it is replaced."""
+        """Forget the places at and below ``at``: it is replaced."""
         for key in [key for key in self._places if key[: len(at)] == at]:
             del self._places[key]
 
     def _move(self, at: Key, to: Key) -> None:
-        """What stood at and below ``at`` stands at ``to``."""
+        """Move the places at and below ``at`` to ``to``."""
         for key in [key for key in self._places if key[: len(at)] == at]:
             self._places[(*to, *key[len(at) :])] = self._places.pop(key)
 
     def _table(
         self, base: dict[str, Any], over: dict[str, Any], at: Key, source: Key, file: TomlFile
     ) -> dict[str, Any]:
-        """``over``, which is ``source`` of ``file``, laid over ``base``, which is ``at`` of ours."""
+        """Table ``over``, which is ``source`` of ``file``, laid over ``base``, which is ``at`` of ours."""
         if at:
             self._places[at] = (file, source)
         merged = dict(base)
@@ -129,8 +129,8 @@ class MergedFile:
         return merged
 
     def _named(self, base: list[Any], over: list[Any], name: str, file: TomlFile) -> list[Any]:
-        """Lists of tables that are told apart by their names. What has no name, or one that its own file
-        has given before, is an item of its own: the checks tell what is there twice."""
+        """Lists of tables merged by name. An item without a name, or with one that its own file has given
+        before, is an item of its own: the checks report doubles."""
         merged = list(base)
         places = {_identity(item, name): n for n, item in enumerate(base)}
         for n, item in enumerate(over):
@@ -142,7 +142,7 @@ class MergedFile:
         return merged
 
     def _pdos(self, base: Any, over: Any, here: Key, there: Key, file: TomlFile) -> list[Any]:
-        """PDOs are told apart by their numbers; one without a number is the first."""
+        """PDOs merged by number; one without a number is the first."""
         if isinstance(base, dict):
             place = self._places.get(here)
             self._move(here, (*here, 0))
@@ -161,7 +161,7 @@ class MergedFile:
         return merged
 
     def place(self, key: Sequence[int | str]) -> _Place:
-        """In which file ``key`` stands, or the nearest table around it, and its key there."""
+        """File in which ``key`` stands, or the nearest table around it, and its key there."""
         for length in range(len(key), 0, -1):
             place = self._places.get(tuple(key[:length]))
             if place:
@@ -169,7 +169,7 @@ class MergedFile:
         return self._last, tuple(key)
 
     def item(self, key: Key, place: int) -> Key:
-        """The key of one of several that may be written as one table."""
+        """Key of one of several items that may be written as one table."""
         return (*key, place) if (*key, place) in self._places else key
 
     def line(self, key: Sequence[int | str]) -> int:
@@ -181,7 +181,7 @@ class MergedFile:
         self.faults.append(Fault(str(file.path), file.line(source), dotted(source), message, hint))
 
     def validate(self, model: type[Model]) -> Model | None:
-        """The content as ``model``, or None with every fault noted."""
+        """Content as ``model``, or None with every fault noted."""
         return validated(self.data, model, self.fault)
 
     def finish(self) -> None:
@@ -192,7 +192,7 @@ class MergedFile:
 
 
 def _identity(item: Any, name: str) -> object:
-    """What tells an item of the list ``name`` from the others; itself where it does not say."""
+    """Key that tells an item of the list ``name`` from the others; its id where it names none."""
     if not isinstance(item, dict):
         return id(item)
     table = cast("dict[str, Any]", item)
@@ -201,13 +201,13 @@ def _identity(item: Any, name: str) -> object:
 
 
 def _label(item: Any, kind: str) -> str:
-    """What ``without`` calls an item of the list ``kind``; empty where it has no name."""
+    """Name that ``without`` uses for an item of the list ``kind``; empty where it has none."""
     identity = _identity(item, kind)
     return "/".join(reversed(cast("tuple[str, ...]", identity))) if isinstance(identity, tuple) else ""
 
 
 def _listed(pdos: Any) -> list[Any]:
-    """One table stands for a list of one."""
+    """List of PDOs; one table stands for a list of one."""
     return list(cast("list[Any]", pdos)) if isinstance(pdos, list) else [pdos]
 
 
@@ -216,7 +216,7 @@ def _numbers(pdos: list[Any]) -> list[object]:
 
 
 def _place_in(pdo: Any, numbers: list[object]) -> int | None:
-    """Where the PDO stands that this one changes; None where it is a further one."""
+    """Index of the PDO that this one changes; None where it is a further one."""
     if not isinstance(pdo, dict):
         return None
     number = cast("dict[str, object]", pdo).get("number")
@@ -226,6 +226,6 @@ def _place_in(pdo: Any, numbers: list[object]) -> int | None:
 
 
 def _same_pdos(base: Any, over: Any) -> bool:
-    """Whether one of them changes a PDO that is there; else they take their place."""
+    """Whether one of them changes a PDO that is there; else they replace those."""
     numbers = _numbers(_listed(base))
     return any(_place_in(pdo, numbers) is not None for pdo in _listed(over))

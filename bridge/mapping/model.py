@@ -1,7 +1,7 @@
-"""What a drive family is: the content of a file below ``mappings/``.
+"""Model of a drive family: the content of a file below ``mappings/``.
 
-The models are the schema (``mappings/schema.json`` is made from them); everything the service knows
-of a vendor's drive is in such a file.
+The models are the schema (``mappings/schema.json`` is made from them); everything the service knows of a
+vendor's drive is in such a file.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class FamilyTable(Table):
 
 
 class IdentityRule(Table):
-    """What 1000h and 1018h must hold; what is absent is not compared."""
+    """Required content of 1000h and 1018h; what is absent is not compared."""
 
     device_type: int | None = None
     device_type_mask: int | None = None
@@ -81,7 +81,7 @@ class Command(Table):
 
 
 class Handshake(Table):
-    """How the drive takes over a position: the bridge does it when the value is written."""
+    """Handover of a position to the drive: the bridge does it when the value is written."""
 
     value: Name = Field(description="the command value that is handed over, such as position")
     bit: Bit = Field(description="of the control word: its rising edge says that there is a new one")
@@ -137,7 +137,7 @@ class StatusWord(Table):
 
 
 class Stopping(Table):
-    """How long a drive may go on saying that it is enabled after a stop; beyond that it ignores the stop."""
+    """Longest time that a drive may report itself enabled after a stop; beyond it, it ignores the stop."""
 
     off_ms: int = Field(
         250, ge=0, le=60_000, description="after a word that takes the voltage: the brake, the drive's cycle"
@@ -148,7 +148,7 @@ class Stopping(Table):
 
 
 class Poll(Table):
-    """An object of the node that is read again and again and shown as a point of the node."""
+    """An object of the node that is read periodically and shown as a point of the node."""
 
     name: Name
     object: Ref
@@ -171,8 +171,8 @@ def _no_status_word() -> StatusWord:
 
 
 class Family(Table):
-    """One mapping file, merged with those it extends: of drives, or, without slots, of a device that is none
-    and has inputs instead of process data, control word and status word."""
+    """One mapping file, merged with those it extends: a family of drives or, without slots, a device that is
+    no drive and has inputs instead of process data, control word and status word."""
 
     extends: str | None = Field(None, description='another mapping, such as "nord/sk-tu4-cao"')
     without: list[str] = Field(
@@ -209,7 +209,7 @@ class Family(Table):
     _axis: int = PrivateAttr(1)
 
     def of_axis(self, axis: int) -> Family:
-        """The family as an axis of the node has it: its parameters are objects of that axis."""
+        """Family as an axis of the node has it: its parameters are objects of that axis."""
         if axis == self._axis:
             return self
         made = self.model_copy()
@@ -217,24 +217,24 @@ class Family(Table):
         return made
 
     def of_slot(self, slot: Slot) -> Family:
-        """The family as the drive in this slot has it."""
+        """Family as the drive in this slot has it."""
         return self.of_axis(slot.axis)
 
     def place(self, ref: ObjectRef) -> ObjectRef:
-        """Where the axis has an object that the file names."""
+        """Object that the axis has for one that the file names."""
         return ObjectRef(on_axis(ref.index, self._axis), ref.sub)
 
     def is_per_axis(self, ref: ObjectRef) -> bool:
-        """Whether each axis of the node has an object of its own for the one that the file names."""
+        """Whether each axis of the node has an object of its own for this one of the file."""
         return ref.index in STANDARDISED and any(slot.axis > 1 for slot in self.slot)
 
     @property
     def is_device(self) -> bool:
-        """It is of a node without drives."""
+        """Whether it describes a node without drives."""
         return not self.slot
 
     def slot_named(self, name: str) -> Slot:
-        """Raises KeyError where the family has no such slot."""
+        """Slot of this name. Raises KeyError where the family has none."""
         for slot in self.slot:
             if slot.name == name:
                 return slot
@@ -246,36 +246,36 @@ class Family(Table):
         return slot is None or slot.parameters_by_sdo or not has_own_channel
 
     def sdo_channel(self, slot: Slot, opened: Sequence[int]) -> int | None:
-        """The number of the SDO server that reaches a drive's parameters, with these opened beside the
-        first; None where none does."""
+        """Number of the SDO server that reaches a drive's parameters, with these opened beside the first;
+        None where none does."""
         if slot.parameters_by_sdo:
             return 1
         numbers = {server.number for server in self.sdo if server.slot == slot.name}
         return next((number for number in opened if number in numbers), None)
 
     def leaf_of(self, drive: DriveTable) -> str:
-        """What the site calls this drive below its node: its name, else its slot; the one drive of a node
-        that has one only is ``drive``."""
+        """Name of a drive below its node: its own, else its slot's; ``drive`` where the family has one slot
+        only."""
         return drive.name or (drive.slot if len(self.slot) > 1 else "drive")
 
     def parameter_named(self, name: str) -> Parameter:
-        """Raises KeyError where the family lists no such parameter."""
+        """Parameter of this name. Raises KeyError where the family lists none."""
         for parameter in self.parameter:
             if parameter.name == name:
                 return parameter
         raise KeyError(name)
 
     def depends_on_set(self, value: ProcessValue) -> bool:
-        """Whether a parameter that scales it differs between the drive's parameter sets."""
+        """Whether a parameter that scales the value differs between the drive's parameter sets."""
         return any(self.parameter_named(name).sets for name in value.scaled_by)
 
     def steady_of(self, value: ProcessValue) -> list[str]:
-        """The parameters whose change makes it unknown: also one that scales it and is told in another form
-        than the site file gives it."""
+        """Parameters whose change makes the value unknown: also one that scales it and is told in another
+        form than the site file gives it."""
         return [*value.steady, *(name for name in value.scaled_by if not self.parameter_named(name).read)]
 
     def object_of(self, parameter: Parameter) -> ObjectRef:
-        """Where a parameter is in the object dictionary."""
+        """Object of a parameter. Raises ValueError where it has none."""
         if parameter.object is not None:
             return self.place(parameter.object)
         if self.parameter_names is None:
@@ -284,16 +284,16 @@ class Family(Table):
         return self.place(named)
 
     def rpdo_words(self, pdo: Pdo) -> list[str]:
-        """The words that this RPDO carries, in its order."""
+        """Words that this RPDO carries, in its order."""
         return pdo.words or self.process.rpdo
 
     def tpdo_words(self, pdo: Pdo) -> list[str]:
-        """The words that this TPDO carries, in its order."""
+        """Words that this TPDO carries, in its order."""
         return pdo.words or self.process.tpdo
 
     def carried(self, slot: Slot) -> tuple[list[str], list[str]]:
-        """The words that there are for this drive: of its RPDOs and of its TPDOs, as ``process`` orders
-        them. The others do not exist for it."""
+        """Words of this drive: those of its RPDOs and those of its TPDOs, as ``process`` orders them. The
+        others do not exist for it."""
         commanded = {word for pdo in slot.rpdo for word in self.rpdo_words(pdo)}
         actual = {word for pdo in slot.tpdo for word in self.tpdo_words(pdo)}
         return (
@@ -302,8 +302,8 @@ class Family(Table):
         )
 
     def values_of(self, slot: Slot) -> list[ProcessValue]:
-        """The values that there are for this drive: those all of whose words it has, and those that enough
-        of its words may be set to carry."""
+        """Values of this drive: those all of whose words it has, and those that enough of its words may be
+        set to carry."""
         rpdo, tpdo = self.carried(slot)
         words = {"command": set(rpdo[1:]), "actual": set(tpdo)}
 
@@ -316,7 +316,7 @@ class Family(Table):
         return [value for value in self.value if may_have(value)]
 
     def is_usual(self, slot: Slot, value: ProcessValue) -> bool:
-        """Whether this drive's words carry the value where they are set as the mapping file takes them."""
+        """Whether this drive's words carry the value while their codes are the mapping file's defaults."""
         runs = self.meanings_of(slot, value.group)
         if value.word_names:
             codes = {one.word: one.default for run in runs for one in run}
@@ -325,14 +325,14 @@ class Family(Table):
         return any({one.default for one in run}.issuperset(value.code) for run in runs)
 
     def meanings_of(self, slot: Slot, group: str) -> list[list[Meaning]]:
-        """What tells the meaning of this drive's words, for each PDO of one direction."""
+        """Meanings of this drive's words, for each PDO of one direction."""
         by_word = {meaning.word: meaning for meaning in self.meaning if meaning.group == group}
         pdos = slot.rpdo if group == "command" else slot.tpdo
         words = self.rpdo_words if group == "command" else self.tpdo_words
         return [[by_word[word] for word in words(pdo) if word in by_word] for pdo in pdos]
 
     def told_by(self, slot: Slot, meaning: Meaning) -> str | None:
-        """The word of a TPDO that carries the code itself, as where 6061h is mapped; None where none does."""
+        """Word of a TPDO that carries the code itself, as where 6061h is mapped; None where none does."""
         ref = self.object_of_meaning(meaning, 1)
         for pdo in slot.tpdo if self.sets == 1 else ():
             for word, refs in zip(self.tpdo_words(pdo), pdo.objects, strict=True):
@@ -341,8 +341,8 @@ class Family(Table):
         return None
 
     def needed_bits(self, group: str) -> int:
-        """Bits of the control word, or for the group ``actual`` of the status word, without which a drive
-        cannot be commanded, or would be shown in a state that it is not in."""
+        """Bits of the control word (of the status word for the group ``actual``) without which a drive cannot
+        be commanded, or would be shown in a state that it is not in."""
         control, status = self.control_word, self.status_word
         handshake = [control.handshake] if control.handshake else []
         if group == "actual":
@@ -361,11 +361,11 @@ class Family(Table):
 
     @property
     def sets(self) -> int:
-        """How many parameter sets its drives have."""
+        """Number of parameter sets that its drives have."""
         return 1 << len(self.status_word.parameter_set_bits)
 
     def parameter_and_set(self, name: str) -> tuple[str, int]:
-        """A parameter's name and the parameter set that it ends with, 1 where it names none."""
+        """Name of a parameter, and the parameter set that ``name`` ends with, 1 where it names none."""
         names = self.parameter_names
         match = re.fullmatch(names.pattern, name, re.ASCII) if names else None
         in_set = match.groupdict().get("set") if match else None
@@ -374,12 +374,12 @@ class Family(Table):
         return name[: match.start("set")].rstrip(".-_/ "), int(in_set)
 
     def object_in_set(self, ref: ObjectRef, in_set: int) -> ObjectRef:
-        """Where a parameter is in this set, given where it is in set 1."""
+        """Object of a parameter in this set, given its object in set 1."""
         step = self.parameter_names.set_step if self.parameter_names else 0
         return ObjectRef(ref.index, ref.sub + step * (in_set - 1))
 
     def object_of_meaning(self, meaning: Meaning, in_set: int) -> ObjectRef:
-        """Where the drive says what a word carries. Raises ValueError where there is no such object."""
+        """Object in which the drive says what a word carries. Raises ValueError where there is none."""
         if self.parameter_names is None:
             raise ValueError(f"{meaning.parameter} has no object")
         first = object_of(self.parameter_names, meaning.parameter, self.sets if self.sets > 1 else 0)

@@ -1,4 +1,4 @@
-"""Where a family's own supervision is in the object dictionary, and what a site file asks it to hold."""
+"""Objects of a family's own supervision, and the values that a site file asks for in them."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from bridge.config import BusTable, NodeTable
 from bridge.mapping.model import Family, ObjectRef, OwnObject, OwnSupervision, Slot
 
 LIFE_TIME_FACTOR: Final = (0x100D, 0)
-"""Guard time (100Ch) × this is the life time (CiA 301 §7.5.2.12)."""
+"""Life time factor: the life time is guard time (100Ch) × this (CiA 301 §7.5.2.12)."""
 
 Raw = Mapping[tuple[int, int], int]
-"""By index and sub-index, signed where the object's type is."""
+"""Values by index and sub-index, signed where the object's type is."""
 
 
 @dataclass(frozen=True, slots=True)
 class OwnPlace:
-    """One object of the own supervision. ``low`` and ``high`` are what it can hold, as on the wire."""
+    """One object of the own supervision. ``low`` and ``high`` bound what it can hold, as on the wire."""
 
     name: str
     ref: ObjectRef
@@ -30,7 +30,7 @@ class OwnPlace:
     high: int
     states: Mapping[int, str]
     absent: int | None = None
-    """What counts where a node does not have it."""
+    """Value that counts where a node does not have the object."""
 
     @property
     def key(self) -> tuple[int, int]:
@@ -38,17 +38,17 @@ class OwnPlace:
 
     @property
     def number(self) -> Integer:
-        """How it is on the wire."""
+        """Integer type on the wire."""
         return INTEGERS[self.data_type]
 
     def shown(self, value: int) -> str:
-        """``C00593/1 is 0 (no reaction)``."""
+        """Value as in ``C00593/1 is 0 (no reaction)``."""
         state = self.states.get(value)
         return f"{self.name} is {value}{f' ({state})' if state else ''}"
 
 
 def place_of(family: Family, one: OwnObject) -> OwnPlace:
-    """Where a setting is. The mapping's checks have seen to it that there is one."""
+    """Object of a setting. The mapping's checks have seen to it that there is one."""
     if one.parameter is None:
         ref = family.place(one.object or ObjectRef(0, 0))
         per_drive = one.per_drive or family.is_per_axis(ref)
@@ -68,8 +68,8 @@ def place_of(family: Family, one: OwnObject) -> OwnPlace:
 
 
 def places(family: Family, *, link: bool = False) -> list[OwnPlace]:
-    """All objects that tell what a drive of the family would do, each once; with ``link`` also those of its
-    watch over its interface."""
+    """Objects that tell what a drive of the family would do, each once; with ``link`` also those of its watch
+    over its interface."""
     found: dict[tuple[tuple[int, int], bool], OwnPlace] = {}
     for entry in family.own_supervision:
         if entry.watches == "link" and not link:
@@ -88,7 +88,7 @@ def places(family: Family, *, link: bool = False) -> list[OwnPlace]:
 
 @dataclass(frozen=True, slots=True)
 class OwnWant:
-    """What an object is to hold. With ``only_if`` it is written where it holds one of these."""
+    """Value that an object is to hold. With ``only_if`` it is written where the object holds one of these."""
 
     place: OwnPlace
     value: int
@@ -99,13 +99,13 @@ class OwnWant:
 
 
 def settable(family: Family) -> OwnSupervision | None:
-    """The watch whose time ``own_timeout_ms`` is; None where only ``supervision`` sets it."""
+    """Watch whose time ``own_timeout_ms`` sets; None where only ``supervision`` sets it."""
     kinds = ("process_data", "heartbeat")
     return next((entry for entry in family.own_supervision if entry.watches in kinds), None)
 
 
 def wanted(family: Family, bus: BusTable, node: NodeTable) -> list[OwnWant]:
-    """What ``own_timeout_ms`` of the node stands for: the time first, then the reaction."""
+    """Values that ``own_timeout_ms`` of the node asks for: the time first, then the reaction."""
     entry = settable(family)
     if entry is None or node.own_timeout_ms is None:
         return []
@@ -120,7 +120,7 @@ def wanted(family: Family, bus: BusTable, node: NodeTable) -> list[OwnWant]:
 
 
 def impossible(family: Family, time_ms: int) -> str:
-    """Why ``own_timeout_ms`` cannot be this, or an empty text."""
+    """Reason why ``own_timeout_ms`` cannot be this; empty if it can."""
     entry = settable(family)
     name = family.family.name
     if entry is None:
@@ -139,11 +139,11 @@ def impossible(family: Family, time_ms: int) -> str:
 def offline(
     family: Family, settings: Raw, bus: BusTable, node: NodeTable, slot: Slot | None
 ) -> dict[tuple[int, int], int]:
-    """What the drive in ``slot`` will hold, or a node that is no drive, by the site file and the factory
-    alone.
+    """Values that the drive in ``slot`` will hold, or a node that is no drive, by the site file and the
+    factory alone.
 
-    ``settings`` are the node's downloads; they reach a drive's own objects where the first SDO channel
-    does. ``enforce`` reaches them over an opened one, too.
+    ``settings`` are the node's downloads; they reach a drive's own objects where the first SDO channel does.
+    ``enforce`` reaches them over an opened one, too.
     """
     channel = family.sdo_channel(slot, node.sdo_channels) if slot else 1
     raw: dict[tuple[int, int], int] = {}
@@ -169,7 +169,7 @@ def offline(
 
 
 def ends_own_watch(family: Family, key: tuple[int, int], value: int) -> bool:
-    """Whether this value in an object ends a drive's watch over its process data, or has it do nothing."""
+    """Whether this value in an object ends a drive's watch over its process data, or its reaction."""
     for entry in family.own_supervision:
         if entry.watches != "process_data":
             continue
@@ -182,7 +182,7 @@ def ends_own_watch(family: Family, key: tuple[int, int], value: int) -> bool:
 
 
 def channels_needed(family: Family, node: NodeTable, slots: Iterable[Slot]) -> list[int]:
-    """What ``sdo_channels`` has to be, for the drives' own objects to be reached; empty where they are, or
+    """Value that ``sdo_channels`` needs for the drives' own objects to be reached; empty where they are, or
     where no server reaches them."""
     if not any(place.per_drive for place in places(family)):
         return []
@@ -196,7 +196,7 @@ _LIVES: Final = 3
 
 
 def suggested_ms(family: Family, bus: BusTable, node: NodeTable) -> int:
-    """The site's own time-out, or one that a pause of the bridge does not reach."""
+    """Time-out in ms: the site's own, or one that a pause of the bridge does not reach."""
     entry = settable(family)
     if node.own_timeout_ms is not None or entry is None:
         return node.own_timeout_ms or 0
@@ -205,7 +205,7 @@ def suggested_ms(family: Family, bus: BusTable, node: NodeTable) -> int:
 
 
 def suggested(family: Family, bus: BusTable, node: NodeTable) -> list[OwnWant]:
-    """What would make the drives of this node stop. Empty where nothing but ``supervision`` sets it."""
+    """Values that would make the drives of this node stop; none where only ``supervision`` sets the time."""
     time_ms = suggested_ms(family, bus, node)
     return wanted(family, bus, node.model_copy(update={"own_timeout_ms": time_ms}))
 

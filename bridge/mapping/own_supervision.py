@@ -1,4 +1,4 @@
-"""How drives of a family watch the bridge by themselves: what would stop one if the bridge fell silent."""
+"""Own supervision of a family's drives: what would stop one if the bridge fell silent."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Watches = Literal["process_data", "heartbeat", "guarding", "link"]
 
 
 class OwnObject(Table):
-    """Where a setting is: a parameter of this file, or an object."""
+    """Place of a setting: a parameter of this file, or an object."""
 
     parameter: str | None = Field(None, description="one of this file, which has object, type and texts")
     object: Ref | None = Field(None, description="instead of a parameter")
@@ -24,7 +24,7 @@ class OwnObject(Table):
 
 
 class OwnReaction(OwnObject):
-    """What the drive does when the time has run out. Without one it stops."""
+    """Reaction of the drive when the time has run out. Without one it stops."""
 
     nothing: list[int] = Field(default_factory=lambda: [0], description="with these values it runs on")
     stop: int | None = Field(None, description="what `enforce` writes where it would run on")

@@ -1,4 +1,4 @@
-"""Parameters of a family: how their names become objects, what they hold, what writing them wears out."""
+"""Parameters of a family: their names and objects, their values, and the wear by writing them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from bridge.image import DataType
 from bridge.mapping.entry_types import ObjectRef, Ref, States, Table
 
 GROUPS: Final = ("number", "letter", "element", "set")
-"""What the pattern of parameter names may name."""
+"""Groups that the pattern of parameter names may have."""
 IndexRange = Annotated[str, Field(pattern=r"^[0-9A-F]{4}(-[0-9A-F]{4})?$")]
 Protection = Literal["command", "communication", "safe", "may_move", "while_enabled"]
 _PUNCTUATION: Final = re.compile(r"[^a-z0-9]+")
@@ -48,8 +48,11 @@ def _name_pattern(text: str) -> str:
 
 
 class ParameterNames(Table):
-    """index = ``index`` + ``letter_step`` × (letter − A) + ``number_step`` × number;
-    sub-index = ``sub`` + ``element_step`` × (element − ``element_first``) + ``set_step`` × set."""
+    """Rule by which names of parameters become objects.
+
+    index = ``index`` + ``letter_step`` × (letter − A) + ``number_step`` × number;
+    sub-index = ``sub`` + ``element_step`` × (element − ``element_first``) + ``set_step`` × set.
+    """
 
     pattern: Annotated[str, AfterValidator(_name_pattern)] = Field(
         description="a regular expression with the groups number, letter, element, set"
@@ -75,13 +78,13 @@ class ParameterNames(Table):
 
 
 def indices(text: str) -> range:
-    """The indices of an ``IndexRange``, such as ``2064-20C7``."""
+    """Indices of an ``IndexRange``, such as ``2064-20C7``."""
     first, _, last = text.partition("-")
     return range(int(first, 16), int(last or first, 16) + 1)
 
 
 class Parameter(Table):
-    """A parameter of the drive: value = what is read × factor."""
+    """A parameter of the drive: value = number read × factor."""
 
     name: str = Field(min_length=1)
     title: str
@@ -122,7 +125,7 @@ class Parameter(Table):
     @field_validator("default")
     @classmethod
     def _encodes(cls, value: Plain | None, info: ValidationInfo) -> Plain | None:
-        """Without a type there is a fault already."""
+        """Check that the type can hold the default. Without a type there is a fault already."""
         kind = info.data.get("data_type")
         if kind is not None and value is not None:
             encode(kind, value)
@@ -142,33 +145,33 @@ class Parameter(Table):
 
     @property
     def value_type(self) -> DataType:
-        """The type of the value as users see it."""
+        """Type of the value as users see it."""
         if self.factor != 1.0 and self.data_type not in ("string", "bytes", "bool"):
             return DataType.FLOAT
         return VALUE_TYPES[self.data_type]
 
 
 def leaf_of(name: str) -> str:
-    """The name of a parameter's point: ``P102[2]`` is ``p102_2``."""
+    """Name of a parameter's point: ``P102[2]`` is ``p102_2``."""
     return _PUNCTUATION.sub("_", name.lower()).strip("_")
 
 
 class RamOnly(Table):
-    """While this parameter has this value, writes go to the RAM alone."""
+    """A parameter and the value of it with which writes go to the RAM alone."""
 
     parameter: str
     value: int | float
 
 
 class SaveCommand(Table):
-    """A device command that saves the parameters: this value is written to this parameter."""
+    """A command of the device that saves the parameters: this value is written to this parameter."""
 
     parameter: str
     value: int
 
 
 class Eeprom(Table):
-    """What writing parameters wears out, and how they are saved."""
+    """Wear of the EEPROM by writes, and the way to save parameters."""
 
     cycles: int | None = Field(None, gt=0, description="writes that it endures")
     ram_only: RamOnly | None = None
@@ -182,11 +185,11 @@ class Eeprom(Table):
 
 
 def object_of(names: ParameterNames, name: str, sets: int = 0, elements: int = 0) -> ObjectRef:
-    """The object of the parameter called ``name``. Raises ValueError with what is wrong.
+    """Object of the parameter called ``name``. Raises ValueError with what is wrong.
 
-    What the name leaves out: of a parameter with ``sets`` it means the first, and of one with
-    ``elements`` the first too; elsewhere the sub-index is ``names.sub``. Where elements and sets share
-    the sub-index, an element of a parameter without sets is in the first set (BU 2500 §6.6.1).
+    A name without a set means the first one of a parameter with ``sets``, one without an element the first of
+    a parameter with ``elements``; elsewhere the sub-index is ``names.sub``. Where elements and sets share the
+    sub-index, an element of a parameter without sets is in the first set (BU 2500 §6.6.1).
     """
     match = re.fullmatch(names.pattern, name, re.ASCII)
     if match is None:

@@ -15,15 +15,16 @@ from bridge.mapping.entry_types import Bit, Mapped, Name, ObjectRef, Ref, States
 from bridge.text import Text
 
 MOST_WORDS: Final = 9
-"""Control or status word and eight values: what Modbus has registers for."""
+"""Largest number of words: control or status word and eight values, for which Modbus has registers."""
 ValueKind = Literal["int16", "uint16", "int32", "uint32", "real32"]
 REAL: Final = "real32"
-"""A floating-point number of two words (CiA 301 §7.1.6.6): it is its own value, without a scale."""
+"""Type of a floating-point number of two words (CiA 301 §7.1.6.6), which is its own value, without a
+scale."""
 _LARGEST_REAL: Final = float.fromhex("0x1.fffffep+127")
 
 
 class Process(Table):
-    """Names of the words. Their order is that of the registers, and of the words in a PDO that names none."""
+    """Names of the words, in the order of the registers, and of the words in a PDO that names none."""
 
     rpdo: list[Name] = Field(
         min_length=1, max_length=MOST_WORDS, description="control_word, then the setpoint words"
@@ -42,7 +43,7 @@ class Process(Table):
 
     @property
     def resting(self) -> tuple[int, ...]:
-        """The setpoint words while nobody commands them."""
+        """Setpoint words while nobody commands them."""
         return tuple(self.rest.get(word, 0) for word in self.rpdo[1:])
 
 
@@ -72,13 +73,13 @@ class Pdo(Table):
 
 
 class NodeTpdo(Table):
-    """A TPDO that belongs to no drive: where the node has it switched on, it saves polling."""
+    """A TPDO that belongs to no drive: where the node has it switched on, its objects need no polling."""
 
     number: int = Field(ge=1, le=512)
 
 
 SYNC_PERIOD: Final = "sync_period_ms"
-"""Stands in a start write for what the bus of the site has under this name."""
+"""Placeholder in a start write for the value that the bus of the site has under this name."""
 
 
 def _is_sync_period(kind: str, value: object) -> bool:
@@ -96,7 +97,8 @@ class StartWrite(Table):
     @field_validator("value")
     @classmethod
     def _encodes(cls, value: bool | int | float | str, info: ValidationInfo) -> bool | int | float | str:
-        """The fault is the value's, with its line. Without a type there is a fault already."""
+        """Check that the type can hold the value: a fault here is the value's, with its line. Without a type
+        there is a fault already."""
         kind = info.data.get("type")
         if kind is not None and not _is_sync_period(kind, value):
             encode(kind, value)
@@ -104,15 +106,15 @@ class StartWrite(Table):
 
     @property
     def is_sync_period(self) -> bool:
-        """The value is the period of SYNC of the bus."""
+        """Whether the value is the SYNC period of the bus."""
         return _is_sync_period(self.type, self.value)
 
     def value_with(self, sync_period_ms: int) -> bool | int | float | str:
-        """The value on a bus with this period."""
+        """Value on a bus with this SYNC period."""
         return sync_period_ms if self.is_sync_period else self.value
 
     def download(self, sync_period_ms: int) -> Download:
-        """Raises ValueError where the period of SYNC does not fit the type."""
+        """Download of the value. Raises ValueError where the SYNC period does not fit the type."""
         data = encode(self.type, self.value_with(sync_period_ms))
         return Download(self.object.index, self.object.sub, data, self.read_back, self.type)
 
@@ -146,7 +148,7 @@ class Slot(Table):
 
 
 class SdoServer(Table):
-    """A further SDO server of the node, beside the first, which every node has at 600h and 580h."""
+    """A further SDO server of the node, besides the first, which every node has at 600h and 580h."""
 
     number: int = Field(ge=2, le=128, description="2 is object 1201h")
     request: int = Field(ge=0, le=0x7FF, description="COB-ID to the node without the node id, such as 0x640")
@@ -158,8 +160,8 @@ class SdoServer(Table):
 
 
 class Scale(Table):
-    """value = word × full / at, with ``full`` a parameter of the drive such as P105, divided by another one,
-    ``over``, where there is one; or value = word × factor + offset."""
+    """Scale of a value = word × full / at, with ``full`` a parameter of the drive such as P105, divided by
+    another one, ``over``, where there is one; or value = word × factor + offset."""
 
     full: str | None = None
     at: int | None = Field(None, gt=0)
@@ -170,7 +172,7 @@ class Scale(Table):
 
 
 class Meaning(Table):
-    """What one word carries is set in the drive: ``parameter`` says it, by a code that values name."""
+    """Setting of the drive that says what one word carries: ``parameter`` has a code, which values name."""
 
     group: Literal["command", "actual"]
     word: Name
@@ -189,7 +191,7 @@ class Meaning(Table):
 
     @property
     def leaf(self) -> str:
-        """The word's name below the drive, such as ``actual/value_2``."""
+        """Name of the word below the drive, such as ``actual/value_2``."""
         return f"{self.group}/{self.word}"
 
     @property
@@ -199,7 +201,7 @@ class Meaning(Table):
 
 
 class ProcessValue(Table):
-    """A value beside the raw words it is made from: a number with a unit, an enumeration, named bits or
+    """A value made from raw words and shown beside them: a number with a unit, an enumeration, named bits or
     one bit."""
 
     name: Name
@@ -249,7 +251,7 @@ class ProcessValue(Table):
 
     @property
     def leaf(self) -> str:
-        """Its name below the drive, such as ``actual/frequency``."""
+        """Name of the value below the drive, such as ``actual/frequency``."""
         return f"{self.group}/{self.name}"
 
     @property
@@ -259,22 +261,22 @@ class ProcessValue(Table):
 
     @property
     def word_names(self) -> tuple[str, ...]:
-        """The words it is made from, the low one first; none where a code tells which they are."""
+        """Words it is made from, the low one first; none where a code tells which they are."""
         return (self.word,) if self.word is not None else tuple(self.words)
 
     @property
     def width(self) -> int:
-        """How many words it is made from."""
+        """Number of words it is made from."""
         return len(self.code) or len(self.word_names)
 
     @property
     def is_real(self) -> bool:
-        """Its words are a floating-point number."""
+        """Whether its words are a floating-point number."""
         return self.data_type == REAL
 
     @property
     def raw_type(self) -> DataType:
-        """How the words are read as a number."""
+        """Type as which its words are read."""
         if self.data_type is not None:
             return DataType.FLOAT if self.is_real else DataType(self.data_type)
         unsigned = bool(self.bits or self.states)
@@ -284,7 +286,7 @@ class ProcessValue(Table):
 
     @property
     def is_signed(self) -> bool:
-        """Its words are a number with a sign in the topmost bit of an integer."""
+        """Whether its words are an integer with a sign in the topmost bit."""
         return not self.is_real and INTEGERS[self.raw_type].signed
 
     @property
@@ -296,25 +298,25 @@ class ProcessValue(Table):
 
     @property
     def point_type(self) -> DataType:
-        """The type of its point: a float where it is scaled."""
+        """Type of its point: a float where it is scaled."""
         if self.bit is not None:
             return DataType.BOOL
         return self.raw_type if self.scale is None else DataType.FLOAT
 
     @property
     def full(self) -> str | None:
-        """The parameter that scales it, or None."""
+        """Parameter that scales it, or None."""
         return None if self.scale is None else self.scale.full
 
     @property
     def scaled_by(self) -> tuple[str, ...]:
-        """The parameters that scale it."""
+        """Parameters that scale it."""
         named = () if self.scale is None else (self.scale.full, self.scale.over)
         return tuple(name for name in named if name is not None)
 
     @property
     def is_conditional(self) -> bool:
-        """The drive's parameters say whether there is such a value."""
+        """Whether the drive's parameters decide if there is such a value."""
         return bool(self.code or self.when or self.needs)
 
 

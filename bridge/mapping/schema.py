@@ -1,7 +1,6 @@
-"""The JSON schema of mapping files, made from the models: editors check and complete by it.
+"""JSON schema of mapping files, made from the models: editors check and complete by it.
 
-A file that extends another, or that can only be extended, need not be whole: for those nothing is
-required.
+A file that extends another, or that can only be extended, need not be whole: for those nothing is required.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ TITLE: Final = "drivebridge mapping file"
 
 
 def mapping_schema() -> dict[str, Any]:
-    """The schema as a JSON document."""
+    """Schema as a JSON document."""
     whole = Family.model_json_schema(by_alias=True)
     definitions = cast("dict[str, Any]", _plain(whole.pop("$defs")))
     definitions["Family"] = _plain(whole)
@@ -35,7 +34,7 @@ def mapping_schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """The content of ``mappings/schema.json``."""
+    """Content of ``mappings/schema.json``."""
     return json.dumps(mapping_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
@@ -50,7 +49,7 @@ def _plain(node: Any) -> Any:
 
 
 def _without_required(node: Any) -> Any:
-    """A copy in which no key must be there, and which refers to such copies."""
+    """A copy in which no key is required, and which refers to such copies."""
     if isinstance(node, list):
         return [_without_required(item) for item in cast("list[Any]", node)]
     if not isinstance(node, dict):

@@ -1,4 +1,4 @@
-"""What a site file asks of the mappings it names."""
+"""Mappings that a site file names: loaded, and the file checked against them."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from bridge.mapping.process import SYNC_PERIOD
 from bridge.tomlfile import RawTable, TomlFile
 
 DESCRIBED: Final = "eds:"
-"""What stands before the name of a device description in the place of a mapping."""
+"""Prefix that marks the name of a device description in the place of a mapping."""
 Describe = Callable[[Path, Sequence[Path], Sequence[str]], Family]
-"""The family that a device description gives, with the folders of mappings and the modules that are plugged
-in. Raises ``FileFaults``."""
+"""Gives the family of a device description, with the folders of mappings and the modules that are plugged in.
+Raises ``FileFaults``."""
 
 
 def described_file(site: Path, key: str) -> Path | None:
-    """The device description that a node of the site file in ``site`` has in the place of a mapping; ``key``
-    is its ``mapping_key``."""
+    """Device description that a node of the site file in ``site`` has in the place of a mapping; ``key`` is
+    its ``mapping_key``."""
     mapping = key.partition("\n")[0]
     return site.parent / mapping.removeprefix(DESCRIBED) if mapping.startswith(DESCRIBED) else None
 
 
 def modules_of(key: str) -> tuple[str, ...]:
-    """The modules that are plugged into a node with this ``mapping_key``, in their order."""
+    """Modules that are plugged into a node with this ``mapping_key``, in their order."""
     return tuple(key.split("\n")[1:])
 
 
 def load_site_and_families(path: Path, describe: Describe | None = None) -> tuple[Site, dict[str, Family]]:
-    """A site file and every mapping it names; ``describe`` makes those of device descriptions. Raises
+    """Site file and every mapping it names; ``describe`` gives those of device descriptions. Raises
     ``FileFaults`` with all faults of all files."""
     file, site = read_site(path)
     families: dict[str, Family] = {}
@@ -91,7 +91,7 @@ def load_site_and_families(path: Path, describe: Describe | None = None) -> tupl
 
 
 def _near(missing: Path) -> str:
-    """A file of nearly that name, else how such a name is meant."""
+    """Hint to a file of nearly that name, else to how such a name is meant."""
     there = [one.name for one in missing.parent.glob("*") if one.is_file()]
     near = difflib.get_close_matches(missing.name, there, n=1)
     return f"did you mean {near[0]}?" if near else "a name is relative to the site file"
@@ -102,7 +102,7 @@ def _nodes(file: TomlFile) -> list[RawTable]:
 
 
 def _key(node: RawTable) -> str:
-    """Its ``mapping_key``, as far as the table says."""
+    """The node's ``mapping_key``, as far as the table tells it."""
     modules: object = node.content.get(MODULES)
     named = cast("list[object]", modules) if isinstance(modules, list) else []
     return mapping_key(node.text("mapping") or "", [one for one in named if isinstance(one, str)])
@@ -145,7 +145,7 @@ def _check_node(node: RawTable, family: Family, file: TomlFile) -> None:
 
 
 def _check_outputs(node: RawTable, family: Family, file: TomlFile) -> None:
-    """The names and values of ``[bus.node.outputs]``."""
+    """Check the names and values of ``[bus.node.outputs]``."""
     if "outputs" not in node.content:
         return
     outputs = node.table("outputs")
@@ -165,7 +165,7 @@ def _check_outputs(node: RawTable, family: Family, file: TomlFile) -> None:
 
 
 def _check_sdo_channels(node: RawTable, family: Family, file: TomlFile) -> None:
-    """The further SDO channels that are to be opened must be ones the family has."""
+    """Check that the further SDO channels to be opened are ones the family has."""
     known = [server.number for server in family.sdo]
     asked: object = node.content.get("sdo_channels")
     if not isinstance(asked, list):
@@ -199,7 +199,7 @@ def _check_drive(drive: RawTable, family: Family, file: TomlFile) -> None:
 
 
 def _check_sync_period(bus: RawTable, drive: RawTable, family: Family, file: TomlFile) -> None:
-    """The period of SYNC must be one that can be written into the drive, where its family asks for that."""
+    """Check that the SYNC period can be written into the drive, where its family asks for that."""
     period_ms = bus.whole(SYNC_PERIOD)
     if period_ms is None:
         return
@@ -216,7 +216,7 @@ def _check_sync_period(bus: RawTable, drive: RawTable, family: Family, file: Tom
 
 
 def _check_pdos(drive: RawTable, family: Family, slot: str, file: TomlFile) -> None:
-    """A table for a PDO must be for one that the drive has, and for each there is one at most."""
+    """Check that each table for a PDO is for one that the drive has, and that no PDO has two."""
     it = family.slot_named(slot)
     for name, pdos in (("rpdo", it.rpdo), ("tpdo", it.tpdo)):
         numbers = [pdo.number for pdo in pdos]

@@ -1,5 +1,5 @@
-"""How often nodes are told again to stop while an intruder goes on: as often as it speaks, within a share of
-the bus. Sans-IO."""
+"""Repeated stops to nodes while an intruder goes on: as often as it speaks, within a share of the bus.
+Sans-IO."""
 
 from __future__ import annotations
 
@@ -9,22 +9,23 @@ from bridge.can.wirebits import longest_bits
 from bridge.node.node_core import NodeCore
 
 SHARE: Final = 0.2
-"""Of the bus: somebody who provokes answers must not fill it by them."""
+"""Share of the bus for these answers: somebody who provokes them must not fill it."""
 _AT_ONCE_S: Final = 0.05
-"""An allowance that was not used adds up for so long."""
+"""Time in seconds for which an unused allowance adds up."""
 _SPARE_S: Final = 0.001
-"""So that rounding asks for no round in which nothing may be sent yet."""
+"""Margin in seconds, so that rounding asks for no round in which nothing may be sent yet."""
 _WORD_BYTES: Final = 8
 _NMT_BYTES: Final = 2
 
 
 def answer_bits(identifiers: int) -> int:
-    """The longest answer to one intruding frame: a stopped word on each of these, and an NMT command."""
+    """Bits of the longest answer to one intruding frame: a stopped word on each of these identifiers, and an
+    NMT command."""
     return identifiers * longest_bits(_WORD_BYTES) + longest_bits(_NMT_BYTES)
 
 
 class Answers:
-    """Nodes that are to be told again, each once, and the bits that may be used for that. ``bitrate`` in
+    """Nodes that are to be told again, each once, within the bits that may be used for that. ``bitrate`` in
     bit/s."""
 
     def __init__(self, bitrate: int) -> None:
@@ -35,14 +36,14 @@ class Answers:
 
     @property
     def are_asked(self) -> bool:
-        """A node waits to be told."""
+        """True while a node waits to be told."""
         return bool(self._waiting)
 
     def ask(self, node: NodeCore, identifiers: int) -> None:
         self._waiting[node.table.id] = node, answer_bits(identifiers)
 
     def take(self, now: float) -> list[NodeCore]:
-        """Those that may be told now; the others stay."""
+        """Nodes that may be told now; the others stay."""
         if not self._waiting:
             return []
         if now > self._at:

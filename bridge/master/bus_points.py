@@ -1,4 +1,4 @@
-"""What a CAN controller says of itself and of its bus, as points and events. Sans-IO."""
+"""State of a CAN controller and of its bus, as points and events. Sans-IO."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bridge.text import Text
 
 _LOAD_PERIOD_S: Final = 1.0
 _ERRORS_EVERY_S: Final = 10.0
-"""A broken wire gives thousands of error frames a second: one line reports all of them."""
+"""Shortest time in seconds between reports of error frames: a broken wire gives thousands a second."""
 
 
 class BusPoints:
@@ -25,7 +25,7 @@ class BusPoints:
         self._error_limit = RateLimit(1, _ERRORS_EVERY_S)
 
     def refresh(self, status: BusStatus, now: float) -> None:
-        """A few times a second."""
+        """Show the state; called a few times a second."""
         values = {
             "state": int(status.state),
             "tx_errors": status.tx_errors,
@@ -52,7 +52,7 @@ class BusPoints:
             self._measured = now, bits
 
     def _tell_errors(self, status: BusStatus, now: float) -> None:
-        """Error frames since the last time, in one event."""
+        """Report the error frames since the last time, in one event."""
         number = status.error_frames - self._errors_told
         if number and self._error_limit.allows(now):
             self._errors_told = status.error_frames

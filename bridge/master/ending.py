@@ -1,4 +1,4 @@
-"""The end of the service: what did not follow its stop, what is done about it, and the report."""
+"""End of the service: what did not follow its stop, what is done about it, and the report."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from bridge.text import Text, render
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """Number of what is ``commanded``, of which so many are ``drives`` and the others outputs; and names of
-    both. ``ignoring`` were heard and do not follow their stop; ``unheard`` were not heard; ``unproven`` are
-    outputs whose node does not let them be read, each with the reason. ``nodes_stopped`` get NMT stop, or had
-    it."""
+    """Drives and outputs at the end: their number, ``commanded``, of which so many are ``drives``, and names.
+    ``ignoring`` were heard and do not follow their stop; ``unheard`` were not heard; ``unproven`` are outputs
+    whose node does not let them be read, each with the reason. ``nodes_stopped`` get NMT stop, or had it."""
 
     drives: int = 0
     commanded: int = 0
@@ -31,7 +30,7 @@ class Ending:
 
     @property
     def lines(self) -> list[str]:
-        """The last lines of the log."""
+        """Last lines of the log."""
         what = "drives" if self.commanded == self.drives else "drives and outputs"
         lines = [f"forwarded, and not known to be followed: {one}" for one in self.unproven]
         if self.ignoring:
@@ -48,7 +47,8 @@ class Ending:
 
 
 def waits_for(plant: Plant) -> bool:
-    """Whether something whose node is in operation is not known yet to follow its stop, and may be."""
+    """Whether a drive or output whose node is in operation is not yet known to follow its stop, and may
+    be."""
     return any(
         one.stop_check.is_judged and not has_followed(one) and one.unproven is None for one in plant.commanded
     )
@@ -75,8 +75,8 @@ def end(plant: Plant, *, can_send: bool = True) -> Ending:
 
 
 def nmt_stops(plant: Plant, ending: Ending) -> Iterator[Enforcement]:
-    """NMT stop for the nodes of what has not followed, unless the site file exempts them. Do each before the
-    next one is taken: a node that is stopped by then gets no other for its next drive."""
+    """NMT stops for the nodes of what has not followed, unless the site file exempts them. Carry out each
+    before the next one is taken: a node that is stopped by then gets no other for its next drive."""
     for one in plant.commanded:
         if one.name in ending.ignoring and _gets_nmt_stop(one) and one.stop_check.is_judged:
             yield Enforcement(one.node_name, Action.STOP_NODE, Text.of("stopped_by.end", name=one.name))

@@ -1,6 +1,6 @@
-"""The last frames on a bus that is left to another bridge: the stops that this one owes. Sans-IO.
+"""Last frames on a bus that is left to another bridge: the stops that this one owes. Sans-IO.
 
-They can hurt nobody: the other bridge sees its nodes stop, and its drives have to be enabled anew.
+They do no harm: the other bridge sees its nodes stop, and its drives have to be enabled anew.
 """
 
 from __future__ import annotations
@@ -12,26 +12,26 @@ from bridge.node.node_core import NodeCore
 
 
 class Farewell:
-    """``nodes`` are those of the bus."""
+    """Stops owed to the ``nodes`` of one bus."""
 
     def __init__(self, nodes: Sequence[NodeCore]) -> None:
         self._nodes = nodes
         self.told: list[NodeCore] = []
-        """Who gets a stop, until that has gone out."""
+        """Nodes that get a stop, until that has gone out."""
         self._is_sent = False
 
     @property
     def is_on(self) -> bool:
-        """There is something to send yet."""
+        """True while there is something left to send."""
         return bool(self.told)
 
     @property
     def awaiting(self) -> tuple[NodeCore, ...]:
-        """The nodes that get their stopped words repeated, because they take them over with SYNC."""
+        """Nodes whose stopped words are repeated, because they take them over with SYNC."""
         return tuple(node for node in self.told if node.leaving.is_due) if self.told else ()
 
     def begin(self, now: float) -> None:
-        """Tell every node that is owed a stop."""
+        """Send a stop to every node that is owed one."""
         self.told = [node for node in self._nodes if node.leaving.owed.is_open]
         self._is_sent = False
         for node in self.told:
@@ -39,7 +39,7 @@ class Farewell:
             node.was_told(NmtCommand.STOP)
 
     def bus_is_gone(self) -> None:
-        """What was to be sent is lost, and owed again when the bus is back."""
+        """Drop what was to be sent: it is owed again when the bus is back."""
         self.told.clear()
 
     def on_time(self, now: float) -> None:
@@ -47,7 +47,8 @@ class Farewell:
             node.wire.send_put_off(now)
 
     def on_sending(self, *, has_frames: bool) -> None:
-        """Frames are taken to be sent. What was taken before has gone out, unless the bus has gone since."""
+        """Note that frames are taken to be sent. What was taken before has gone out, unless the bus has gone
+        since."""
         if self._is_sent and not (has_frames or self.awaiting):
             for node in self.told:
                 node.leaving.owed.settle()

@@ -29,25 +29,28 @@ from bridge.node.wire import Handler
 from bridge.text import Said, Text, Words
 
 _AGAIN_S: Final = 10.0
-"""How often an intruder that goes on is reported, with the number of frames since the last time."""
+"""Period in seconds of the reports on an intruder that goes on, each with the number of frames since the last
+one."""
 _STOP_AGAIN_S: Final = 1.0
-"""How often a node that is held stopped is told so again, for frames that do not bring its drives back."""
+"""Period in seconds of the stops to a node that is held stopped, for frames that do not bring its drives
+back."""
 _PATIENCE_S: Final = 1.0
-"""For how long answers may leave a drive enabled now and then before its node is reset."""
+"""Time in seconds for which answers may leave a drive enabled now and then before its node is reset."""
 _RESET_AGAIN_S: Final = 2.0
-"""A node that has been reset gets this time to start."""
+"""Time in seconds that a reset node gets to start."""
 _ENDED_S: Final = 2.0
-"""An intruder that has been silent for so long has ended."""
+"""Silence in seconds after which an intruder has ended."""
 _NMT_BYTES: Final = 2
 _SEVERE: Final = 900
 _HARMLESS: Final = 500
 
 Stop = Callable[[Sequence[NodeCore], Text, float], None]
-"""Stops these nodes: who they are, why, and now."""
+"""Stops nodes: the nodes, the reason, the time."""
 
 
 class Intruders:
-    """``count`` is of all frames since the start; ``last`` the latest one that was told."""
+    """Frames of others on identifiers of the bridge. ``count`` is their number since the start; ``last`` the
+    latest one reported."""
 
     def __init__(
         self,
@@ -57,7 +60,7 @@ class Intruders:
         acts: Callable[[], bool],
         stop: Stop,
     ) -> None:
-        """``acts`` says whether this bridge is in charge: while another one is, nobody is an intruder."""
+        """``acts`` tells whether this bridge is in charge: while another one is, nobody is an intruder."""
         self.count = 0
         self.last: Said = ""
         self._bus = bus
@@ -72,15 +75,15 @@ class Intruders:
         self._stopped: dict[int, float] = {}
         self._answers = Answers(bus.bitrate)
         self._series: dict[int, _Series] = {}
-        """By the node's id."""
+        """Series of answers, by node id."""
         self._spoken = frozenset(
             tpdo.cob_id for node in nodes for drive in node.table.drive for tpdo in drive.tpdo
         )
-        """Where the site file has TPDOs put: they come before the boot-up has ended."""
+        """COB-IDs that the site file gives to TPDOs: they come before the boot-up has ended."""
         self._given = {can_id: node for node in nodes for can_id in node.wire.stop_words.given_ids}
-        """Whose identifier it is by the site's files."""
+        """Node of each identifier that the site's files give away."""
         self._known: dict[int, tuple[Mapping[str, DrivePdos], dict[int, CommandFrame]]] = {}
-        """What each node is commanded by, as long as it has these PDOs."""
+        """Command frames of each node, by node id, as long as it has these PDOs."""
 
     # whose identifiers
 
@@ -109,7 +112,8 @@ class Intruders:
         return known[1]
 
     def routes(self, others: Mapping[int, Handler]) -> dict[int, Handler]:
-        """Identifiers on which we send single frames, which do not come back to us: TIME and SDO requests."""
+        """Handlers of identifiers on which we send single frames, which do not come back to us: NMT, TIME and
+        SDO requests."""
         routes: dict[int, Handler] = {cobid.NMT: partial(self._on_nmt, others.get(cobid.NMT))}
         if self._bus.time_period_s:
             routes[cobid.TIME] = self._on_time
@@ -129,7 +133,7 @@ class Intruders:
         return frame.can_id == self._heartbeat_id or (not acts and frame.can_id in self._commands)
 
     def name(self, frame: Frame) -> Text:
-        """The name of this frame."""
+        """Name of this frame."""
         if frame.can_id == self._heartbeat_id:
             return _named(frame, Text.of("frame.own_heartbeat", id=self._bus.master_node_id))
         if frame.can_id in self._commands:
@@ -139,7 +143,7 @@ class Intruders:
     # what comes
 
     def on_frame(self, frame: Frame) -> None:
-        """A frame of somebody else on one of those that are watched."""
+        """Take a frame of somebody else on a watched identifier."""
         if frame.can_id in self._commands:
             node, command = self._commands[frame.can_id]
             enables = command.enables(frame.data)
@@ -155,8 +159,8 @@ class Intruders:
         return Text.of("frame.says", frame=self.name(frame), said=command.said(frame.data))
 
     def _on_nmt(self, then: Handler | None, frame: Frame) -> None:
-        """Our own NMT commands do not come back. A node that is in operation loses it by some of them, which
-        is noticed; one that is held stopped must not come back."""
+        """Take an NMT command of somebody else: our own do not come back. A node in operation loses it by
+        some of them, which is noticed; one that is held stopped must not come back."""
         if then:
             then(frame)
         command, addressed = self._addressed(frame.data)
@@ -169,7 +173,7 @@ class Intruders:
         self._meet(frame, back, partial(_nmt_said, frame), bool(back), brings_back=bool(back))
 
     def _addressed(self, data: bytes) -> tuple[int | None, Sequence[NodeCore]]:
-        """The command, and whom it is for; nobody where it is none."""
+        """NMT command and the nodes that it is for; no nodes where it is none."""
         if len(data) < _NMT_BYTES:
             return None, ()
         command, node_id = data[:_NMT_BYTES]
@@ -179,7 +183,7 @@ class Intruders:
         self._meet(frame, [], lambda: _named(frame, "TIME"))
 
     def _on_sdo(self, node: NodeCore, then: Handler | None, frame: Frame) -> None:
-        """Somebody reads or writes an object of a node. Reading has no consequences: a tool may look."""
+        """Take an SDO request of somebody else. Reading has no consequences: a tool may look."""
         if then:
             then(frame)
         said = self._sdo.setdefault(frame.can_id, SdoListener()).request(frame.data)
@@ -195,9 +199,10 @@ class Intruders:
         *,
         brings_back: bool = False,
     ) -> None:
-        """Count it, answer it, and report it, though not every frame: each that stops a node. ``affected``:
-        None if it changes nothing. ``is_worse``: report it even if another one on this identifier has just
-        been reported. ``brings_back``: drives of a node that is held stopped may run by it."""
+        """Count a frame, answer it, and report it, though not every one: each that stops a node.
+        ``affected``: None if it changes nothing. ``is_worse``: report it even if another one on this
+        identifier has just been reported. ``brings_back``: drives of a node that is held stopped may run by
+        it."""
         if not self._acts():
             return
         self.count += 1
@@ -228,11 +233,11 @@ class Intruders:
         return brings_back or not node.is_held or now >= self._stopped.get(node.table.id, now)
 
     def _identifiers(self, node: NodeCore) -> int:
-        """On how many identifiers the node gets stopped words."""
+        """Number of identifiers on which the node gets stopped words."""
         return sum(one is node for one, _ in self._commands.values())
 
     def on_time(self, now: float) -> None:
-        """Tell those again for whom there is room on the bus."""
+        """Tell the nodes again for which there is room on the bus."""
         for node in self._answers.take(now):
             series = self._series.get(node.table.id)
             if series is None or now > series.last + _ENDED_S:
@@ -276,17 +281,18 @@ class Intruders:
 
 @dataclass(slots=True)
 class _Series:
-    """Answers to an intruder that goes on."""
+    """Series of answers to an intruder that goes on."""
 
     node: NodeCore
     since: float
     last: float = float("-inf")
     reset_at: float = float("-inf")
     look_at: float = float("inf")
-    """When it is judged though nobody is answered."""
+    """Time at which the series is judged even if nobody is answered."""
 
     def has_to_reset(self, now: float) -> bool:
-        """The drives of this family run on in Stopped, and one has said last that it is enabled."""
+        """Whether the node has to be reset: its family's drives run on in Stopped, and one last said that it
+        is enabled."""
         node = self.node
         begun = max(self.since, self.reset_at)
         if node.leaving.is_stopped_by_nmt or now < self.reset_at + _RESET_AGAIN_S:
@@ -295,7 +301,8 @@ class _Series:
 
 
 def _said_enabled_at(drive: Drive) -> float:
-    """When the drive has last said that it is enabled, if that is the last thing that it has said."""
+    """Time at which the drive last said that it is enabled; -inf if that is not the last thing it has
+    said."""
     heard = drive.channel.link.last_pdo
     is_enabled = drive.channel.state is DriveState.OPERATION_ENABLED
     return heard if is_enabled and heard is not None else float("-inf")
@@ -306,7 +313,7 @@ def _follows_sync(node: NodeCore) -> bool:
 
 
 def _met(frame: Text, since: int) -> Text:
-    """``since`` are frames that were not told of."""
+    """Text of a frame; ``since`` is the number of frames before it that were not reported."""
     if since:
         return Text.of("intruder.met_again", frame=frame, frames=since + 1)
     return Text.of("intruder.met", frame=frame)

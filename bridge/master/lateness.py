@@ -11,15 +11,15 @@ from bridge.image import Image
 from bridge.text import Text
 
 HANG_MS: Final = 100
-"""From so long on the bus process counts as having been too slow to notice what went on."""
+"""Delay in ms from which the bus process counts as too slow to have noticed what went on."""
 _EVENTS: Final = 3
 _EVENT_EVERY_S: Final = 60.0
 _SEVERITY_ROUND, _SEVERITY_TRIP = 500, 700
 
 
 class Lateness:
-    """Times are monotonic seconds. The worst of a trip is from its deadline until its stop was handed to the
-    bus, that of a round from when it was to begin."""
+    """Worst delays: of a trip from its deadline until its stop was handed to the bus, of a round from its due
+    time. Times are monotonic seconds."""
 
     def __init__(self, image: Image, events: EventQueue) -> None:
         self._image = image
@@ -33,8 +33,8 @@ class Lateness:
         self._round_limit = RateLimit(_EVENTS, _EVENT_EVERY_S)
 
     def on_hang(self, began: float, now: float) -> None:
-        """The bus process did not run in between, though something was due. A hang counts once, however many
-        notice it."""
+        """Count a hang: the bus process did not run in between, though something was due. It counts once,
+        however many notice it."""
         hang_ms = 1000 * (now - began)
         if hang_ms < HANG_MS or began < self._hung_until:
             return

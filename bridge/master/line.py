@@ -1,5 +1,4 @@
-"""One bus of the master with its network: what comes from it, what is to be repeated on it, and what it has
-been told to repeat."""
+"""One bus of the master with its network: frames received, repetitions wanted, bursts running."""
 
 from __future__ import annotations
 
@@ -22,18 +21,18 @@ from bridge.node.node_core import NodeCore
 from bridge.node.process.process_data import Repetition, RunningBurst
 
 RENEWALS: Final = 3
-"""How often a burst is renewed within its dead-man time."""
+"""Number of renewals of a burst within its dead-man time."""
 _BUS_EVENTS: Final = 10
 _BUS_EVENT_EVERY_S: Final = 5.0
 _SEND_LIMIT_S: Final = 0.1
-"""A frame that could not be sent for this long is stale and is dropped."""
+"""Time in seconds after which a frame that could not be sent is stale and is dropped."""
 
 Repetitions = dict[int, Repetition]
-"""What is to be repeated, by COB-ID."""
+"""Repetitions wanted on a bus, by COB-ID."""
 
 
 class Repeated:
-    """What is to be repeated on the bus of ``network``."""
+    """Repetitions wanted on the bus of ``network``."""
 
     def __init__(self, network: Network, plant: Plant) -> None:
         self._network = network
@@ -41,14 +40,14 @@ class Repeated:
         self._sync = sync_frames(network.bus.sync_counter)
         self._repetitions: Repetitions = {}
         self._of_nodes: dict[str, list[tuple[Repetition, bool]]] = {}
-        """By the node's name, in order; and whether each needs SYNC."""
+        """Repetitions of each node in order, by node name, each with whether it needs SYNC."""
         self._made_for: tuple[int, NmtState, bool, tuple[NodeCore, ...]] | None = None
 
     def repetitions(self, *, anew: bool = False) -> Repetitions:
-        """The frames to be repeated: the same object while they are the same.
+        """Frames to be repeated; the same object while they are the same.
 
-        A drive's settling changes those of its node; where a node has new PDOs or our own state is another,
-        and asked ``anew``, every drive is looked at.
+        A change of a drive remakes those of its node; if a node has new PDOs, if our own state has changed,
+        or with ``anew``, those of every drive are remade.
         """
         network = self._network
         changed = self._plant.take_changed(network.bus.name)
@@ -61,7 +60,7 @@ class Repeated:
         return self._repetitions
 
     def _make(self, changed: set[str] | None) -> Repetitions:
-        """With what has become of the nodes that have changed, or of all."""
+        """Repetitions, remade for the nodes in ``changed``, or for all if None."""
         repetitions: Repetitions = {}
         bus, state = self._network.bus, self._network.nmt_state
         # Initialising is said once, by the boot-up message.
@@ -85,7 +84,7 @@ class Repeated:
         return repetitions
 
     def _make_last(self) -> Repetitions:
-        """The stopped words that nodes have still to take over, though the bus is left to another bridge."""
+        """Stopped words that nodes have still to take over, though the bus is left to another bridge."""
         wanted = [one for node in self._network.farewell.awaiting for one in self._of_node(node)]
         repetitions = {one.frames[0].can_id: one for one, _ in wanted}
         if self._network.farewell.awaiting and self._network.bus.sync_period_ms:
@@ -103,7 +102,7 @@ class Repeated:
 
 @dataclass(slots=True)
 class BusLine:
-    """One bus with its network. ``alarm`` notices a standstill while frames are handed to the bus."""
+    """One bus with its network. ``alarm`` detects a standstill while frames are handed to the bus."""
 
     bus: Bus
     network: Network
@@ -115,7 +114,7 @@ class BusLine:
     repetitions: Repetitions | None = None
     renew_at: float = 0.0
     hold_at: float = inf
-    """When bursts have to be renewed so that they last as long as a drive needs them."""
+    """Time at which bursts have to be renewed so that they last as long as a drive needs them."""
     was_up: bool = True
     shown: ControllerState = ControllerState.OK
     shown_refusal: str = ""
@@ -126,7 +125,7 @@ class BusLine:
         self.repeated = Repeated(self.network, self.plant)
 
     def receive(self, now: float) -> list[Frame]:
-        """Take in what has come since the last call; gives what others have sent on identifiers of ours."""
+        """Take in what has come since the last call; returns the frames of others on identifiers of ours."""
         frames = self.bus.drain(now)
         has_started = bool(frames) and self.network.on_frames(frames, now)
         # They come by a way of their own: what was sent to a node before its boot-up message is taken in with
@@ -135,14 +134,14 @@ class BusLine:
 
     @property
     def has_news(self) -> bool:
-        """What has been taken in needs a round."""
+        """True if what has been taken in needs a round."""
         status = self.bus.status
         known = self.shown, self.outages, self.shown_refusal
         return (status.state, status.outages, status.bursts_refused) != known or self.network.has_news
 
     def stood_still(self, since: float) -> bool:
-        """The process was stopped after ``since`` for longer than deadman_ms, so words computed before are
-        stale. The next round finds the gap."""
+        """Whether the process was stopped after ``since`` for longer than deadman_ms, so that words computed
+        before are stale. The next round finds the gap."""
         return (self.clock() - since) * 1000 > self.network.bus.deadman_ms
 
     def flush(self, now: float) -> None:
@@ -183,8 +182,8 @@ class BusLine:
             network.on_handed_over(self.plant.unsent_stops, self.clock())
 
     def _hand_over(self, due: list[tuple[Repetition, bool]], now: float) -> None:
-        """Raises ``StoodStill`` where the process was stopped for so long that the rest is not right any
-        more. What was begun then is handed over anew after the gap."""
+        """Hand over the bursts that are due. Raises ``StoodStill`` where the process was stopped for so long
+        that the rest is no longer right. What was begun then is handed over anew after the gap."""
         self.alarm.set(self.burst_s)
         try:
             for wanted, changed in due:
@@ -199,24 +198,24 @@ class BusLine:
 
     @property
     def burst_s(self) -> float:
-        """How long a burst goes on without being renewed."""
+        """Duration in seconds of a burst that is not renewed."""
         return self.network.bus.deadman_ms / 1000
 
     @property
     def renew_s(self) -> float:
-        """How often bursts are renewed. One that has to end in a stop is no longer than the longest sequence
-        that the kernel takes."""
+        """Period in seconds in which bursts are renewed. One that has to end in a stop is no longer than the
+        longest sequence that the kernel takes."""
         return min(self.burst_s, MOST_FRAMES * self.network.bus.rpdo_period_s) / RENEWALS
 
     def _ended(self, repetitions: Repetitions, frames: list[Frame]) -> set[int]:
-        """The bursts that end: what is sent once takes their place, too."""
+        """COB-IDs of the bursts that end: a frame that is sent once takes a burst's place, too."""
         return self.running.keys() - (repetitions.keys() - {frame.can_id for frame in frames})
 
     def _due(self, repetitions: Repetitions, now: float, *, renew: bool) -> list[tuple[Repetition, bool]]:
-        """What to hand to the bus, and whether it is new: setpoints before the enabling word.
+        """Bursts to hand to the bus, each with whether it is new: setpoints before the enabling word.
 
-        Mere renewals go in reverse order: what is handed over later has no more frames left until the
-        deadline than what went before it, so setpoints end before the stop comes.
+        Mere renewals go in reverse order: a burst that is handed over later has no more frames left until the
+        deadline than one before it, so setpoints end before the stop comes.
         """
         new, kept = list[tuple[Repetition, bool]](), list[tuple[Repetition, bool]]()
         # What was right at the last call is right until one has to be held.

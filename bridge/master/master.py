@@ -1,8 +1,8 @@
-"""The shell of the CANopen side: drains the buses, runs every timer, keeps the bursts alive.
+"""Shell of the CANopen side: drains the buses, runs every timer, keeps the bursts alive.
 
 All of that happens in ``pump``, and only ``pump`` says that the service is alive: "process alive" and "drives
 supervised" cannot come apart (``docs/explanation/dead-man-chain.md``). Between two rounds ``take_in`` takes
-frames of which nothing comes but values, and lets the buses do what is theirs: look for frames of others, and
+frames that bring nothing but values, and lets the buses do their own work: look for frames of others, and
 send what the kernel does not send for them.
 """
 
@@ -32,9 +32,10 @@ _log = logging.getLogger(__name__)
 
 _REFRESH_S = 0.1
 _STOP_DRIVES_S = 0.1
-"""How long stopped words are sent at least before the bursts end, when the service is stopped."""
+"""Shortest time in seconds for which stopped words are sent before the bursts end, when the service is
+stopped."""
 _DRIVES_FOLLOW_S = 5.0
-"""How long they are sent at most, while a drive has not said that it follows: a quarter of TimeoutStopSec."""
+"""Longest time for that, while a drive has not said that it follows: a quarter of TimeoutStopSec."""
 _LOOK_S = 0.02
 
 _SEVERITIES = {
@@ -47,12 +48,12 @@ _SEVERITIES = {
 
 
 class Master:
-    """Runs any number of networks on their buses in one event loop. What nodes and buses report is told when
-    the words of a round are on their way.
+    """Runs any number of networks on their buses in one event loop. Reports of nodes and buses are passed on
+    when the words of a round are on their way.
 
     ``clock`` gives monotonic seconds; ``alive`` is called at the end of every complete round; ``alarm``
-    notices a standstill while frames are handed to the bus; ``suspended`` gives bounds for how long the
-    machine has been suspended.
+    detects a standstill while frames are handed to the bus; ``suspended`` gives a lower and an upper bound,
+    in seconds, of how long the machine has been suspended.
     """
 
     def __init__(
@@ -94,7 +95,7 @@ class Master:
         self.wake()
 
     def attach(self, set_timer: Callable[[float], None]) -> None:
-        """Run by whoever calls ``take_in`` or ``pump`` at the times given to ``set_timer``."""
+        """Begin to run, by calls of ``take_in`` or ``pump`` at the times given to ``set_timer``."""
         self._set_timer = set_timer
         self._running = True
 
@@ -139,21 +140,23 @@ class Master:
             line.bus.close()
 
     def carry_out(self, request: Request, now: float, reply: Reply) -> bool:
-        """A command on a node or a bus, or a request for a parameter; False if there is no such target."""
+        """Carry out a command on a node or a bus, or a request for a parameter; False if there is no such
+        target."""
         return any(line.network.carry_out(request, now, reply) for line in self._lines)
 
     def wake(self) -> None:
-        """One round, while running. An outcome may call this: it is told when the work of a round is done."""
+        """Run one round, while the master runs. An outcome may call this: it is delivered when the work of a
+        round is done."""
         self._carry_on(self.pump)
 
     def on_bus(self) -> None:
-        """A bus has something to give, or to do, or a round is due."""
+        """Take in frames, and let the buses do their work, or run a round that is due."""
         self._carry_on(self.take_in)
 
     def _carry_on(self, turn: Callable[[], None]) -> None:
-        """A fault of our own ends it: no drive is left to a master that does half of its work. Each drive
-        gets a last, stopped word if possible; the bursts end within the dead-man time, and ``failed`` says
-        why."""
+        """Do one turn. A fault of our own ends the running: no drive is left to a master that does half of
+        its work. Each drive gets a last, stopped word if possible; the bursts end within the dead-man time,
+        and ``failed`` says why."""
         if not self._running:
             return
         try:
@@ -166,7 +169,8 @@ class Master:
             raise
 
     def _send_last_words(self) -> None:
-        """After a fault of our own: what fails for one bus must not keep the others' drives running."""
+        """Send stopped words after a fault of our own: what fails for one bus must not keep the others'
+        drives running."""
         now = self._clock()
         try:
             self._plant.close(now)
@@ -186,10 +190,11 @@ class Master:
             await self._failure
 
     def take_in(self) -> None:
-        """Take in what has come, and let the buses do what is due; a whole round follows where something
-        comes of it, or where one is due.
+        """Take in what has come, and let the buses do what is due; a whole round follows if that has
+        consequences, or if one is due.
 
-        Else all stays as the last round has left it: what is repeated, and who is alive."""
+        Otherwise all stays as the last round has left it: what is repeated, and who is alive.
+        """
         now, due = self._clock(), self._due
         if due is None or now >= due:
             self.pump()
@@ -212,8 +217,9 @@ class Master:
             self._plant.tell_events()
 
     def _receive(self, now: float) -> float:
-        """Take in what has come; gives the time up to which. The process may have been stopped since it
-        looked at the clock: then what others have sent came in the gap, in which one may have taken over."""
+        """Take in what has come; returns the time up to which. The process may have been stopped since it
+        looked at the clock: then frames of others came in the gap, in which another bridge may have taken
+        over."""
         for line in self._lines:
             if foreign := line.receive(now):
                 now = self._clock()
@@ -226,7 +232,7 @@ class Master:
         return any(line.has_news for line in self._lines)
 
     def pump(self) -> None:
-        """One round: drain, judge, send, renew; then outcomes are told."""
+        """Run one round: drain, judge, send, renew; then deliver outcomes."""
         now = self._clock()
         self._check_gap(now)
         if self._due is not None:
@@ -275,8 +281,8 @@ class Master:
             line.network.enforce(enforcement, now)
 
     def _check_gap(self, now: float) -> None:
-        """After a pause longer than the dead-man time, or a suspended machine, all bursts have ended: nothing
-        that was moving may go on by itself."""
+        """Stop all drives after a pause longer than the dead-man time, or a suspended machine: all bursts
+        have ended, and nothing that was moving may go on by itself."""
         slept_s = self._suspend.take()
         if self._last_round is None:
             return
@@ -321,8 +327,8 @@ class Master:
             line.network.bus_is_gone(now)
 
     def _tell_state(self, line: BusLine, now: float) -> None:
-        """The controller is in another state. A loose plug changes it a hundred times a second: the last
-        one is told in any case, those before it no more often than the limit allows."""
+        """Report another state of the controller. A loose plug changes it a hundred times a second: the last
+        state is reported in any case, those before it no more often than the limit allows."""
         status = line.bus.status
         if status.state is line.shown or not line.limit.allows(now):
             return
@@ -334,7 +340,7 @@ class Master:
         self._plant.events.report(Event(now, EventKind.BUS, line.bus.name, _SEVERITIES[status.state], said))
 
     def _tell_refusal(self, line: BusLine, now: float) -> None:
-        """The kernel no longer takes bursts, or takes them again."""
+        """Report that the kernel no longer takes bursts, or takes them again."""
         refusal = line.bus.status.bursts_refused
         if refusal == line.shown_refusal or not line.limit.allows(now):
             return
@@ -359,7 +365,7 @@ class Master:
         self._set_timer_for(self._due)
 
     def _set_timer_for(self, due: float) -> None:
-        """A round is due then; a bus may have something to do before."""
+        """Set the timer for the round at ``due``, or for a bus that has something to do before."""
         for line in self._lines:
             at = line.bus.next_deadline()
             if at is not None and at < due:

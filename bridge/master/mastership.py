@@ -44,8 +44,8 @@ class BusMastership:
         return Text.of("bus.listens" if listens else "bus.leaves", bus=self._bus.name)
 
     def heard(self, sign: Text, now: float) -> Text | None:
-        """``sign`` reveals another bridge. If this one gives way by that it sends nothing more, not even
-        stops: the reason, with which all that is known of the bus is to be forgotten."""
+        """Take a ``sign`` of another bridge. If this one gives way by that it sends nothing more than it
+        owes: returns the reason, with which all that is known of the bus is to be forgotten."""
         if not self._listening.heard(now):
             return None
         until_ms = self._listening.silence_s * 1000
@@ -70,7 +70,7 @@ class BusMastership:
         return self._listening.next_deadline()
 
     def came_back(self, now: float) -> None:
-        """The bridge was away for longer than its bursts last."""
+        """Note that the bridge was away for longer than its bursts last."""
         self._listening.returns(now)
 
     def bus_is_gone(self) -> None:
@@ -82,7 +82,7 @@ class BusMastership:
             self.say_passive(now)
 
     def say_passive(self, now: float) -> None:
-        """Show of each node that another bridge is in charge of it."""
+        """Show for each node that another bridge is in charge of it."""
         for node in self._nodes:
             if not node.is_out_of_service:
                 node.say(Text.of("node.passive", bus=self._bus.name), now)

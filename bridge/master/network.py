@@ -1,6 +1,6 @@
 """One CANopen network: its nodes, its SYNC and TIME, our own heartbeat. Sans-IO.
 
-Says which frames are to be sent once; what is repeated is made of its nodes (``line.py``).
+Gives the frames that are to be sent once; repetitions are made from its nodes (``line.py``).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ NOTHING: Final[Mapping[str, Sequence[Download]]] = MappingProxyType({})
 class Network:
     """All configured nodes of one bus.
 
-    ``epoch_ns`` gives the wall clock at a monotonic time, for TIME; without it none is sent.
+    ``epoch_ns`` gives the wall clock in ns at a monotonic time, for TIME; without it none is sent.
     """
 
     def __init__(
@@ -53,8 +53,8 @@ class Network:
         downloads: Mapping[str, Sequence[Download]] = NOTHING,
         listening: Standby | None = None,
     ) -> None:
-        """``downloads`` has the configuration of nodes that a file gives, by the node's name. ``listening``
-        is as the bus has it, unless given."""
+        """``downloads`` has the configurations that files give, by node name. ``listening`` is that of the
+        bus, unless given."""
         self.bus = bus
         self._image = side.image
         self._events = side.events
@@ -70,7 +70,7 @@ class Network:
         self._watch = BusWatch(bus.name, own_id, self.mastership.acts, known, side)
         self._intruders = Intruders(bus, self.nodes, side.events, self.mastership.acts, self._stop_nodes)
         self.ours: frozenset[int] = frozenset()
-        """Identifiers on which nobody else may send what we repeat; brought up to date by ``take_routes``."""
+        """Identifiers of what we repeat, on which nobody else may send; updated by ``take_routes``."""
         self._has_booted = False
         self._has_news = False
         self._has_started = False
@@ -78,14 +78,14 @@ class Network:
         self._routes_changed = True
         self._routes: dict[int, Handler] = {}
         self.routings = 0
-        """How often ``take_routes`` has found other identifiers."""
+        """Number of times that ``take_routes`` has found other identifiers."""
         self._window = SyncWindow(bus.sync_window_us / 1e6) if bus.sync_window_us else None
         self._time = TimeProducer(bus.time_period_s, epoch_ns) if bus.time_period_s and epoch_ns else None
         self._frames: list[Frame] = []
         self._points = BusPoints(bus, side)
 
     def on_frames(self, frames: list[Frame], now: float) -> bool:
-        """Everything received, in order; gives whether a node has started by it."""
+        """Take all that was received, in order; returns whether a node has restarted by it."""
         self._has_started = False
         routes = self._routes
         for frame in frames:
@@ -96,7 +96,7 @@ class Network:
         return self._has_started
 
     def on_foreign(self, frames: list[Frame], now: float) -> None:
-        """What others have sent on identifiers that are ours."""
+        """Take frames of others on identifiers that are ours."""
         self._has_news = True
         for frame in frames:
             if frame.can_id == cobid.ERROR_CONTROL + self.bus.master_node_id:
@@ -166,7 +166,7 @@ class Network:
         return min((time for time in times if time is not None), default=None)
 
     def came_back(self, now: float) -> None:
-        """The bridge was away for longer than its bursts last."""
+        """Note that the bridge was away for longer than its bursts last."""
         self.mastership.came_back(now)
 
     def _stop_nodes(self, nodes: Sequence[NodeCore], why: Text, now: float) -> None:
@@ -184,7 +184,7 @@ class Network:
     # NMT
 
     def _boot_up(self, now: float) -> None:
-        """The bus is there: send our boot-up message (CiA 301 §7.2.8.3.3), and reset nodes that need it."""
+        """Send our boot-up message (CiA 301 §7.2.8.3.3) on the new bus, and reset nodes that need it."""
         self._has_booted = True
         if self.bus.heartbeat_ms:
             self._frames.append(Frame(cobid.ERROR_CONTROL + self.bus.master_node_id, b"\0"))
@@ -202,7 +202,7 @@ class Network:
 
     @property
     def nmt_state(self) -> NmtState:
-        """Our own: pre-operational while a mandatory node keeps the others waiting (CiA 302-2)."""
+        """Our own NMT state: pre-operational while a mandatory node keeps the others waiting (CiA 302-2)."""
         if not self._has_booted:
             return NmtState.INITIALISING
         return NmtState.OPERATIONAL if self._gate.is_open else NmtState.PRE_OPERATIONAL
@@ -210,8 +210,8 @@ class Network:
     # requests
 
     def carry_out(self, request: Request, now: float, reply: Reply) -> bool:
-        """A command on a node or on all of them, or a request for a parameter; False where its target is not
-        on this bus."""
+        """Carry out a command on a node or on all of them, or a request for a parameter; False where its
+        target is not on this bus."""
         if request.action not in NODE_ACTIONS:
             return self._ask_drive(request, now, reply)
         is_bus = request.target == f"bus/{self.bus.name}"
@@ -236,7 +236,7 @@ class Network:
         return False
 
     def enforce(self, enforcement: Enforcement, now: float) -> None:
-        """Do this to its node, if that is on this bus."""
+        """Carry out the enforcement on its node, if that is on this bus."""
         for node in self.nodes:
             if node.node.name == enforcement.node:
                 node.enforce(enforcement.action, enforcement.why, now)
@@ -254,7 +254,7 @@ class Network:
         return self._gate.may_start(node)
 
     def stop_others(self, node: Neighbour, why: Text, now: float) -> None:
-        """A node is lost without which the others must not go on."""
+        """Stop all nodes, because one is lost without which the others must not go on."""
         self._gate.stopped_by(node)
         said = Text.of("bus.all_stopped", why=why)
         self._events.report(Event(now, EventKind.BUS, self.bus.name, 800, said))
@@ -274,7 +274,7 @@ class Network:
         self._watch.on_duplicate(node.table.id, sign, now)
 
     def is_taken(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether another node of the bus has a PDO, or anything else, on this identifier."""
+        """Whether another node of the bus uses this identifier, for a PDO or anything else."""
         return any(
             cob_id in other.wire.routes
             or any(cob_id == rpdo.cob_id for pdos in other.wire.pdos for rpdo in pdos.rpdos)
@@ -283,7 +283,7 @@ class Network:
         )
 
     def is_foreign(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether an identifier is that of another node, or will be."""
+        """Whether this identifier is another node's, or will be by the site's files."""
         others = (other for other in self.nodes if other is not node)
         return self.is_taken(node, cob_id) or any(cob_id in one.wire.stop_words.given_ids for one in others)
 
@@ -291,12 +291,12 @@ class Network:
 
     @property
     def waiting(self) -> int:
-        """Plans and frames that it holds: bounded, whatever is received."""
+        """Number of plans and frames that it holds: bounded, whatever is received."""
         return len(self._schedule) + len(self._frames)
 
     @property
     def has_news(self) -> bool:
-        """Since ``take_frames`` something has come of a node beside its signs of life."""
+        """True if a node has brought more than signs of life since ``take_frames``."""
         return self._has_news or self._schedule.is_touched
 
     def take_frames(self) -> list[Frame]:
@@ -315,7 +315,7 @@ class Network:
         return frames
 
     def take_routes(self) -> list[int] | None:
-        """The identifiers to be received, if they have changed since the last call."""
+        """Identifiers to be received; None if they have not changed since the last call."""
         if not self._routes_changed:
             return None
         self._routes_changed = False
@@ -330,7 +330,7 @@ class Network:
         return list(self._routes)
 
     def _judge_by_window(self, window: SyncWindow) -> None:
-        """SYNC comes back to us, and every synchronous TPDO is looked at before its drive gets it."""
+        """Judge each synchronous TPDO by the SYNC window before its drive gets it; SYNC comes back to us."""
 
         def judged(handler: Handler) -> Handler:
             def judge(frame: Frame) -> None:
@@ -346,8 +346,8 @@ class Network:
                     self._routes[tpdo.cob_id] = judged(self._routes[tpdo.cob_id])
 
     def on_handed_over(self, unsent: set[Commanded], now: float) -> None:
-        """Begin the bounds of stops, and have outputs read back: the bus repeats what it is to repeat. Those
-        whose stop is sent by that are taken out of ``unsent``."""
+        """Begin the time bounds of stops, and have outputs read back: the bus repeats what it is to repeat.
+        Those whose stop is sent by that are taken out of ``unsent``."""
         for node in self.nodes:
             for one in node.node.commanded:
                 is_sent = node.sends_process_data and node.wire.carries(one)
@@ -357,13 +357,13 @@ class Network:
                     self._schedule.plan(node)
 
     def _give_way(self, now: float, why: Text) -> None:
-        """Another bridge is in charge: nothing more is sent than what is owed."""
+        """Give way to another bridge: nothing more is sent than what is owed."""
         self._forget_bus(now, why)
         self.say_farewell(now)
         self._reach.on_bus(now)
 
     def say_farewell(self, now: float) -> None:
-        """Send what is owed, where this bridge acts no more."""
+        """Send what is owed, if this bridge no longer acts."""
         if not self.mastership.acts():
             self.farewell.begin(now)
             self._touch_all(self.nodes)
@@ -391,7 +391,7 @@ class Network:
         self._touch_all(self.nodes)
 
     def bus_is_back(self, now: float) -> None:
-        """What was written while the bus was down must not be sent first."""
+        """Go on after an outage: what was written while the bus was down must not be sent first."""
         self.mastership.bus_is_back(now)
         if self.mastership.acts():
             self._return(now)
@@ -404,7 +404,7 @@ class Network:
         self._touch_all(self.nodes)
 
     def refresh(self, status: BusStatus, now: float) -> None:
-        """Bring the points of the bus and its nodes up to date; a few times a second."""
+        """Update the points of the bus and its nodes; called a few times a second."""
         self._points.refresh(status, now)
         top = f"bus/{self.bus.name}"
         self._image.put(f"{top}/sync_window_misses", self._window.misses if self._window else 0, now)

@@ -1,4 +1,4 @@
-"""Whose words reach the bus, and why others do not: what an answer may call forwarded. Sans-IO."""
+"""Whether words reach the bus, and the reason if not: what an answer may call forwarded. Sans-IO."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from bridge.text import Said, Text
 
 
 class Reach:
-    """Tells each drive, and the outputs of each node, whether what it puts out is repeated on the bus; as
-    ``Repeated`` does (``line.py``)."""
+    """Tells each drive, and the outputs of each node, whether its words are repeated on the bus, as
+    ``Repeated`` does it (``line.py``)."""
 
     def __init__(self, nodes: Sequence[NodeCore], mastership: BusMastership, farewell: Farewell) -> None:
         self._nodes = nodes
@@ -24,7 +24,8 @@ class Reach:
         self._of_bus: tuple[bool, bool, tuple[NodeCore, ...]] | None = None
 
     def on_bus(self, now: float, *, is_up: bool | None = None) -> None:
-        """The state of the bus, or this bridge's part on it, may be another. ``is_up``: it takes frames."""
+        """Tell all nodes if the bus, or this bridge's part on it, has changed. ``is_up``: whether the bus
+        takes frames."""
         self._is_up = self._is_up if is_up is None else is_up
         of_bus = self._is_up, self._mastership.acts(), self._farewell.awaiting
         if of_bus != self._of_bus:
@@ -38,7 +39,7 @@ class Reach:
                 one.channel.on_sending(why or _why_left_out(node, one), now)
 
     def _why_not(self, node: NodeCore) -> Said:
-        """Why no words go to this node; empty where they do."""
+        """Reason why no words go to this node; empty where they do."""
         if not self._is_up:
             return BUS_IS_DOWN
         if not self._mastership.acts() and node not in self._farewell.awaiting:

@@ -1,4 +1,4 @@
-"""Which nodes of a bus have something to do now: only those that are due cost anything, even of 127."""
+"""Schedule of the nodes of a bus: only those with something to do now cost anything, even of 127."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ N = TypeVar("N", bound=Neighbour)
 
 
 class Schedule(Generic[N]):
-    """Deadlines of nodes. A deadline that was put off (each heartbeat does that) is noticed when the old one
-    comes; one that was brought forward has to be reported by ``plan``, or by ``touch`` and the next round."""
+    """Deadlines of nodes. One that was put off (each heartbeat does that) is noticed when the old one comes;
+    one that was brought forward has to be reported by ``plan``, or by ``touch`` and the next round."""
 
     def __init__(self, nodes: Iterable[N]) -> None:
         self._nodes = tuple(nodes)
@@ -30,12 +30,12 @@ class Schedule(Generic[N]):
         return bool(self._touched)
 
     def take_touched(self) -> list[N]:
-        """Each node once, in the order in which they were touched."""
+        """Touched nodes, each once, in the order in which they were touched."""
         touched, self._touched = self._touched, {}
         return [self._nodes[place] for place in touched]
 
     def plan(self, node: Neighbour) -> None:
-        """Look at the deadline of this node."""
+        """Plan this node by its present deadline."""
         place = self._places[id(node)]
         at, planned = node.next_deadline(), self._planned[place]
         if at is not None and (planned is None or at < planned):
@@ -43,7 +43,7 @@ class Schedule(Generic[N]):
             heapq.heappush(self._heap, (at, place))
 
     def take_due(self, now: float) -> list[N]:
-        """The nodes whose deadline may have come; each is touched or planned again by the caller."""
+        """Nodes whose deadline may have come; each is touched or planned again by the caller."""
         due: list[N] = []
         heap = self._heap
         while heap and heap[0][0] <= now:
@@ -55,7 +55,7 @@ class Schedule(Generic[N]):
         return due
 
     def __len__(self) -> int:
-        """Entries it holds, stale ones included."""
+        """Number of entries that it holds, stale ones included."""
         return len(self._heap) + len(self._touched)
 
     def next_deadline(self) -> float | None:

@@ -1,4 +1,4 @@
-"""Whether the process was stopped for long, found out without a system call.
+"""Detection, without a system call, of a process that was stopped for long.
 
 A process can be stopped for any time between reading the clock and what follows: most likely at the end of
 the reading itself, where that is a system call (as on many virtual machines). A signal that has become due
@@ -11,22 +11,22 @@ import signal
 
 
 class StoodStill(Exception):
-    """The process was stopped for longer than what it was about to do may wait."""
+    """The process was stopped for longer than its next action may wait."""
 
 
 class WatchdogTimer:
-    """``rang``: the time it was last set to has passed. While it ``breaks_in``, it raises ``StoodStill``
-    wherever the process is as it rings. This one never rings: it is for a master that shares its process."""
+    """Timer that never rings, for a master that shares its process. ``rang``: the time it was last set to has
+    passed. While it ``breaks_in``, ringing raises ``StoodStill`` wherever the process is."""
 
     rang = False
     breaks_in = False
 
     def set(self, seconds: float) -> None:
-        """Ring then, unless set again before. 0: not at all."""
+        """Ring after ``seconds``, unless set again before. 0: not at all."""
 
 
 class SignalAlarm(WatchdogTimer):
-    """Takes SIGALRM and the real-time interval timer of the process. Made in its main thread."""
+    """Timer that takes SIGALRM and the real-time interval timer of the process. Made in its main thread."""
 
     def __init__(self) -> None:
         signal.signal(signal.SIGALRM, lambda number, frame: self._ring())

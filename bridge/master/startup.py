@@ -1,4 +1,4 @@
-"""Which nodes may be started when: mandatory nodes and start order (CiA 302-2, NMT start-up). Pure."""
+"""Start gate of a bus: mandatory nodes and start order (CiA 302-2, NMT start-up). Pure."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bridge.node.neighbours import Neighbour
 
 
 class StartGate:
-    """Judges all nodes of a bus at once, when ``judge`` is called; ``may_start`` answers by that."""
+    """Gate of one bus: ``judge`` judges all its nodes at once, and ``may_start`` answers by that."""
 
     def __init__(self, policy: MandatoryMissing, nodes: Sequence[Neighbour]) -> None:
         self._policy = policy
@@ -18,10 +18,10 @@ class StartGate:
         self._awaited: list[Neighbour] = []
         self._order = 0
         self.missing: list[str] = []
-        """Names of the nodes that the others wait for."""
+        """Names of the nodes for which the others wait."""
 
     def stopped_by(self, node: Neighbour) -> None:
-        """All nodes were stopped because this one was lost: they wait until it is ready again."""
+        """Make all nodes wait until this one is ready again: they were stopped because it was lost."""
         if node not in self._awaited:
             self._awaited.append(node)
 

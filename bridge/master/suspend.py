@@ -1,4 +1,4 @@
-"""Whether the machine was suspended: then CLOCK_BOOTTIME goes on and CLOCK_MONOTONIC does not. Sans-IO."""
+"""Detection of a suspended machine: CLOCK_BOOTTIME goes on then and CLOCK_MONOTONIC does not. Sans-IO."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ _NOTICEABLE_S: Final = 0.01
 
 
 class SuspendWatch:
-    """``look`` gives a lower and an upper bound, in seconds, of how long the machine has been suspended since
-    it was booted: two clocks cannot be read at once, and the process may be delayed between them."""
+    """Watch for suspensions. ``look`` gives a lower and an upper bound, in seconds, of how long the machine
+    has been suspended since it was booted: two clocks cannot be read at once, and the process may be delayed
+    between them."""
 
     def __init__(self, look: Callable[[], tuple[float, float]]) -> None:
         self._look = look
         self._at_most = look()[1]
 
     def take(self) -> float:
-        """How many seconds it was suspended since the last call; 0 if it was not."""
+        """Seconds for which it was suspended since the last call; 0 for none."""
         at_least, at_most = self._look()
         slept_s = at_least - self._at_most
         if slept_s > _NOTICEABLE_S:

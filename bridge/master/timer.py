@@ -22,7 +22,7 @@ _FLOOR_S: Final = 1e-6
 
 
 class LoopTimer:
-    """Calls ``wake`` at the armed time; one time is armed at a time, the newest counts."""
+    """Timer that calls ``wake`` at the armed time; one time is armed at a time, the newest counts."""
 
     def __init__(
         self, loop: asyncio.AbstractEventLoop, clock: Callable[[], float], wake: Callable[[], None]
@@ -32,7 +32,7 @@ class LoopTimer:
         self._wake = wake
         self._handle: asyncio.TimerHandle | None = None
         self._armed_ns = 0
-        """What the timerfd is set to, and has not come to yet; 0 where it is not."""
+        """Time that the timerfd is set to and that has not come yet, in ns; 0 if there is none."""
         self._libc = _library_with_timerfd()
         self._fd = -1
         if self._libc:
@@ -74,7 +74,7 @@ class LoopTimer:
 
 
 def _library_with_timerfd() -> ctypes.CDLL | None:
-    """The C library, or None where the system has no timerfd (it is Linux's own)."""
+    """The C library; None where the system has no timerfd (it is Linux's own)."""
     try:
         library = ctypes.CDLL(None)
     except (OSError, TypeError):

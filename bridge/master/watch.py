@@ -1,4 +1,4 @@
-"""What is on the bus and should not be there: other NMT masters, foreign nodes, node ids used twice."""
+"""Watch for what should not be on the bus: other NMT masters, foreign nodes, node ids used twice."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bridge.text import Text
 
 _NODES: Final = range(1, 128)
 _FORGET_S: Final = 60.0
-"""So long after the last sign a point is back, and so long nothing is told twice."""
+"""Time in seconds after the last sign until a point is back, and for which nothing is told twice."""
 
 
 class BusWatch:
@@ -30,7 +30,7 @@ class BusWatch:
         side: BusSide,
     ) -> None:
         """``own_id`` is the bridge's own node id where it produces a heartbeat; where the bridge does not
-        act, another one is the NMT master. ``known`` has the configured nodes."""
+        act, another one is the NMT master. ``known`` has the names of the configured nodes, by id."""
         self._bus = bus
         self._own_id = own_id
         self._acts = acts
@@ -43,7 +43,8 @@ class BusWatch:
         self._pauses = Pauses()
 
     def routes(self) -> dict[int, Callable[[Frame], None]]:
-        """NMT commands, and the error control messages of every node that is not configured."""
+        """Handlers of NMT commands, and of the error control messages of every node that is not
+        configured."""
         routes: dict[int, Callable[[Frame], None]] = {cobid.NMT: self._on_nmt}
         for node_id in _NODES:
             if node_id not in self._known and node_id != self._own_id:
@@ -51,7 +52,7 @@ class BusWatch:
         return routes
 
     def _on_nmt(self, frame: Frame) -> None:
-        """An NMT command that we did not send: our own do not come back."""
+        """Report an NMT command that we did not send: our own do not come back."""
         if not self._acts():
             return
         self._master_at = frame.time
@@ -74,12 +75,12 @@ class BusWatch:
         )
 
     def on_own_id(self, now: float) -> None:
-        """Somebody else uses the bridge's own id; who holds this watch tells it."""
+        """Note that somebody else uses the bridge's own id; whoever holds this watch reports it."""
         if self._own_id is not None:
             self._duplicates[self._own_id] = now
 
     def on_duplicate(self, node_id: int, sign: DuplicateSign, now: float) -> None:
-        """A configured node id behaves as if two devices had it."""
+        """Report a configured node id that behaves as if two devices had it."""
         self._duplicates[node_id] = now
         name = self._known.get(node_id, "unknown")
         self._tell(
@@ -94,7 +95,7 @@ class BusWatch:
             self._events.report(Event(now, EventKind.BUS, self._bus, severity, said))
 
     def refresh(self, now: float) -> None:
-        """Bring the points of the bus up to date."""
+        """Update the points of the bus."""
         top = f"bus/{self._bus}"
         self._image.put(f"{top}/second_master", now - self._master_at < _FORGET_S, now)
         self._image.put(f"{top}/unexpected_nodes", _listed(self._strangers, now), now)
@@ -112,7 +113,7 @@ def _said(sign: DuplicateSign) -> Text:
 
 
 def _listed(seen: dict[int, float], now: float) -> str:
-    """The ids seen within the last minute; the others are forgotten."""
+    """Node ids seen within the last minute; the others are forgotten."""
     for node_id in [node_id for node_id, at in seen.items() if now - at >= _FORGET_S]:
         del seen[node_id]
     return ", ".join(str(node_id) for node_id in sorted(seen))

@@ -1,4 +1,4 @@
-"""How long a node waits for its next boot-up: longer after each one that failed or did not last. Pure."""
+"""Delay before a node's next boot-up: longer after each one that failed or did not last. Pure."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ BETWEEN_BOOTS_S: Final = 0.2
 _FIRST_S: Final = 1.0
 _LAST_S: Final = 10.0
 _LAST_UNUSABLE_S: Final = 300.0
-"""A node that is there and cannot be used: what has to change is its configuration or the site file, and
-each attempt may cost it writes."""
+"""Longest delay for a node that answers and cannot be used: its configuration or the site file has to change,
+and each attempt may cost it EEPROM writes."""
 _STEADY_S: Final = 30.0
-"""Who has been in operation for so long begins anew."""
+"""Time in operation after which the delays start over."""
 _MANY: Final = 3
 
 
 class BackOff:
-    """Of one node. ``lost`` and ``failed`` give the seconds until it is booted again."""
+    """Delays of one node. ``lost`` and ``failed`` return the seconds until its next boot-up."""
 
     def __init__(self) -> None:
         self._since = float("-inf")
@@ -27,13 +27,13 @@ class BackOff:
         self.reset()
 
     def reset(self) -> None:
-        """The node has started, or an operator wants it now."""
+        """Start over: the node has restarted, or an operator wants it now."""
         self.pause_s = _FIRST_S
         self.between_boots_s = BETWEEN_BOOTS_S
-        """The least time from one boot-up to the next, where the node is heard again meanwhile."""
+        """Minimum time between two boot-ups of a node that is heard again in between, in seconds."""
         self._losses = 0
         self.steady_at: float | None = None
-        """When a node that was lost again and again is believed to stay."""
+        """Time at which a flapping node counts as stable; None unless one is in operation."""
 
     def entered_operation(self, now: float) -> None:
         self._since = now
@@ -50,7 +50,7 @@ class BackOff:
         return pause_s
 
     def failed(self, *, absent: bool) -> float:
-        """A boot-up has failed; ``absent`` where the node did not answer."""
+        """Seconds until the next boot-up after a failed one; ``absent`` where the node did not answer."""
         return self._take(_LAST_S if absent else _LAST_UNUSABLE_S)
 
     def _take(self, most_s: float) -> float:
@@ -60,11 +60,11 @@ class BackOff:
 
     @property
     def is_flapping(self) -> bool:
-        """Lost again and again soon after each boot-up: not every time is told."""
+        """True if the node is lost repeatedly, soon after each boot-up: not every loss is reported."""
         return self._losses >= _MANY
 
     def report(self, now: float) -> Text | None:
-        """What to tell of a node that flaps, once a minute."""
+        """Report of a node that flaps, at most once a minute; None if there is none."""
         if not self.is_flapping or self._pauses.take(now) is None:
             return None
         return Text.of("node.lost_again", times=self._losses)

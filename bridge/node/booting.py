@@ -1,4 +1,4 @@
-"""Runs a node's boot-up generator: carries its questions to the SDO channel, brings the answers back."""
+"""Runner of a node's boot-up generator: it carries requests to the SDO channel, and the answers back."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Booted(Protocol):
 
 
 class Booting:
-    """One boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
+    """Runner of one boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
     channel's own bookkeeping."""
 
     def __init__(self, node: Booted, make: Callable[[], boot.Boot], sdo: SdoChannels) -> None:
@@ -72,7 +72,7 @@ class Booting:
         self._answers.clear()
 
     def pump(self, now: float) -> None:
-        """Give the boot-up the answers that have come since the last call."""
+        """Resume the boot-up with the answers received since the last call."""
         while self._answers:
             self._go_on(self._answers.pop(0), now)
         if self.is_held and self._node.may_start():
@@ -80,7 +80,7 @@ class Booting:
             self._go_on(None, now)
 
     def on_nmt_state(self, state: NmtState, now: float) -> None:
-        """The node has reported its state."""
+        """Take a state that the node has reported."""
         if self._awaited and self._awaited.state in (None, state):
             self._awaited = None
             self._go_on(None, now)
@@ -104,7 +104,7 @@ class Booting:
         return self._awaited.deadline if self._awaited else self._goes_on_at
 
     def _go_on(self, answer: Result | boot.BootError | None, now: float) -> None:
-        """Run until the boot-up waits for something, from an answer, or from what has become of waiting."""
+        """Resume with an answer, or with the outcome of a wait, and run until the boot-up waits again."""
         if self._dialogue is not None:
             self._dialogue.go_on(answer, now)
 
@@ -141,7 +141,7 @@ class Booting:
 
 
 def _failure(error: SdoError, step: boot.BootStep) -> boot.BootError:
-    """What the boot-up ends with. Silence says nothing about what was asked for."""
+    """Error with which the boot-up ends. Silence says nothing about the object that was asked for."""
     if error.was_answered or step.letter == "B":
         return boot.BootError(step.letter, _needed(text_of(error), step), absent=not error.was_answered)
     what = Text.of("boot.no_answer", why=text_of(error))

@@ -1,4 +1,4 @@
-"""A node that keeps restarting is booted less and less often, and reported once a minute."""
+"""Boot loops: a node that keeps restarting is booted less and less often, and reported once a minute."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from bridge.text import Text
 _MANY: Final = 4
 _WITHIN_S: Final = 20.0
 _ROW_GAP_S: Final = 0.2
-"""Some devices say several times that they have started; none starts twice so soon."""
+"""Gap within which boot-up messages mean one start, in seconds: some devices send several, none starts twice
+so soon."""
 _LONGEST_ROW_S: Final = 1.0
-"""Beyond that it is no row: the device is reset faster than it can start."""
+"""Longest series of such messages, in seconds; beyond it the device is reset faster than it can start."""
 _FIRST_PAUSE_S: Final = 2.0
 _LAST_PAUSE_S: Final = 60.0
 
 
 class BootLoop:
-    """Counts the restarts of one node by its boot-up messages."""
+    """Restarts of one node, counted by its boot-up messages."""
 
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=_MANY)
@@ -29,8 +30,8 @@ class BootLoop:
         self._since_told = 0
 
     def on_boot_up(self, now: float) -> float:
-        """A boot-up message; returns the seconds to wait before the node is booted, 0 if all is well. Those
-        of a row are one restart."""
+        """Take a boot-up message; returns the seconds to wait before the node is booted, 0 if all is well. A
+        series counts as one restart."""
         self._since_told += 1
         gap_s, self._last = now - self._last, now
         if self._times and gap_s < _ROW_GAP_S and now - self._times[-1] < _LONGEST_ROW_S:
@@ -51,7 +52,7 @@ class BootLoop:
         return self._pause_s > 0
 
     def report(self, now: float) -> Text | None:
-        """What to report, once a minute while it goes on."""
+        """Report of the restarts, at most once a minute while they go on; None if there is none."""
         if not self.is_looping or self._pauses.take(now) is None:
             return None
         since, self._since_told = self._since_told, 0

@@ -1,5 +1,5 @@
-"""Emergency messages of one node: each to the drive it is about, or an event where there is none, and their
-history as points."""
+"""Emergency messages of one node: each goes to the drive it is about, or becomes an event where there is
+none; their history becomes points."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from bridge.text import Text
 
 _COMES: Final = 700
 _GONE: Final = 100
-"""Severities of an emergency message, as of a drive's."""
+"""Severities of the events for an emergency that comes or is gone, the same as a drive's."""
 
 
 class Concerned(NamedTuple):
-    """A drive that an emergency message is about, and when that came."""
+    """A drive that an emergency message is about, and the time at which the message came."""
 
     drive: Drive
     at: float
@@ -37,7 +37,7 @@ class Emergencies:
         self._log = EmergencyLog()
 
     def on_frame(self, frame: Frame) -> Sequence[Concerned] | None:
-        """Drives that it is about, as far as it is told now; None where it is no emergency message."""
+        """Drives that the message is about, if it is reported now; None where it is no emergency message."""
         emergency = emcy.decode(frame.data)
         if emergency is None:
             return None
@@ -48,7 +48,7 @@ class Emergencies:
         return ()
 
     def on_time(self, now: float) -> Sequence[Concerned]:
-        """Drives that messages are about which were held back and are told now."""
+        """Drives concerned by messages that were held back and are reported now."""
         told = self._log.on_time(now)
         return [one for emergency, number, at in told for one in self._tell(emergency, number, at)]
 

@@ -1,4 +1,4 @@
-"""The emergencies of one node: a history, and a limit on how often they are told."""
+"""Emergency messages of one node: a history, and a limit on how often they are reported."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from bridge.base.ratelimit import RateLimit
 from bridge.canopen.emcy import Emergency
 
 _HISTORY: Final = 8
-"""As many as 1003h of most devices."""
+"""Length of the history, that of 1003h in most devices."""
 _BURST: Final = 16
 _EVERY_S: Final = 0.1
-"""A node tells its own inhibit time by 1015h; a babbling one keeps to nothing."""
+"""Time per report beyond the burst, in seconds. A node has its own inhibit time (1015h); a babbling one
+ignores it."""
 _MOST_PENDING: Final = 16
 
 
 class EmergencyLog:
-    """What one node has told: the last eight, and which of them may be told on.
+    """The last eight emergency messages of one node, and which of them may be reported.
 
-    ``number`` is the drive that an emergency is about, for nodes with several. Of what comes too fast
-    only the newest for each drive is kept and told later, so that the last word always arrives.
+    ``number`` is the drive that an emergency is about, for nodes with several. Of messages that come too fast
+    only the newest for each drive is kept and reported later, so that the last one always gets through.
     """
 
     def __init__(self) -> None:
@@ -32,10 +33,10 @@ class EmergencyLog:
         self._pending: dict[int | None, tuple[Emergency, float]] = {}
         self._due: float | None = None
         self.changed = True
-        """Since the last ``as_json``."""
+        """True if a message came since the last ``as_json``."""
 
     def add(self, emergency: Emergency, number: int | None, at: float) -> bool:
-        """True where it may be told now."""
+        """Record a message; True if it may be reported now."""
         self._history.appendleft(emergency)
         self.changed = True
         if not self._pending and self._limit.allows(at):
@@ -53,7 +54,8 @@ class EmergencyLog:
         return self._due
 
     def on_time(self, now: float) -> list[tuple[Emergency, int | None, float]]:
-        """What was held back and may be told now, with its drive and the time at which it came."""
+        """Messages that were held back and may be reported now, each with its drive and the time at which it
+        came."""
         if self._due is None or now < self._due:
             return []
         told: list[tuple[Emergency, int | None, float]] = []
@@ -65,7 +67,7 @@ class EmergencyLog:
         return told
 
     def as_json(self, text: Callable[[Emergency], str]) -> str:
-        """The history, newest first; ``text`` puts a message into the family's words."""
+        """History, newest first; ``text`` puts a message into the family's words."""
         self.changed = False
         return json.dumps(
             [

@@ -1,6 +1,6 @@
-"""Error control of one node: is it there, in which state, once or twice, does it start again and again?
+"""Error control of one node: presence, NMT state, duplicate node id, boot loop.
 
-What is known of the state is what the node has said, never what it was told.
+The state is always one that the node has reported, never one that it was commanded to.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from bridge.text import Text
 
 
 class Sign(Enum):
-    """What an error control message says."""
+    """Content of an error control message."""
 
     MALFORMED = "malformed"
     BOOT_UP = "boot-up"
@@ -35,7 +35,7 @@ class ErrorControl:
         self._table = table
         self._duplicates = DuplicateCheck()
         self.duplicate: DuplicateSign | None = None
-        """Sign in the frame that came last that two devices have this node id."""
+        """Sign in the latest frame that two devices have this node id."""
         self.boot_loop = BootLoop()
         self.state = NmtState.UNKNOWN
         self._toggle_errors_before = 0
@@ -47,7 +47,7 @@ class ErrorControl:
 
     @property
     def loss(self) -> Text:
-        """How a loss is called: error status E or F of CiA 302-2."""
+        """Text of a loss, with error status E or F of CiA 302-2."""
         if self._table.supervision != "guarding":
             what = Text.of("node.no_heartbeat", ms=self._table.supervision_ms)
             return Text.of("boot.failed_advised", letter="E", what=what, hint=HINTS["E"])
@@ -58,7 +58,7 @@ class ErrorControl:
 
     @property
     def toggle_errors(self) -> int:
-        """Answers to node guarding whose toggle bit was not the one that is due."""
+        """Number of answers to node guarding with a wrong toggle bit."""
         return self._supervisor.toggle_errors if isinstance(self._supervisor, NodeGuard) else 0
 
     def on_frame(self, frame: Frame) -> Sign:
@@ -79,7 +79,7 @@ class ErrorControl:
         return Sign.CHANGED
 
     def begin_await(self, state: NmtState | None) -> bool:
-        """The node is to report this state, or any; False where it never says its state."""
+        """Await a report of ``state``, or of any; False where the node never reports its state."""
         if self._supervisor is None:
             self.state = state or self.state
             return False
@@ -88,35 +88,35 @@ class ErrorControl:
         return True
 
     def assume(self, state: NmtState) -> None:
-        """The node is taken to be in this state until it says another one."""
+        """Take the node to be in this state until it reports another."""
         self.state = state
 
     def forget_boots(self) -> None:
-        """Whatever it is told now may make it start again."""
+        """Forget the restarts counted: a command may now cause another."""
         self.boot_loop = BootLoop()
 
     def on_foreign_request(self, frame: Frame) -> None:
-        """Another SDO client asks this node: its answers are not for us."""
+        """Note another SDO client's request to this node: its answer is not for us."""
         self._duplicates.on_foreign_request(frame.time)
 
     def on_reply(self, frame: Frame, *, matched: bool) -> None:
-        """An SDO answer; ``matched`` where it belonged to a request of ours."""
+        """Check an SDO answer for a duplicate node id; ``matched`` where it belonged to a request of ours."""
         self.duplicate = self._duplicates.on_reply(frame.data, frame.time, matched=matched)
 
     def produces_every(self, period_s: float | None) -> None:
-        """The heartbeat period that the node has kept at boot-up; None where there is none."""
+        """Set the heartbeat period that the node kept at boot-up; None for none."""
         self._duplicates.period_s = period_s
 
     def expect(self, now: float) -> None:
-        """From now on the node has to be heard."""
+        """Begin supervision: from now on the node has to be heard."""
         self._duplicates.restart()
         self._toggle_errors_before = self.toggle_errors
         if self._supervisor:
             self._supervisor.expect(now)
 
     def stop(self, now: float, *, lost: bool = False) -> None:
-        """No longer expect the node. A guarded one whose loss is only reported goes on being asked: there
-        is no other way to hear that it is back."""
+        """End supervision. A guarded node whose loss is only reported goes on being asked: there is no other
+        way to hear that it is back."""
         if self._supervisor is None:
             return
         self._supervisor.reset()

@@ -1,7 +1,7 @@
-"""Asks drives for the fault numbers that they keep themselves, such as P700 of a NORD drive.
+"""Reads the fault numbers that drives keep themselves, such as P700 of a NORD drive.
 
-A drive is asked when an emergency message came about it, and again and again while it is in the state
-*fault*; once more when that is over, so that a number that has gone is not shown any longer.
+A drive is asked after an emergency message about it, repeatedly while it is in the state *fault*, and once
+more after that, so that a fault that is gone is no longer shown.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from bridge.node.places.sdo_channels import SdoChannels
 
 _LOOK_S: Final = 0.5
 _AGAIN_S: Final = 1.0
-"""How often a drive in fault is asked."""
+"""Period of the reads while a drive is in fault."""
 
 
 @dataclass(slots=True)
@@ -33,7 +33,7 @@ class _FaultWatch:
 
 
 class FaultReading:
-    """The drives of one node. Nothing is asked where the family names no such parameter."""
+    """Fault reading for the drives of one node. Nothing is read where the family names no such parameter."""
 
     def __init__(self, node: Node, sdo: SdoChannels) -> None:
         faults, family = node.family.faults, node.family
@@ -55,7 +55,7 @@ class FaultReading:
                 self._drives[drive.name] = _FaultWatch(drive, sdo[number])
 
     def start(self, now: float) -> None:
-        """The node is in operation: each drive is asked once, for what it remembers."""
+        """Ask each drive once for its stored faults: the node is in operation."""
         if not self._drives:
             return
         self._look_at = now
@@ -66,7 +66,7 @@ class FaultReading:
         self._look_at = None
 
     def on_emcy(self, drive: Drive, now: float) -> None:
-        """An emergency message about this drive came."""
+        """Ask this drive at once: an emergency message about it came."""
         asked = self._drives.get(drive.name)
         if asked is not None and self._look_at is not None:
             asked.due = now

@@ -1,8 +1,8 @@
-"""How a node is taken out of operation without its drives running on. Sans-IO.
+"""Taking a node out of operation without leaving its drives running. Sans-IO.
 
-What stops a drive is its stopped word: NMT stop does not stop those of every family. So the command goes
-out when the words have been taken over, and a drive that cannot say any more whether it has stopped is
-told of (``command/stop_check/step.py``).
+A drive is stopped by its stopped word: NMT stop does not stop those of every family. So the NMT command goes
+out when the words have been taken over, and a drive that can no longer tell whether it has stopped is
+reported (``command/stop_check/step.py``).
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from bridge.node.wire import NodeWire
 
 
 class Leaving:
-    """Of one node. ``takes_words``: it may be in Operational, as far as is known."""
+    """Exit of one node from operation. ``takes_words``: whether it may be in Operational, as far as is
+    known."""
 
     def __init__(
         self, node: Node, wire: NodeWire, memory: BootMemory, takes_words: Callable[[], bool]
@@ -31,18 +32,18 @@ class Leaving:
 
     @property
     def is_due(self) -> bool:
-        """A command waits for stopped words to be taken over."""
+        """True while an NMT command waits for stopped words to be taken over."""
         return self._wire.put_off.command is not None
 
     @property
     def is_stopped_by_nmt(self) -> bool:
-        """Whether the node's drives do not run in the state Stopped."""
+        """Whether NMT stop stops the node's drives: they do not run in the state Stopped."""
         return self._node.family.family.stopped_by == "stop_node"
 
     @property
     def takeover_s(self) -> float:
-        """How long stopped words may take from the bus to the drives: 0 where they wait for no SYNC, or where
-        the node takes none any more."""
+        """Longest time in seconds that stopped words take from the bus to the drives: 0 where they wait for
+        no SYNC, or where the node no longer takes any."""
         return self._sync_s if self._takes_words() else 0.0
 
     @property
@@ -51,12 +52,12 @@ class Leaving:
         return max((*known, *(one.takeover_s for one in self._node.commanded)), default=0.0)
 
     def has_told(self, now: float) -> bool:
-        """Whatever gets process data has had stopped words for long enough to take them over."""
+        """Whether all that gets process data has had stopped words for long enough to take them over."""
         told = [one for one in self._node.commanded if self._wire.carries(one)]
         return all(one.stop_check.sent_for_s(now) >= self.takeover_s for one in told)
 
     def send(self, command: NmtCommand, now: float, *, at_once: bool = False) -> None:
-        """A command after which the node takes no words: when it has taken over the stopped ones.
+        """Send an NMT command after which the node takes no words, once it has taken over the stopped ones.
         ``at_once``: it has had them for long."""
         wait_s = 0.0 if at_once else self.takeover_s
         if wait_s or self.is_due:
@@ -65,8 +66,9 @@ class Leaving:
             self._wire.send_nmt(command)
 
     def silence(self, now: float, *, only_heard: bool = False) -> None:
-        """It leaves operation because we say so: its drives are not heard any more, and may still run.
-        ``only_heard``: the node itself is silent, and so nothing is known of a drive that is."""
+        """Cut off the drives, because we take the node out of operation: they are no longer heard and may
+        still run. ``only_heard``: the node itself is silent, and nothing is known of a drive that is silent,
+        too."""
         for drive in self._node.drives:
             if not only_heard or drive.channel.link.is_fresh(now):
                 drive.on_cut_off(now)
@@ -74,7 +76,7 @@ class Leaving:
     # what happens to the node
 
     def on_state(self, state: NmtState, now: float) -> None:
-        """The node has said its state."""
+        """Take a state that the node has reported."""
         if state is NmtState.OPERATIONAL:
             self._memory.is_at_rest = False
         if state is NmtState.STOPPED and self.is_stopped_by_nmt:
@@ -83,7 +85,7 @@ class Leaving:
                 drive.stop_check.on_node_stopped(now)
 
     def on_restart(self) -> None:
-        """The node has started: whatever it was told before is over."""
+        """Drop pending commands and the owed stop: the node has restarted."""
         self.forget()
         self.owed.settle()
         for drive in self._node.drives:
@@ -93,8 +95,8 @@ class Leaving:
         self._wire.put_off.clear()
 
     def tell(self, command: NmtCommand, now: float, *, takes_words: bool = False) -> None:
-        """Stopped words on all its identifiers, and then ``command``. ``takes_words``: it is in Operational,
-        whatever is known of it."""
+        """Send stopped words on all COB-IDs of the node, then ``command``. ``takes_words``: the node is taken
+        to be in Operational, whatever is known of it."""
         self._wire.send_stopped()
         if takes_words and self._sync_s:
             self._wire.put_off.begin(command, now, self._sync_s)

@@ -1,4 +1,4 @@
-"""Asks drives again what their words mean, while the node is in operation: somebody may have changed it at
+"""Repeated reads of what drives' words mean, while the node is in operation: somebody may have changed it at
 the drive's keypad, or with the maker's tool."""
 
 from __future__ import annotations
@@ -17,25 +17,26 @@ from bridge.node.boot import code_of, deciding_of, meanings_of, parameter_value
 from bridge.node.places.sdo_channels import SdoChannels
 
 _EVERY_S: Final = 8.0
-"""How old an answer is when it is asked for again: with the time that this takes a change is found within
+"""Age in seconds at which an answer is read again: with the time that this takes, a change is found within
 ``_BOUND_S``."""
 _BOUND_S: Final = 10.0
-"""Older answers are not taken for certain."""
+"""Age in seconds beyond which an answer is no longer taken for certain."""
 _LOOK_S: Final = 0.5
-"""How often it is looked what is due."""
+"""Period of the check for due reads, in seconds."""
 _PAUSE_S: Final = 1.0
-"""From a question that nobody has answered to the next one about the same."""
+"""Pause in seconds from an unanswered question to the next one about the same object."""
 _SHARE: Final = 0.25
-"""How much the newest answer counts in the time that answers take."""
+"""Weight of the newest answer in the mean response time."""
 _TURNS: Final = 3
-"""Transfers to one about a set that is not in use: the others are for what is polled."""
+"""Transfers for each one about a set that is not in use: the others are left to polling."""
 _SLOWEST: Final = 0.75
-"""How much of ``_EVERY_S`` may be kept for asking about the sets in use, where answers are slow."""
+"""Largest share of ``_EVERY_S`` that reads about the sets in use may take, where answers are slow."""
 
 
 @dataclass(slots=True, eq=False)
 class _Item:
-    """One object that decides what words mean. Times are when it was answered, and asked in vain."""
+    """One object that decides what words mean, with the times of its last answer and of the last attempt in
+    vain."""
 
     what: Meaning | Parameter
     in_set: int
@@ -51,7 +52,7 @@ class _Item:
 
 @dataclass(slots=True)
 class _WatchedDrive:
-    """One drive. ``items`` are those that count with the codes its words have."""
+    """Watch over one drive. ``items`` are the objects that count with the present codes of its words."""
 
     drive: Drive
     sdo: SdoChannel
@@ -60,22 +61,22 @@ class _WatchedDrive:
     """The codes for which ``items`` were chosen."""
     was_enabled: bool = False
     not_before: float = -math.inf
-    """Answers from before are asked for again."""
+    """Time before which answers do not count: those are read again."""
     answer_s: float = 0.0
-    """How long an answer takes."""
+    """Mean response time in seconds."""
     rest_at: float = -math.inf
-    """When a set that is not in use may be asked about."""
+    """Earliest time for the next read about a set that is not in use."""
     is_asking: bool = False
     run: int = 0
-    """Counts the times in operation: what is told late does not count."""
+    """Number of the present run in operation; answers from an earlier one do not count."""
 
 
 class MeaningWatch:
-    """The drives of one node. Nothing is asked where the family names no such parameters.
+    """Watch over the drives of one node. Nothing is read where the family names no such parameters.
 
-    Each answer is asked for again when it is some seconds old, the oldest first, and before all others those
-    that count in the parameter sets in use; all of them when the drive has been enabled, and when it says by
-    a TPDO that something has changed. ``now`` is the time of the last frame or timer.
+    Each answer is read again when it is some seconds old, oldest first, and those that count in the parameter
+    sets in use before all others; all of them when the drive has been enabled, and when it reports by a TPDO
+    that something has changed. ``now`` is the time of the last frame or timer.
     """
 
     def __init__(self, node: Node, sdo: SdoChannels) -> None:
@@ -91,7 +92,7 @@ class MeaningWatch:
                 self._drives.append(_WatchedDrive(drive, sdo[number]))
 
     def start(self, now: float) -> None:
-        """The node is in operation, and its drives have just been asked."""
+        """Begin: the node is in operation, and its drives have just been asked."""
         self.now = now
         if not self._drives:
             return
@@ -129,7 +130,8 @@ class MeaningWatch:
             self._ask(watched)
 
     def _choose(self, watched: _WatchedDrive, read_at: float) -> None:
-        """What is asked depends on the codes. What is new among it has been read at ``read_at``."""
+        """Choose the objects to read, by the present codes. New ones among them count as read at
+        ``read_at``."""
         drive = watched.drive
         codes = drive.channel.meanings.codes
         if codes is watched.codes and watched.items:
@@ -148,12 +150,13 @@ class MeaningWatch:
         watched.items = {one.key: before.get(one.key, one) for one in items}
 
     def _judge(self, watched: _WatchedDrive) -> None:
-        """What has not been answered for too long is in doubt."""
+        """Report objects without an answer for too long as being in doubt."""
         late = (key for key, one in watched.items.items() if self.now - one.read_at > _BOUND_S)
         watched.drive.news.on_overdue(frozenset(late), self.now)
 
     def _ask(self, watched: _WatchedDrive) -> None:
-        """The next question. Its answer leads to the one after it, so that others get their turn between."""
+        """Send the next read. Its answer leads to the one after it, so that other transfers get their turn in
+        between."""
         if watched.is_asking or self._look_at is None:
             return
         sets = _sets_in_use(watched.drive)
@@ -197,7 +200,7 @@ class MeaningWatch:
         watched.sdo.read(item.ref.index, item.ref.sub, self.now, done, priority=Priority.MEANING)
 
     def _told(self, drive: Drive, item: _Item, data: bytes | None) -> None:
-        """``data`` is None where the drive has refused it."""
+        """Pass an answer on to the drive; ``data`` is None where the drive has refused it."""
         if isinstance(item.what, Meaning):
             code = code_of(drive.family, item.what, data)
             drive.news.on_code(item.what, code, self.now, item.in_set)
@@ -210,7 +213,7 @@ class MeaningWatch:
 
 
 def _sets_in_use(drive: Drive) -> Sequence[int]:
-    """That of the drive's status word, and that which is commanded."""
+    """The parameter set of the drive's status word, and the commanded one."""
     family, channel = drive.family, drive.channel
     actual = ParameterSet(family.status_word.parameter_set_bits).of(channel.drive_status_word)
     return actual, ParameterSet(family.control_word.parameter_set_bits).of(channel.control_word)

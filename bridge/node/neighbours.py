@@ -1,4 +1,4 @@
-"""What a node and its network are to each other."""
+"""Interfaces by which a node and its network see each other."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Neighbour(Protocol):
 
     @property
     def is_ready(self) -> bool:
-        """Operational, or booted and waiting to be started."""
+        """True if it is operational, or booted and waiting to be started."""
         ...
 
     @property
@@ -25,12 +25,12 @@ class Neighbour(Protocol):
 
     @property
     def is_on_its_way(self) -> bool:
-        """Being booted, or not asked yet."""
+        """True while it is booted, or before it has been looked for."""
         ...
 
     @property
     def is_out_of_service(self) -> bool:
-        """An operator has switched it off or stopped it: nobody waits for it."""
+        """True if an operator has switched it off or stopped it: nobody waits for it."""
         ...
 
     def next_deadline(self) -> float | None: ...
@@ -40,11 +40,11 @@ class Neighbours(Protocol):
     """The network as one of its nodes needs it."""
 
     def touched(self, node: Neighbour) -> None:
-        """Something happened to the node beyond a sign of life: look at its frames and deadlines."""
+        """Look at the node's frames and deadlines: more than a sign of life has happened to it."""
         ...
 
     def started_anew(self, node: Neighbour) -> None:
-        """Its boot-up message has come: what was sent to it before is forgotten."""
+        """Take the node's boot-up message: what was sent to it before is forgotten."""
         ...
 
     def may_start(self, node: Neighbour) -> bool: ...
@@ -54,9 +54,9 @@ class Neighbours(Protocol):
     def duplicate(self, node: Neighbour, sign: DuplicateSign, now: float) -> None: ...
 
     def is_taken(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether another node of the bus has something on this identifier."""
+        """Whether another node of the bus uses this identifier."""
         ...
 
     def is_foreign(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether it is that of another node, or will be by the site's files."""
+        """Whether this identifier is another node's, or will be by the site's files."""
         ...

@@ -33,11 +33,11 @@ NMT: Final = {
     Action.ENTER_PRE_OPERATIONAL: NmtCommand.ENTER_PRE_OPERATIONAL,
 }
 _AFTER_RESET_S: Final = 1.0
-"""A node that resets is asked again after this time if its boot-up message was not heard."""
+"""Time in seconds after which a reset node is asked again if its boot-up message was not heard."""
 
 
 class CommandedNode(Protocol):
-    """A node that commands come for."""
+    """A node as commands see it."""
 
     @property
     def node(self) -> Node: ...
@@ -76,11 +76,11 @@ def answer(
     now: float,
     reply: Reply,
 ) -> bool:
-    """A request for these nodes, ``name`` in the log; True where it was carried out and one frame is to be
-    sent to them all.
+    """Answer a request for these nodes, ``name`` in the log; True where it was carried out and one frame is
+    to be sent to them all.
 
-    For a whole bus all commands but Start go out as one frame, which the caller sends: an unchecked node
-    is not started. Where a node has to take over its stopped words first each gets its own.
+    For a whole bus all commands but Start go out as one frame, which the caller sends: an unchecked node is
+    not started. Where a node has to take over its stopped words first, each node gets its own frame.
     """
     is_bus = request.target.startswith("bus/")
     why = refusal(request, [commanded for one in nodes for commanded in one.node.commanded])
@@ -103,10 +103,10 @@ def answer(
 
 
 def refusal(request: Request, commanded: Sequence[Commanded]) -> Text | None:
-    """Why this identity may not command the node now, or None if it may.
+    """Reason why this identity may not command the node now; None if it may.
 
-    A command on the node touches all its drives, so nobody gives one while another identity controls
-    one of them; an engineer may.
+    A command on the node affects all its drives, so nobody gives one while another identity controls one of
+    them; an engineer may.
     """
     if request.identity.role < Role.OPERATOR:
         return Text.of("request.may_only_read", who=str(request.identity))
@@ -129,7 +129,7 @@ def carry_out(
     send: bool = True,
     at_once: bool = False,
 ) -> None:
-    """Do what ``action`` asks of a node. ``send`` is false where one frame tells all nodes; ``at_once``: its
+    """Carry out ``action`` on a node. ``send`` is false where one frame tells all nodes; ``at_once``: its
     drives have had their stopped words for long."""
     if action in NMT:
         _nmt(node, NMT[action], who, now, send=send, at_once=at_once)
@@ -147,7 +147,8 @@ def carry_out(
 def _nmt(
     node: CommandedNode, command: NmtCommand, who: Words, now: float, *, send: bool, at_once: bool
 ) -> None:
-    """NMT on a node that is switched off goes on the bus and changes nothing here."""
+    """Carry out an NMT command. For a node that is switched off it goes on the bus and changes nothing
+    here."""
     if command is NmtCommand.START and node.state is not NodeState.OPERATIONAL:
         # It is booted first, and started at the end of that: an unchecked node gets no process data.
         if node.state is NodeState.DISABLED:

@@ -29,7 +29,7 @@ from bridge.text import Said, Text, Words
 
 _SETTLE_S: Final = 2.0
 _OWN_RESET_S: Final = 30.0
-"""A boot-up message within this time is the answer to our own reset."""
+"""Time in seconds within which a boot-up message is the answer to our own reset."""
 
 
 BUS_IS_DOWN: Final = Text.of("bus.is_down")
@@ -64,17 +64,17 @@ class NodeCore:
         self.parameters = NodeParameters(node, side, lambda: self.sdo)
         self.boot_at: float | None = 0.0
         self.has_concluded = False
-        """Whether a boot-up has ended, well or not, since the bus is there."""
+        """Whether a boot-up has ended, well or not, since the bus came up."""
         self.told: NmtCommand | None = None
-        """The NMT command that it was told last and that keeps it out of Operational."""
+        """Last NMT command to the node, if it keeps it out of Operational."""
         self._held_by_reset_at = float("-inf")
-        """When it was reset though it is to stay stopped."""
+        """Time at which the node was last reset although it is to stay stopped."""
         self._reset_at = float("-inf")
-        """When a boot-up has last reset the node, or its communication."""
+        """Time of our last reset of the node, or of its communication."""
         self._back_off = BackOff()
         self._last_boot = float("-inf")
         self.started_at = float("-inf")
-        """When it has said last that it has started."""
+        """Time of the node's last boot-up message."""
         self._operational_since = 0.0
         if not table.enabled:
             self.boot_at = None
@@ -83,7 +83,7 @@ class NodeCore:
         self._show(side.began)
 
     def _on_sign(self, sign: Sign, now: float) -> None:
-        """An error control message."""
+        """Take an error control message."""
         if sign is Sign.SAME and self.is_operational and self.error_control.state is NmtState.OPERATIONAL:
             return
         self._touch()
@@ -100,7 +100,7 @@ class NodeCore:
             self._judge_nmt_state(now)
 
     def _on_boot_up(self, now: float) -> None:
-        """The node has started: whatever it was told before is forgotten."""
+        """Take a boot-up message: whatever the node was told before is forgotten."""
         self.started_at = now
         self._neighbours.started_anew(self)
         self.told = None
@@ -146,7 +146,7 @@ class NodeCore:
                 self.boot_at = self._soon(now)
 
     def _heard_again(self, now: float) -> None:
-        """Heard again without a boot-up message: the cable was the fault, not the node."""
+        """Go on with a node that is heard without a boot-up message: the cable was at fault, not the node."""
         reaction = self.table.on_loss
         if self.error_control.boot_loop.is_looping:
             return
@@ -157,39 +157,39 @@ class NodeCore:
             self.boot_at = self._soon(now)
 
     def _soon(self, now: float) -> float:
-        """When a node that is there may be booted, by the time since the boot-up before."""
+        """Earliest time to boot a node that is there, counted from the boot-up before."""
         return max(now, self._last_boot + self._back_off.between_boots_s)
 
     @property
     def sdo(self) -> SdoChannels:
-        """For whoever wants a transfer: the node's deadlines are looked at in the next round."""
+        """SDO channels, for a new transfer: the node's deadlines are looked at in the next round."""
         self._touch()
         return self.wire.sdo
 
     def boot_next(self, at: float | None) -> None:
-        """Then, or at once when it is past; None: not until somebody asks for it."""
+        """Schedule the next boot-up, at once if ``at`` is past; None: only on request."""
         self.boot_at = at
 
     @property
     def is_held(self) -> bool:
-        """It was told to leave Operational, and nobody has asked for it since."""
+        """True if it was told to leave Operational, and nobody has asked for it since."""
         return self.told is not None and self.state not in (NodeState.OPERATIONAL, NodeState.BOOTING)
 
     def hold_again(self, now: float) -> None:
-        """Somebody else may have brought it back."""
+        """Repeat the command: somebody else may have brought the node back."""
         if self.told is not None:
             self.leaving.tell(self.told, now, takes_words=True)
             self._touch()
 
     def hold_by_reset(self, now: float) -> None:
-        """Neither words nor NMT stop keep its drives from running: it starts anew, and stays stopped."""
+        """Reset the node and keep it stopped: neither words nor NMT stop keep its drives from running."""
         self._reset_at = self._held_by_reset_at = now
         self.wire.send_stopped()
         self.wire.send_nmt(NmtCommand.RESET_NODE)
         self._touch()
 
     def was_told(self, command: NmtCommand) -> None:
-        """This NMT command was the last one it got."""
+        """Note the NMT command that was sent to the node last."""
         self.told = command if command in CANCELS_WORDS else None
 
     # time
@@ -308,8 +308,8 @@ class NodeCore:
         self.boot_at = now + self._back_off.failed(absent=error.absent)
 
     def _stop_unbooted(self, now: float) -> None:
-        """Nobody watches over its drives: they are told to stop, and it to take no more words. Also where
-        it seems to be absent: it may hear all the same, and our heartbeat would keep it running."""
+        """Stop a node that could not be booted, and its drives, which nobody supervises. Also where it seems
+        absent: it may still hear, and our heartbeat would keep it running."""
         self.stop_drives(now)
         self.wire.send_stopped()
         self.told = NmtCommand.STOP
@@ -320,11 +320,11 @@ class NodeCore:
             self.leaving.send(NmtCommand.STOP, now)
 
     def enforce(self, action: Action, why: Said, now: float) -> None:
-        """Because somebody ignores a stop whose words have been on the bus for long."""
+        """Carry out ``action``, because a stop whose words have been on the bus for long is ignored."""
         self.carry_out_command(action, why, now, at_once=self.leaving.has_told(now))
 
     def tell_habits(self, now: float) -> None:
-        """Tell what its frames have that the standard does not allow, where there are news of that."""
+        """Report deviations of its frames from the standard, if there are new ones."""
         if self.is_operational and (news := self.wire.habits.take_news()):
             habits = self.wire.habits.habits()
             self._view.shows_habits([*map(text_of_habit, news)], [*map(text_of_habit, habits)], now)
@@ -332,7 +332,7 @@ class NodeCore:
     # states
 
     def _lose(self, why: Text, now: float) -> None:
-        """The node is silent, or not in the state it was put in."""
+        """Handle a node that is silent, or not in the state it was put in."""
         self.error_control.assume(NmtState.UNKNOWN)
         if not self.is_operational and not self.booting.is_held:
             self.error_control.stop(now, lost=self.state is NodeState.LOST)
@@ -359,7 +359,7 @@ class NodeCore:
             self._neighbours.stop_others(self, Text.of("node.is_lost", node=self.node.name), now)
 
     def stop_drives(self, now: float) -> None:
-        """Every drive of the node has to be enabled anew, and its outputs be written anew."""
+        """Require every drive of the node to be enabled anew, and its outputs to be written anew."""
         for one in self.node.commanded:
             one.channel.start_anew(now)
 
@@ -369,10 +369,10 @@ class NodeCore:
         self.booting.cancel(now)
 
     def hold(self, why: Text, now: float) -> None:
-        """All nodes are stopped: leave operation, and be booted up to the point where it would start.
+        """Leave operation, because all nodes are stopped, and boot up as far as the start.
 
-        Whoever is in operation or at its boot-up begins again, and so does a node that cannot be used: it
-        stays no longer in Stopped than it has to. The others are woken when their time comes.
+        A node in operation or at its boot-up begins again, and so does one that cannot be used: it stays in
+        Stopped no longer than it has to. The others are woken when their time comes.
         """
         self.stop_drives(now)
         begins_again = self.is_operational or self.booting.is_running
@@ -387,7 +387,7 @@ class NodeCore:
             self.boot_at = now + BETWEEN_BOOTS_S
 
     def bus_is_gone(self, now: float, why: Text = BUS_IS_DOWN) -> None:
-        """The bus is down, or another's: everything on it is lost at once."""
+        """Lose the node at once, with all others: the bus is down, or another bridge's."""
         self.error_control.assume(NmtState.UNKNOWN)
         self.stop_drives(now)
         self.wire.clear()
@@ -403,12 +403,12 @@ class NodeCore:
 
     @property
     def _stays_stopped(self) -> bool:
-        """It was stopped, and nobody boots it by itself."""
+        """Whether the node was stopped, and nothing boots it by itself."""
         gave_up = self.boot_at is None and self.state is NodeState.LOST and self.table.on_loss == "stop_node"
         return self.state is NodeState.STOPPED or gave_up
 
     def bus_is_back(self, now: float) -> None:
-        """Whether a node that stays stopped has had its command is not known: it gets that once more."""
+        """Repeat the command to a node that stays stopped: nobody knows whether it has had it."""
         self.stop_drives(now)
         if self._stays_stopped:
             self.leaving.tell(self.told or NmtCommand.STOP, now, takes_words=True)
@@ -433,7 +433,7 @@ class NodeCore:
 
     @property
     def sends_process_data(self) -> bool:
-        """RPDOs go on while it is lost, for it may hear us, and until it has taken over its last ones."""
+        """Whether RPDOs are sent: also to a lost node, which may hear, and until the last are taken over."""
         states = (NodeState.OPERATIONAL, NodeState.LOST, NodeState.DISABLED)
         return self.leaving.is_due or self.state in states
 
@@ -444,7 +444,7 @@ class NodeCore:
         self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
 
     def _count_write(self, owner: str, address: str, name: str) -> Said:
-        """The boot-up writes to an EEPROM: counted as of its beginning."""
+        """Count a boot-up's write to an EEPROM, as of its beginning; returns a warning or an empty text."""
         ledger, eeprom = self._ledger, self.node.family.eeprom
         cycles = eeprom.cycles if eeprom else None
         ledger.check((owner, address), name, self._last_boot, cycles)
@@ -453,7 +453,7 @@ class NodeCore:
     def carry_out_command(
         self, action: Action, who: Words, now: float, *, send: bool = True, at_once: bool = False
     ) -> None:
-        """A command that may be given; ``send`` is false where one frame has told all nodes."""
+        """Carry out a permitted command; ``send`` is false where one frame has told all nodes."""
         self.error_control.forget_boots()
         self._back_off.reset()
         if action in (Action.RESET, Action.RESET_COMMUNICATION):

@@ -1,4 +1,4 @@
-"""How a node is shown: its points of state and boot-up, and the events about it."""
+"""Points of a node's state and boot-up, and the events about the node."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ class NodeView:
         self._identification: Identification | None = None
 
     def say(self, said: Text, now: float) -> None:
-        """Step or result of the boot-up."""
+        """Show a step or the result of the boot-up."""
         self._say("boot_status", said, now)
 
     def _say(self, leaf: str, said: Said, now: float) -> None:
         self._image.say(self._image.index[f"{self._top}/{leaf}"], said, now)
 
     def is_in(self, state: NodeState, now: float) -> None:
-        """Where the master has the node."""
+        """Show the state in which the master has the node."""
         self._image.put(f"{self._top}/state", NODE_CODES[state], now)
 
     def went(self, state: NodeState, now: float) -> None:
-        """Event of a node that is lost, or in operation again."""
+        """Report a node that is lost, or in operation again."""
         if state is NodeState.LOST:
             self._tell(EventKind.NODE_LOST, 800, Text.of("node.lost"), now)
         elif state is NodeState.OPERATIONAL:
@@ -64,7 +64,7 @@ class NodeView:
         self.say(said, now)
 
     def failed(self, error: BootError, now: float) -> None:
-        """The boot-up has failed; each way of failing is an event once until it succeeds."""
+        """Show a failed boot-up; each kind of failure is an event once until a boot-up succeeds."""
         self.say(error.said, now)
         failure = error.letter, error.what
         if self._failure != failure:
@@ -73,21 +73,22 @@ class NodeView:
             self._tell(EventKind.CONFIGURATION, 600, said, now)
 
     def errors(self, said: Said, now: float) -> None:
-        """What the node says of its errors, empty where it has none; an event when it is something else."""
+        """Show the errors that the node reports, empty if it has none; new ones are an event."""
         self._say("device_errors", said, now)
         if said and said != self._errors:
             self._tell(EventKind.EMERGENCY, 300, Text.of("node.says", errors=said), now)
         self._errors = said
 
     def shows_habits(self, news: Sequence[Text], habits: Sequence[Text], now: float) -> None:
-        """``news`` are habits of the node in operation that are to be told, ``habits`` all of them."""
+        """Report ``news``, habits of the node in operation that were not reported yet, and show ``habits``,
+        all of them."""
         for said in news:
             self._tell(EventKind.CONFIGURATION, 300, said, now)
         self.say(Text.of("boot.noted", outcome=self._success, notes=tuple(habits)), now)
 
     def identified(self, found: Identification, now: float) -> bool:
-        """Who the node is, by a boot-up that has succeeded. True where that is somebody else than before,
-        which is an event."""
+        """Note the identity that a successful boot-up has found. True, and an event, if it is another device
+        than before."""
         before, self._identification = self._identification, found
         if before is None:
             return False
@@ -104,13 +105,13 @@ class NodeView:
         self._tell(EventKind.NODE_LOST, 800, Text.of("node.restarted"), now)
 
     def loops(self, loop: BootLoop, now: float) -> None:
-        """Once a minute, where the node starts again and again."""
+        """Report a boot loop, at most once a minute."""
         told = loop.report(now)
         if told:
             self._tell(EventKind.CONFIGURATION, 600, told, now)
 
     def flaps(self, back_off: BackOff, now: float) -> None:
-        """Once a minute, where the node is lost soon after each boot-up."""
+        """Report a node that is lost soon after each boot-up, at most once a minute."""
         told = back_off.report(now)
         if told:
             self._tell(EventKind.NODE_LOST, 800, told, now)

@@ -1,6 +1,6 @@
 """The stop that the bridge owes a node for what it has enabled there. Sans-IO.
 
-Much makes the bridge silent towards a node: another bridge, a bus that goes, a command, a boot-up. None of it
+Many things silence the bridge towards a node: another bridge, a lost bus, a command, a boot-up. None of them
 may come before the stop, so the debt is kept apart from the node's state, and whoever ends the sending asks
 here.
 """
@@ -12,15 +12,15 @@ from bridge.command.node import Node
 
 
 class OwedStop:
-    """A debt begins with the first word that enables a drive or an output. It ends when that is known to
-    follow its stop, when the node has started anew, or when stopped words and an NMT stop have gone out."""
+    """Debt that begins with the first word that enables a drive or an output. It ends when that is known to
+    follow its stop, when the node has restarted, or when stopped words and an NMT stop have gone out."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self._enabled: set[Commanded] = set()
 
     def note(self) -> None:
-        """What the channels put out is about to be repeated on the bus."""
+        """Note the channels' output, which is about to be repeated on the bus."""
         for one in self._node.commanded:
             if is_enabling(one):
                 self._enabled.add(one)
@@ -29,9 +29,9 @@ class OwedStop:
 
     @property
     def is_open(self) -> bool:
-        """Something may still run as the bridge has told it."""
+        """True if something may still run as the bridge has told it to."""
         return any(is_enabling(one) or not has_followed(one) for one in self._enabled)
 
     def settle(self) -> None:
-        """The node has had its stop, or has started anew."""
+        """Settle the debt: the node has had its stop, or has restarted."""
         self._enabled.clear()

@@ -16,15 +16,15 @@ CANCELS_WORDS: Final = (
     NmtCommand.ENTER_PRE_OPERATIONAL,
     NmtCommand.RESET_COMMUNICATION,
 )
-"""What leaves Operational with drives that may go on as they were told."""
+"""NMT commands that leave Operational with drives that may go on as they were told."""
 _ROUND_S: Final = 0.001
-"""SYNC that is due in this round goes out at its end: the command follows in the next one."""
+"""Delay in seconds to the next round: a SYNC that is due in this one goes out at its end."""
 _LATE_S: Final = 0.02
-"""A process that is later than this may have sent no SYNC meanwhile."""
+"""Delay in seconds beyond which a late process may have sent no SYNC meanwhile."""
 
 
 class PutOff:
-    """At most one command. Times are monotonic seconds."""
+    """At most one delayed NMT command. Times are monotonic seconds."""
 
     def __init__(self) -> None:
         self.command: NmtCommand | None = None
@@ -33,8 +33,8 @@ class PutOff:
         self._is_last = False
 
     def begin(self, command: NmtCommand, now: float, wait_s: float) -> None:
-        """``command`` in ``wait_s``, or when the one that waits already would have gone out: who asks
-        again and again does not put it off for ever."""
+        """Delay ``command`` by ``wait_s``, or until the one that waits already would have gone out: repeated
+        requests do not put it off for ever."""
         if self.command is None:
             self._at, self._wait_s, self._is_last = now + wait_s, wait_s, False
         self.command = command
@@ -43,7 +43,7 @@ class PutOff:
         self.command = None
 
     def on_time(self, now: float) -> NmtCommand | None:
-        """The command, if it is to go out now. A process that comes late waits once more, and only once."""
+        """The command, if it is to go out now. A late process waits once more, and only once."""
         if self.command is None or now < self._at:
             return None
         if not self._is_last:

@@ -1,7 +1,8 @@
-"""Reads the outputs of a node that is no drive: whether they have what the last stop gives them.
+"""Reads back the outputs of a node that is no drive: whether they have the values that the last stop gives
+them.
 
-``command/stop_check/output_check.py`` says when, and what it means. One is asked for after the other,
-so that other transfers get their turn.
+``command/stop_check/output_check.py`` decides when, and what an answer means. Outputs are read one after the
+other, so that other transfers get their turn.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ from bridge.node.places.sdo_channels import FIRST, SdoChannels
 from bridge.text import Text
 
 _EXPEDITED: Final = 4
-"""Some servers answer every read of a number with so many bytes. Any other length is another object."""
+"""Length in bytes with which some servers answer every read of a number. Any other length is another
+object."""
 
 
 class ReadBack:
-    """``now`` is the time of the last frame or timer."""
+    """Read-back of one node's outputs. ``now`` is the time of the last frame or timer."""
 
     def __init__(self, outputs: Outputs, sdo: SdoChannels) -> None:
         self._outputs = outputs

@@ -1,4 +1,4 @@
-"""What one node sends and is sent: routes, SDO, emergencies, error control, process data. Sans-IO."""
+"""Traffic of one node: routes, SDO, emergencies, error control, process data. Sans-IO."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ _EMCY_BYTES: Final = 8
 
 @dataclass(frozen=True, slots=True)
 class WireEvents:
-    """Who is told what comes in, and knows the other nodes."""
+    """Receivers of what one node sends, and what its network knows of the other nodes."""
 
     on_sign: Callable[[Sign, float], None]
-    """An error control message, and when it came."""
+    """Takes an error control message and the time at which it came."""
     touch: Callable[[], None]
-    """Something came that may change frames to be sent or deadlines."""
+    """Notes a frame that may change frames to be sent or deadlines."""
     on_duplicate: Callable[[DuplicateSign, float], None]
-    """Two devices seem to have this node id."""
+    """Takes a sign that two devices have this node id, and its time."""
     is_taken: Callable[[int], bool]
     is_foreign: Callable[[int], bool]
-    """Whether an identifier is another node's, as ``Neighbours`` says it."""
+    """Whether an identifier is another node's, as in ``Neighbours``."""
 
 
 class NodeWire:
-    """``rejected`` counts frames that did not fit what the node says it sends."""
+    """Frames from and to one node. ``rejected`` counts those that do not fit what the node says it sends."""
 
     def __init__(self, node: Node, side: BusSide, listener: WireEvents, stop_words: StopWords) -> None:
         self._node = node
@@ -66,7 +66,7 @@ class NodeWire:
         self.rejected = 0
         self.habits = HabitCounter()
         self._mapped_bytes: dict[int, int] = {}
-        """Length of each TPDO, by its COB-ID."""
+        """Length of each TPDO in bytes, by COB-ID."""
         self.faults = FaultReading(node, self.sdo)
         self.meanings = MeaningWatch(node, self.sdo)
         outputs = [one for device in node.devices for one in device.commanded]
@@ -77,7 +77,7 @@ class NodeWire:
         self.polling = Polling(node.family.poll, self.sdo.for_polls, side.image, f"{node.name}/node")
         self.drives: dict[str, DrivePdos] = {}
         self.output_pdos: dict[str, OutputPdos] = {}
-        """The PDOs of outputs, by their names, as ``drives`` has those of drives."""
+        """PDOs of outputs, by output name; ``drives`` has those of drives."""
         self._no_rpdo: dict[str, Said] = {one.name: Text.of("unsent.no_rpdo") for one in outputs}
         self._left_out = self._no_rpdo
         self._emcy_id: int | None = cobid.EMCY + node.table.id
@@ -85,7 +85,7 @@ class NodeWire:
         self.routes_changed = True
         self._frames: list[Frame] = []
         self.put_off = PutOff()
-        """The NMT command that waits for stopped words to be taken over; stopped words go on until then."""
+        """NMT command that waits until stopped words are taken over; these go on until then."""
 
     def _basic_routes(self) -> dict[int, Handler]:
         routes: dict[int, Handler] = {
@@ -99,12 +99,12 @@ class NodeWire:
         return routes
 
     def carries(self, one: Commanded) -> bool:
-        """The boot-up has found RPDOs by which it is commanded."""
+        """Whether the boot-up has found RPDOs that command ``one``."""
         return one.name in self.drives or one.name in self.output_pdos
 
     @property
     def pdos(self) -> Sequence[DrivePdos | OutputPdos]:
-        """By which the node is commanded."""
+        """PDOs that command the node, of its drives and its outputs."""
         return [*self.drives.values(), *self.output_pdos.values()]
 
     def why_left_out(self, one: Commanded) -> Text:
@@ -112,28 +112,28 @@ class NodeWire:
         return self._left_out.get(one.name) or Text.of("unsent.no_pdos")
 
     def take_routes(self) -> dict[int, Handler]:
-        """Who gets which identifier; no news any more until it changes."""
+        """Handlers by COB-ID; marks them as taken until they change."""
         self.routes_changed = False
         return self.routes
 
     def take_frames(self, *, only_commands: bool = False) -> list[Frame]:
-        """``only_commands``: nothing but words and NMT goes out, and what was to be asked is dropped."""
+        """Frames to be sent now. ``only_commands``: process data and NMT alone, all requests are dropped."""
         asked = self.sdo.take_frames() + self.error_control.take_frames() + self.polling.take_frames()
         commands, self._frames = self._frames, []
         return commands if only_commands else commands + asked
 
     def clear(self) -> None:
-        """Send nothing that waits: the bus is gone."""
+        """Drop all that waits to be sent: the bus is gone."""
         self._frames.clear()
         self.put_off.clear()
 
     def send_nmt(self, command: NmtCommand) -> None:
-        """Now, and nothing that waits after it."""
+        """Send ``command`` now, and drop the one that waits."""
         self.put_off.clear()
         self._frames.append(nmt.command(command, self._node.table.id))
 
     def carry_out(self, action: boot.Action) -> None:
-        """What a boot-up has sent and needs no answer."""
+        """Send what the boot-up asks for and needs no answer to."""
         match action:
             case boot.SendNmt(command):
                 self.send_nmt(command)
@@ -197,7 +197,7 @@ class NodeWire:
             self._listener.on_duplicate(self.error_control.duplicate, at)
 
     def reject(self, frame: Frame, why: Text) -> None:
-        """A frame that does not fit: counted, told at most once a minute, nothing changed."""
+        """Count and report a frame that does not fit, at most once a minute; it changes nothing."""
         self.rejected += 1
         due = self._mapped_bytes.get(frame.can_id, len(frame.data))
         if due != len(frame.data):
@@ -217,13 +217,13 @@ class NodeWire:
         self.send_put_off(now)
 
     def _tell_learned(self, now: float) -> None:
-        """Something is learned when a transfer ends well, which an answer brings about."""
+        """Report what was learned: that happens when a transfer ends well, which an answer brings about."""
         for learned in self.sdo.take_learned():
             said = Text.of("node.no_block_transfer", why=text_of_learned(learned))
             self._events.report(Event(now, EventKind.CONFIGURATION, self._node.name, 300, said))
 
     def send_put_off(self, now: float) -> None:
-        """The NMT command that waits, if its time has come."""
+        """Send the NMT command that waits, if its time has come."""
         command = self.put_off.on_time(now)
         if command is not None:
             self.send_nmt(command)
@@ -242,7 +242,7 @@ class NodeWire:
         return min((time for time in times if time is not None), default=None)
 
     def start_polling(self, now: float) -> None:
-        """The node is in operation: ask it what has to be asked for."""
+        """Begin all polling: the node is in operation."""
         self.polling.start(self.drives.values(), now)
         self.faults.start(now)
         self.meanings.start(now)
@@ -282,7 +282,7 @@ class NodeWire:
             self.output_pdos = {outputs.name: pdos} if pdos else {}
 
     def _usable_emcy_id(self, result: boot.BootResult) -> int | None:
-        """Where emergency messages come, unless that is somebody else's."""
+        """COB-ID of the emergency messages; the default one where the node's own belongs to another node."""
         default = cobid.EMCY + self._node.table.id
         wanted = result.emcy_id
         if wanted in (None, default) or not self._listener.is_taken(wanted):
@@ -296,7 +296,7 @@ class NodeWire:
 
 
 def _tpdos(result: boot.BootResult) -> Iterator[boot.PdoPlan]:
-    """All that the node sends and the bridge takes."""
+    """TPDOs of the node that the bridge receives."""
     for plan in result.drives.values():
         yield from plan.tpdos
     for of_node in result.node_tpdos:

@@ -1,4 +1,4 @@
-"""What the boot-up asks of the one who runs it, and what it finds."""
+"""Requests of a boot-up to whoever runs it, and its result."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from bridge.text import Said, Text
 
 @dataclass(frozen=True, slots=True)
 class BootStep:
-    """What the boot-up is doing now, for ``boot_status``; ``letter`` is the error status if it fails.
+    """Present step of the boot-up, for ``boot_status``; ``letter`` is the error status if it fails.
 
-    ``needed_by`` is the key in the site file, or in ``mapping``, that asks for it; empty: nothing does, and
-    a node that answers it wrongly or not at all is used all the same.
+    ``needed_by`` is the key in the site file, or in ``mapping``, that requires the step. Empty: nothing
+    requires it, and a node that answers wrongly or not at all is used all the same.
     """
 
     what: Text
@@ -36,21 +36,20 @@ class BootStep:
 
     @property
     def said(self) -> Text:
-        """What it does, and who needs that."""
+        """The step, and the key that requires it."""
         if not self.needed_by:
             return self.what
         return Text.of("boot_step.needed", step=self.what, rule=self.needed_by)
 
 
 class BootSignal(Enum):
-    """Steps that need no more words."""
+    """Steps without arguments."""
 
     FOUND = "the node is there"
     SEND_STOPPED = "stopped words"
-    """To every drive, by every identifier under which it may listen: the node may still be operational."""
+    """To every drive, on every COB-ID on which it may listen: the node may still be operational."""
     WAKE = "enter pre-operational"
-    """For a node that does not answer, after a stopped word for every drive: it may be stopped, and does not
-    answer SDO then."""
+    """For a node that does not answer, after a stopped word for every drive: in Stopped it answers no SDO."""
     START_SUPERVISION = "from now on the node is expected to be heard"
     AWAIT_RELEASE = "wait until the network lets the node start"
     """Start order and mandatory nodes decide. No time limit."""
@@ -63,15 +62,15 @@ class SendNmt:
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """Go on after this time, in seconds."""
+    """Pause before the next step, in seconds."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class Await:
-    """Wait until the node reports this state, or any with None. Without supervision there is nothing
-    to wait for."""
+    """Wait until the node reports ``state``, or any state if None. Without supervision the node reports none,
+    and there is no wait."""
 
     state: NmtState | None
     timeout_s: float
@@ -79,8 +78,8 @@ class Await:
 
 @dataclass(frozen=True, slots=True)
 class DeviceErrors:
-    """What the node says of its errors: 1001h, the newest codes of 1003h, and both in words (empty where it
-    has none)."""
+    """Errors that the node reports: 1001h, the newest codes of 1003h, and both as a text (empty if there is
+    none)."""
 
     register: int = 0
     codes: tuple[int, ...] = ()
@@ -88,7 +87,7 @@ class DeviceErrors:
 
     @property
     def cause(self) -> tuple[int, int]:
-        """By which an error is known again."""
+        """Key by which an error is recognised: error register and newest code, 0 for none."""
         return self.register, self.codes[0] if self.codes else 0
 
 
@@ -106,8 +105,8 @@ Action = (
 
 @dataclass(frozen=True, slots=True)
 class NodePdoPlan:
-    """A TPDO of the node itself: which polls it saves. ``names`` has one for each entry, "" for what
-    nobody shows."""
+    """A TPDO of the node itself, which makes polls unnecessary. ``names`` has the name of each entry's poll,
+    "" for an entry that is not shown."""
 
     pdo: PdoPlan
     names: tuple[str, ...]
@@ -115,9 +114,9 @@ class NodePdoPlan:
 
 @dataclass(slots=True)
 class DrivePlan:
-    """The PDOs of one drive, those with control and status word first, or the reason why it cannot be
-    served. ``unserved`` has the reason for each word that they do not carry, and for each value of a word
-    that they carry in part, by its leaf such as ``actual/value_2``."""
+    """PDOs of one drive, those with the control and the status word first, or the ``problem`` for which it
+    cannot be served. ``unserved`` has the reason for each word that they do not carry, and for each value of
+    a word that they carry in part, by leaf, such as ``actual/value_2``."""
 
     rpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
     tpdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
@@ -125,14 +124,14 @@ class DrivePlan:
     unserved: dict[str, Text] = field(default_factory=dict[str, Text])
 
     def leave_out(self, why: Text) -> None:
-        """It cannot be served; the first reason counts."""
+        """Mark the drive as not served; the first reason counts."""
         self.problem = self.problem or why
 
 
 @dataclass(slots=True)
 class SignalPlan:
-    """The TPDOs or the RPDOs of a device that is no drive; ``unserved`` has the reason for each input or
-    output that none of them carries."""
+    """TPDOs or RPDOs of a device that is no drive; ``unserved`` has the reason for each input or output that
+    none of them carries."""
 
     pdos: list[PdoPlan] = field(default_factory=list[PdoPlan])
     unserved: dict[ObjectRef, Text] = field(default_factory=dict[ObjectRef, Text])
@@ -140,7 +139,7 @@ class SignalPlan:
 
 @dataclass(slots=True)
 class DevicePlan:
-    """The PDOs of a device: TPDOs bring its inputs, RPDOs take its outputs."""
+    """PDOs of a device: TPDOs bring its inputs, RPDOs take its outputs."""
 
     tpdos: SignalPlan
     rpdos: SignalPlan
@@ -151,8 +150,8 @@ UNREADABLE: Final = Text.of("meaning.cannot_be_read")
 
 @dataclass(slots=True)
 class WordFacts:
-    """What a drive has told of its words: ``parameters`` that decide what they mean, by name and set,
-    ``codes`` by the word's leaf for each set, None for what it does not tell, and ``why_unread``."""
+    """Facts about a drive's words, as read from it: ``parameters`` that decide what they mean, by name and
+    set; ``codes`` by the word's leaf for each set, None for one that it does not tell; ``why_unread``."""
 
     parameters: dict[Key, float | None] = field(default_factory=dict[Key, float | None])
     codes: dict[str, list[int | None]] = field(default_factory=dict[str, list[int | None]])
@@ -168,19 +167,19 @@ class BootResult:
     node_tpdos: list[NodePdoPlan] = field(default_factory=list[NodePdoPlan])
     devices: dict[str, DevicePlan] = field(default_factory=dict[str, DevicePlan])
     held: dict[str, int] = field(default_factory=dict[str, int])
-    """What outputs hold that are to hold it, as integers without sign, by their names."""
+    """Present values of the outputs that hold theirs on a stop, as unsigned integers, by output name."""
     bridge_stop: tuple[int, Said] = (0, "")
-    """Longest time in ms from the bridge's hang to outputs that the node itself has made safe; 0 with the
-    reason where there is none."""
+    """Longest time in ms from a hang of the bridge until the node itself has made its outputs safe; 0, with
+    the reason, where it does not."""
     notes: list[Text] = field(default_factory=list[Text])
     silences: int = 0
-    """Objects that nothing needs and that were not answered."""
+    """Number of optional objects that were not answered."""
     emcy_id: int | None = None
-    """Where emergency messages come; None where the node sends none."""
+    """COB-ID of the emergency messages; None where the node sends none."""
     heartbeat_ms: int = 0
-    """The heartbeat period that the node keeps; 0 for none."""
+    """Heartbeat period in ms that the node keeps; 0 for none."""
     own: dict[str, OwnJudgement] = field(default_factory=dict[str, OwnJudgement])
-    """What each drive, or a node with its outputs, does by itself when the bridge falls silent."""
+    """Own supervision of each drive, or of a node with outputs: its reaction when the bridge falls silent."""
     errors: DeviceErrors = field(default_factory=DeviceErrors)
     memory: BootMemory = field(default_factory=BootMemory)
 
@@ -191,8 +190,8 @@ Do = Generator[Action, bytes | None, None]
 
 @contextmanager
 def told_as(error: Callable[[SdoError], Exception]) -> Generator[None]:
-    """Around steps that the node must not refuse, nor answer wrongly: raises ``error`` where it does. Silence
-    remains silence."""
+    """Raise ``error`` where the node refuses the steps within, or answers them wrongly. A missing answer
+    stays an SdoError."""
     try:
         yield
     except SdoError as refusal:
@@ -204,15 +203,15 @@ def told_as(error: Callable[[SdoError], Exception]) -> Generator[None]:
 U8: Final = 1
 U16: Final = 2
 U32: Final = 4
-"""Bytes of UNSIGNED8, UNSIGNED16 and UNSIGNED32."""
+"""Sizes of UNSIGNED8, UNSIGNED16 and UNSIGNED32 in bytes."""
 _MOST_SILENCES: Final = 2
-"""Objects that nothing needs may remain without an answer: a node that has no segmented transfer may be
-silent about its texts, 1008h and 100Ah. One that leaves more unanswered is gone."""
+"""Number of optional objects that may stay unanswered: a node without segmented transfer may be silent about
+its texts, 1008h and 100Ah. One that leaves more unanswered is gone."""
 
 
 def number(data: bytes | None, default: int = 0, *, size: int = U32) -> int:
-    """The number of ``size`` bytes in an answer. Raises BootError where that is longer than any number of
-    CANopen."""
+    """Unsigned integer of ``size`` bytes in an answer. Raises BootError where the answer is longer than any
+    number of CANopen."""
     if data is None:
         return default
     if len(data) > width.LONGEST:
@@ -221,16 +220,16 @@ def number(data: bytes | None, default: int = 0, *, size: int = U32) -> int:
 
 
 def same(have: bytes | None, want: bytes) -> bool:
-    """Whether what the node has answered is what it is to hold."""
+    """Whether the node's answer is the value that it is to hold."""
     return have is not None and width.holds(have, want)
 
 
 def wish(
     result: BootResult, index: int, sub: int = 0, channel: int = 1, *, may_be_silent: bool = True
 ) -> Generator[SdoRead, bytes | None, bytes | None]:
-    """An object that nothing needs: None where the node has none, and, with a note, where it answers wrongly
-    or not at all. Raises SdoError where it is silent too often to be there, or, without ``may_be_silent``,
-    at all."""
+    """Read an optional object: None where the node has none, and, with a note, where it answers wrongly or
+    not at all. Raises SdoError where it was silent too often to be there, or, without ``may_be_silent``,
+    once."""
     try:
         return (yield SdoRead(index, sub, channel))
     except SdoError as error:
@@ -242,8 +241,8 @@ def wish(
 
 
 def go_on_without(error: SdoError, result: BootResult) -> None:
-    """Note an object that nothing needs and that cannot be read. Raises ``error`` where the node is silent
-    too often to be there."""
+    """Note an optional object that cannot be read. Raises ``error`` where the node was silent too often to be
+    there."""
     if not error.was_answered:
         result.silences += 1
         if result.silences > _MOST_SILENCES:
@@ -261,8 +260,8 @@ def write_number(
     signed: bool = False,
     channel: int = 1,
 ) -> Do:
-    """Write ``data`` in the width in which the node takes it; ``have`` is its last answer, None where it is
-    not known. Raises SdoError where it takes it in none."""
+    """Write ``data`` in a width that the node accepts; ``have`` is its last answer, None if unknown. Raises
+    SdoError where it accepts none."""
     refused: SdoError | None = None
     for form in width.forms(data, have, signed=signed, is_number=is_number):
         try:

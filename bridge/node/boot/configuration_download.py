@@ -1,7 +1,7 @@
 """Download of a node's configuration in order, compared first and read back (CiA 302-2, CiA 302-3).
 
-A node that keeps a configuration date and time (1020h) is asked for it first: where it has ours, nothing
-is downloaded. The date the bridge writes is made from the configuration itself, so that a changed site
+A node that keeps a configuration date and time (1020h) is asked for it first: if it is ours, nothing is
+downloaded. The date that the bridge writes is derived from the configuration itself, so that a changed site
 file is never taken for the one the node has.
 """
 
@@ -32,9 +32,9 @@ _DAYS: Final = 0xFFFF
 
 
 def configuration_stamp(downloads: Sequence[Download]) -> tuple[int, int]:
-    """Date (days since 1984-01-01) and time (ms) that stand for this configuration in 1020h.
+    """Date (days since 1984-01-01) and time (ms) that identify this configuration in 1020h.
 
-    Those in the list, where a DCF brings its own; else made from the content.
+    Those in the list, where a DCF brings its own; else derived from the content.
     """
     given = {download.sub: number(download.data) for download in downloads if download.index == _VERIFY}
     if 1 in given and 2 in given:
@@ -48,8 +48,8 @@ def configuration_stamp(downloads: Sequence[Download]) -> tuple[int, int]:
 
 
 def configure(downloads: Sequence[Download], *, store: bool, result: BootResult) -> Do:
-    """Bring the node's objects to ``downloads``; ``store`` saves them with 1010h:1 if one was written, now
-    or in a boot-up before this one that did not come to it.
+    """Bring the node's objects to ``downloads``; ``store`` saves them with 1010h:1 if one was written, now or
+    in an earlier boot-up that did not get as far as storing.
 
     Raises BootError J with object, expected and read. A value that the node does not keep is written once.
     """
@@ -84,8 +84,8 @@ def configure(downloads: Sequence[Download], *, store: bool, result: BootResult)
 
 
 def _store(memory: BootMemory, *, has_stamp: bool) -> Do:
-    """Write "save". What cannot be stored is owed until it is: the date in 1020h is taken back, so that
-    nobody takes the configuration for the one that the node will have after its next start.
+    """Write "save" to 1010h. A store that fails is owed until it succeeds: the date in 1020h is taken back,
+    so that nobody takes this configuration for the one that the node will have after its next start.
 
     A node that takes "save" without an answer may have stored all the same: it is not asked for ever.
     """
@@ -112,7 +112,7 @@ def _take_stamp_back() -> Do:
 
 
 def _parts(downloads: Sequence[Download]) -> list[list[Download]]:
-    """In order, one by one; what belongs to one PDO stays together, where the first of it stands."""
+    """Downloads in order, one by one; those of one PDO together, at the place of the first."""
     parts: dict[object, list[Download]] = {}
     for place, download in enumerate(downloads):
         key = ("PDO", pdo_parameter(download.index)) if is_pdo(download.index) else place
@@ -121,7 +121,7 @@ def _parts(downloads: Sequence[Download]) -> list[list[Download]]:
 
 
 def download(one: Download, memory: BootMemory) -> Generator[Action, bytes | None, int]:
-    """One object; 1 where it was written. Raises BootError J."""
+    """Download one object; returns 1 where it was written, else 0. Raises BootError J."""
     what = one.index, one.sub, one.data
     if not one.read_back:
         if one.is_command and memory.has_done(*what):
@@ -167,7 +167,7 @@ def _is_signed(download: Download) -> bool:
 
 
 def _write(download: Download, have: bytes | None = None) -> Do:
-    """``have`` is what was read before; a command is written as it is."""
+    """Write one object; ``have`` is the value read before. A command is written as it is."""
 
     def refused(error: SdoError) -> BootError:
         return BootError("J", Text.of("boot.not_taken", why=text_of(error), wanted=_shown(download.data)))
@@ -188,7 +188,7 @@ def _write(download: Download, have: bytes | None = None) -> Do:
 
 
 def _shown(data: bytes | None) -> Words:
-    """A value as people write it: a number up to eight bytes, else its bytes."""
+    """A value as shown to people: a hexadecimal number up to eight bytes, else the bytes."""
     if data is None:
         return Text.of("boot.nothing")
     if 0 < len(data) <= 8:

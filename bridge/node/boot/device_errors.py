@@ -1,5 +1,4 @@
-"""What a node says of its own errors, and the one thing that is tried where it does not start because of
-them.
+"""Errors that a node reports of itself, and the one remedy that is tried where they keep it from starting.
 
 Objects 1001h and 1003h (CiA 301 §7.5.2.2, §7.5.2.4). A slave may keep a communication error, such as one SYNC
 of a wrong length, and refuse *operational* until its communication is reset (1029h, CiA 301 §7.5.2.32).
@@ -29,14 +28,15 @@ from bridge.text import Said, Text
 _REGISTER: Final = 0x1001
 _HISTORY: Final = 0x1003
 _MOST: Final = 4
-"""Of the errors in 1003h the newest are shown."""
+"""Number of errors shown, the newest in 1003h."""
 _LONGEST: Final = 4
 _RESTARTS_S: Final = 2.0
-"""A node that is reset has said so by then; one that is slower is booted when it says so."""
+"""Time in seconds within which a reset node sends its boot-up message; a slower one is booted when it
+does."""
 
 
 def read_errors(node: Node, result: BootResult) -> Do:
-    """Note and show the error register, and the newest errors where there is one."""
+    """Read, note and show the error register, and the newest errors if there is one."""
     yield BootStep(Text.of("boot_step.errors"), "J")
     register = _number((yield from wish(result, _REGISTER)), U8)
     codes: list[int] = []
@@ -68,7 +68,7 @@ def reset_once(node: Node, result: BootResult) -> Do:
 
 
 def _number(data: bytes | None, size: int) -> int:
-    """What the node says of its errors is shown and nothing more: an odd answer is none."""
+    """Number in an answer, 0 for an odd one: the node's errors are only shown."""
     return width.unsigned(data, size) if data and len(data) <= _LONGEST else 0
 
 

@@ -1,4 +1,4 @@
-"""The PDOs of a device that is no drive, as the node has them."""
+"""PDOs of a device that is no drive, as the node has them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ from bridge.text import Text
 _BASES: Final = {"TPDO": (0x1800, 0x1A00), "RPDO": (0x1400, 0x1600)}
 _MOST: Final = 512
 _ABSENT_IN_A_ROW: Final = 4
-"""PDOs are numbered from 1; the four of the predefined connection set may be there in part."""
+"""Missing PDOs in a row that end the search: they are numbered from 1, and the four of the predefined
+connection set may be there in part."""
 
 NONE: Final[Mapping[ObjectRef, Signal]] = MappingProxyType({})
 
@@ -38,7 +39,7 @@ Plan = Generator[Action, bytes | None, SignalPlan]
 
 
 def plan_device(node: Node, result: BootResult) -> Generator[Action, bytes | None, DevicePlan]:
-    """Every PDO that is switched on and carries one of the family's inputs or outputs."""
+    """Plan every PDO that is switched on and carries one of the family's inputs or outputs."""
     family = node.family
     yield BootStep(Text.of("boot_step.pdos"), "J")
     inputs = {one.object: one for one in family.input}
@@ -52,7 +53,8 @@ def plan_device(node: Node, result: BootResult) -> Generator[Action, bytes | Non
 def _plan(
     kind: str, needed: Mapping[ObjectRef, Signal], result: BootResult, also: Mapping[ObjectRef, Signal] = NONE
 ) -> Plan:
-    """The PDOs that carry what is ``needed``, which is noted where none does, or something of ``also``."""
+    """Plan the PDOs that carry ``needed`` objects, or some of ``also``; a needed object that none carries is
+    noted."""
     wanted = {**also, **needed}
     signed = {(ref.index, ref.sub) for ref, signal in wanted.items() if signal.is_signed}
     plan = SignalPlan()

@@ -1,8 +1,8 @@
-"""What a device that is no drive does with its outputs by itself when the bridge falls silent.
+"""Reaction of a device that is no drive, and of its outputs, when the bridge falls silent.
 
-It has to notice the silence (1016h or life guarding), to leave the state Operational then (1029h:01, CiA 301
-§7.5.2.29), and each output has to take its error value in that case (CiA 401: 6206h, 6207h and their like for
-digital outputs, 6443h and 6444h for analogue ones). Which objects those are is in the mapping.
+The device has to notice the silence (1016h or life guarding), to leave the state Operational then (1029h:01,
+CiA 301 §7.5.2.29), and each output has to take its error value in that case (CiA 401: 6206h, 6207h and their
+like for digital outputs, 6443h and 6444h for analogue ones). The mapping file names those objects.
 """
 
 from __future__ import annotations
@@ -22,11 +22,12 @@ from bridge.node.boot.own_supervision_setup import bring_node
 from bridge.text import Said, Text
 
 _DIGITAL: Final = range(0x6200, 0x6400)
-"""CiA 401: one bit of error mode and error value for each output. Analogue ones have a number each."""
+"""Objects of digital outputs (CiA 401): one bit of error mode and error value each. Analogue ones have a
+number each."""
 
 
 def read_held(words: OutputWords, result: BootResult) -> Generator[Action, bytes | None, None]:
-    """What those outputs hold that are to hold it: what is sent first must not change them."""
+    """Read the outputs that hold their values on a stop: what is sent first must not change them."""
     for name, place in words.places.items():
         if place.safe is None:
             data = yield from optional(place.output.object.index, place.output.object.sub)
@@ -35,8 +36,9 @@ def read_held(words: OutputWords, result: BootResult) -> Generator[Action, bytes
 
 
 def judge_outputs(node: Node, outputs: Outputs, result: BootResult) -> Generator[Action, bytes | None, None]:
-    """Into ``result.bridge_stop``; what ``own_timeout_ms`` says is written first where ``enforce`` is true
-    and the node holds something else. Raises BootError J where a value that is enforced is not taken."""
+    """Judge whether the node makes its outputs safe by itself, into ``result.bridge_stop``;
+    ``own_timeout_ms`` is written first where ``enforce`` is true and the node holds something else. Raises
+    BootError J where an enforced value is not taken."""
     if outputs.words.all_hold:
         result.bridge_stop = 0, Text.of("outputs.all_hold")
         return
@@ -57,15 +59,15 @@ def judge_outputs(node: Node, outputs: Outputs, result: BootResult) -> Generator
 
 
 def read_why_not_safe(place: OutputPlace, safe: int) -> Generator[SdoRead, bytes | None, Said]:
-    """As ``why_not_safe``, by what the node holds."""
+    """Result of ``why_not_safe`` for the values that the node holds."""
     mode = yield from _number(place.output.error_mode)
     value = yield from _number(place.output.error_value)
     return why_not_safe(place, safe, mode, value)
 
 
 def why_not_safe(place: OutputPlace, safe: int, mode: int | None, value: int | None) -> Said:
-    """Why this output does not take its safe value when the node leaves Operational; empty where it does.
-    ``mode`` and ``value`` are what error mode and error value hold, None where that is not known."""
+    """Reason why the output does not take its safe value when the node leaves Operational; empty where it
+    does. ``mode`` and ``value`` are the contents of error mode and error value, None if unknown."""
     output = place.output
     if output.error_mode is None or output.error_value is None:
         return Text.of("outputs.no_error_mode", output=output.name)
@@ -86,7 +88,7 @@ def why_not_safe(place: OutputPlace, safe: int, mode: int | None, value: int | N
 
 
 def keeps_outputs(own: OwnJudgement, why: Said, *, is_known: bool = True) -> OwnJudgement:
-    """The same for a node that notices a silent bridge, and does not make all of its outputs safe."""
+    """``own`` of a node that notices a silent bridge, but does not make all of its outputs safe."""
     verdict = OwnVerdict.RUNS_ON if is_known else OwnVerdict.UNKNOWN
     watches = [
         replace(watch, verdict=verdict, because=why) if watch.verdict is OwnVerdict.STOPS else watch

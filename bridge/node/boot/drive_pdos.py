@@ -1,8 +1,8 @@
-"""The PDOs of a drive: written where the site file or the mapping asks for it, then read back.
+"""PDOs of a drive: written where the site file or the mapping asks for it, then read back.
 
-What the node says of itself wins over the mapping file. A node without an object is taken by the mapping
-file's word, and that is noted. A drive works as long as control and status word are there; what else the
-node does not carry is noted and not served.
+The node's own word wins over the mapping file. For an object that the node lacks the mapping file's word is
+taken, and that is noted. A drive works as long as control and status word are there; whatever else the node
+does not carry is noted and not served.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from bridge.node.boot.word_layout import (
 from bridge.text import Text
 
 RPDO: Final = (0x1400, 0x1600)
-"""First communication and first mapping object."""
+"""Indices of the first communication and the first mapping object."""
 _TPDO: Final = (0x1800, 0x1A00)
 _BYTES: Final = 2
 _ALL_BITS: Final = 0xFFFF
@@ -74,12 +74,12 @@ class _Direction:
     known: Layouts
 
     def asked(self, pdo: Pdo) -> PdoTable | None:
-        """What the site file asks of this PDO."""
+        """The site file's table for this PDO, if any."""
         return pdo_table(self.tables, pdo.number, self.pdos[0].number)
 
 
 def plan_drive(node: Node, drive: Drive, result: BootResult) -> Generator[Action, bytes | None, DrivePlan]:
-    """The PDOs of one drive; what does not fit is the drive's problem, not the node's."""
+    """Plan the PDOs of one drive; what does not fit is the drive's problem, not the node's."""
     plan = DrivePlan()
     slot, family, table = drive.slot, drive.family, drive.table
     process = family.process
@@ -119,7 +119,8 @@ def _of(slot: str, what: Text) -> Text:
 
 
 def _require_followed(drive: Drive, plan: DrivePlan) -> None:
-    """A command that follows an actual value needs it: without it, enabling might make the drive jump."""
+    """Refuse a drive without the actual value that one of its commands follows: enabling might make it
+    jump."""
     for value in drive.family.values_of(drive.slot):
         if value.follows is None:
             continue
@@ -136,7 +137,8 @@ def _require_followed(drive: Drive, plan: DrivePlan) -> None:
 def _plan(
     node: Node, drive: Drive, direction: _Direction, found: list[PdoPlan], plan: DrivePlan, result: BootResult
 ) -> Do:
-    """All PDOs of one direction, into ``found``. Raises MappingError where the first word is in none."""
+    """Plan all PDOs of one direction, into ``found``. Raises MappingError where none carries the first
+    word."""
     first = direction.process[0]
     reasons: dict[str, Text] = {}
     for pdo, words in zip(direction.pdos, direction.words, strict=True):
@@ -175,8 +177,8 @@ def _plan(
 def _leave_out_parts(
     drive: Drive, direction: _Direction, found: Sequence[PdoPlan], plan: DrivePlan, result: BootResult
 ) -> None:
-    """Bits of words whose other objects are mapped: they would read as 0. Raises MappingError where the
-    control or status word cannot do without them."""
+    """Leave out values of words that are mapped in part, whose other bits would read as 0. Raises
+    MappingError where the control or status word cannot do without them."""
     family, group = drive.family, direction.group
     needed = family.needed_bits(group)
     mapped = {(entry.index, entry.sub) for one in found for entry in one.codec.entries}
@@ -207,7 +209,7 @@ def _check_length(pdo: PdoPlan, words: int) -> None:
 def _pdo(
     node: Node, drive: Drive, pdo: Pdo, direction: _Direction, result: BootResult
 ) -> Generator[Action, bytes | None, PdoPlan]:
-    """One PDO as the node has it. Raises MappingError where it is off or cannot be used."""
+    """One PDO as the node has it, after it was set. Raises MappingError where it is off or cannot be used."""
     name = f"{direction.name}{pdo.number}"
     parameter, mapping = (base + pdo.number - 1 for base in direction.bases)
     default_id = pdo.cob_id + node.table.id
@@ -245,7 +247,7 @@ def _pdo(
 
 
 def refuse_doubles(result: BootResult) -> None:
-    """Two drives behind one identifier would get each other's words: neither is served."""
+    """Leave out drives that share an identifier: they would get each other's words."""
     users: dict[int, list[DrivePlan]] = {}
     for plan in result.drives.values():
         for pdo in (*plan.rpdos, *plan.tpdos):
@@ -259,7 +261,7 @@ def refuse_doubles(result: BootResult) -> None:
 
 
 def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes | None, None]:
-    """TPDOs that carry what is polled otherwise, where the node has them switched on."""
+    """Plan the node's TPDOs that carry polled objects, where they are switched on."""
     polls = {(poll.object.index, poll.object.sub): poll for poll in node.family.poll}
     signed = {at for at, poll in polls.items() if poll.data_type in (DataType.INT16, DataType.INT32)}
     for tpdo in node.family.node_tpdo:
@@ -286,7 +288,7 @@ def plan_node_tpdos(node: Node, result: BootResult) -> Generator[Action, bytes |
 
 
 def read_entries(mapping: int, count: int) -> Generator[Action, bytes | None, tuple[PdoEntry, ...]]:
-    """The mapping as the node has it. Raises MappingError where it cannot be one, or cannot be read."""
+    """Mapping as the node has it. Raises MappingError where it cannot be one, or cannot be read."""
     if count in MPDO_KINDS:
         kind = MPDO_KINDS[count]
         raise Unusable(Text.of("boot.mpdo", object=f"{mapping:04X}h:00", count=count, kind=kind))

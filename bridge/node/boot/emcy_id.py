@@ -1,4 +1,4 @@
-"""On which identifier the node sends its emergency messages: object 1014h of CiA 301."""
+"""COB-ID of the node's emergency messages: object 1014h (CiA 301)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from bridge.text import Text
 
 
 def read_emcy_id(node_id: int, result: BootResult) -> Do:
-    """A node without the object sends them on 80h + node id; one that names what is no identifier for
-    them is noted, and taken to do the same."""
+    """Read the COB-ID. A node without the object uses 80h + node id; one that names an invalid one is noted,
+    and taken to do the same."""
     default = cobid.EMCY + node_id
     result.emcy_id = default
     yield BootStep(Text.of("boot_step.emergency_id"), "J")

@@ -16,7 +16,7 @@ _PERIOD: Final = 0x1017
 
 
 def heartbeat_period_ms(supervision_ms: int) -> int:
-    """The producer time for a consumer time: two heartbeats in a row may be lost."""
+    """Producer time in ms for a consumer time: two heartbeats in a row may be lost."""
     return max(1, supervision_ms // 3)
 
 
@@ -49,7 +49,7 @@ def set_error_control(table: NodeTable, result: BootResult) -> Do:
 
 
 def _set_period(table: NodeTable, data: bytes, have: bytes | None, result: BootResult) -> Do:
-    """1017h, which some nodes round: Lenze keeps multiples of 5 ms (C00381)."""
+    """Write 1017h, which some nodes round: Lenze keeps multiples of 5 ms (C00381)."""
     want_ms, was_ms = number(data), number(have, size=len(data))
     kept_ms = was_ms
     if not result.memory.was_not_kept(_PERIOD, 0, data):

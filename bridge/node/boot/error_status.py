@@ -1,4 +1,4 @@
-"""Error status of the process "boot NMT slave" (CiA 302-2, error status A … O) with what helps."""
+"""Error status of the process "boot NMT slave" (CiA 302-2, error status A … O), with hints."""
 
 from __future__ import annotations
 
@@ -22,17 +22,16 @@ HINTS: Final = {
 }
 
 SILENT: Final = Text.of("boot_hint.silent")
-"""What helps if a node that was there does not answer any more, whatever the step."""
+"""Hint for a node that was there and no longer answers, whatever the step."""
 
 ABSENT: Final = frozenset("BEFK")
-"""With these the node is not there; with the others it is there and cannot be used."""
+"""Error status of a node that is not there; with any other it is there and cannot be used."""
 
 
 class BootError(Exception):
-    """The boot-up ended. ``letter`` is the error status, ``what`` names object, expected and read.
+    """Failure of a boot-up. ``letter`` is the error status, ``what`` names object, expected and read.
 
-    ``absent`` is true where the node did not answer, whatever the step was. ``hint`` stands in place of what
-    usually helps.
+    ``absent`` is true where the node did not answer, whatever the step was. ``hint`` replaces the usual one.
     """
 
     def __init__(
@@ -47,14 +46,14 @@ class BootError(Exception):
 
     @property
     def said(self) -> Text:
-        """All of it in one."""
+        """Error status, reason and hint in one text."""
         if self._hint is None:
             return Text.of("boot.failed", letter=self.letter, what=self.what)
         return Text.of("boot.failed_advised", letter=self.letter, what=self.what, hint=self._hint)
 
     @property
     def detail(self) -> str:
-        """What has ended it, in English."""
+        """Reason of the failure, in English."""
         return render(self.what)
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""Who the node is: 1000h, 1008h, 100Ah and 1018h, compared with mapping and site file (CiA 302-2)."""
+"""Identity of the node: 1000h, 1008h, 100Ah and 1018h, compared with mapping and site file (CiA 302-2)."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _LONGEST_TEXT = 64
 
 @dataclass(frozen=True, slots=True)
 class IdentityCheck:
-    """``read & mask`` must be ``expected & mask``; a rule without a value compares nothing. ``key`` is where
-    it stands."""
+    """Rule that ``read & mask`` must equal ``expected & mask``; without a value nothing is compared. ``key``
+    is its place in the file."""
 
     key: str
     letter: str
@@ -32,7 +32,7 @@ class IdentityCheck:
     mask: int | None = None
 
     def check(self, read: int | None, where: Text) -> None:
-        """Raises BootError where the value is another one; ``read`` is None where the node has none."""
+        """Raise BootError where the value differs; ``read`` is None where the node has none."""
         mask = _ALL if self.mask is None else self.mask
         if self.expected is None or not ((read or 0) ^ self.expected) & mask:
             return
@@ -47,7 +47,7 @@ class IdentityCheck:
 
 
 def _rules(expected: object, where: Text, table: str) -> list[tuple[IdentityCheck, Text]]:
-    """The rules of an identity table; the mapping's has fewer keys than the site file's."""
+    """Rules of an identity table; the mapping's has fewer keys than the site file's."""
     rules: list[tuple[IdentityCheck, Text]] = []
     for letter, index, sub, name in (
         ("C", 0x1000, 0, "device_type"),
@@ -63,8 +63,8 @@ def _rules(expected: object, where: Text, table: str) -> list[tuple[IdentityChec
 
 
 def identify(node: Node, device_type: int | None, result: BootResult) -> Do:
-    """Read who the node is and compare. Raises BootError C, D, M, N or O. What no rule asks for may be
-    missing.
+    """Read the node's identity and compare it. Raises BootError C, D, M, N or O. Values that no rule asks for
+    may be missing.
 
     The mapping's device name is a hint for ``scan``; the site file's is a rule.
     """
@@ -93,8 +93,8 @@ def identify(node: Node, device_type: int | None, result: BootResult) -> Do:
 
 
 def look_for() -> Generator[Action, bytes | None, int | None]:
-    """Device type of the node, None where it is there and does not say it; SdoError where nobody answers, and
-    a second time after it was woken."""
+    """Device type of the node; None where it is there and does not tell. Raises SdoError where nobody
+    answers, nor after the node was woken."""
     yield BootStep(Text.of("boot_step.look"), "B")
     try:
         return (yield from _device_type())
@@ -104,7 +104,7 @@ def look_for() -> Generator[Action, bytes | None, int | None]:
 
 
 def _device_type() -> Generator[SdoRead, bytes | None, int | None]:
-    """Raises SdoError where there is no answer at all."""
+    """Device type; None where the node does not tell. Raises SdoError where there is no answer at all."""
     try:
         return number((yield SdoRead(0x1000)))
     except SdoError as error:
@@ -116,7 +116,8 @@ def _device_type() -> Generator[SdoRead, bytes | None, int | None]:
 def _text(
     letter: str, index: int, wanted: str | None, key: str, result: BootResult
 ) -> Generator[Action, bytes | None, str]:
-    """A text of the node, in which the regular expression ``wanted``, if there is one, has to be found."""
+    """A text of the node, in which the regular expression ``wanted``, if given, has to be found. Raises
+    BootError."""
     yield BootStep(Text.of("boot_step.name"), letter, needed_by="" if wanted is None else key)
     data = yield from (wish(result, index) if wanted is None else optional(index))
     text = datatypes.readable((data or b"")[:_LONGEST_TEXT]).strip()

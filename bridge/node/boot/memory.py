@@ -1,5 +1,5 @@
-"""What is remembered of a node from one boot-up to the next: so that none of them wears out its EEPROM, and
-that a stop reaches it wherever it listens."""
+"""Memory of a node from one boot-up to the next, so that none of them wears out its EEPROM, and that a stop
+reaches it wherever it listens."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from bridge.node.boot.pdo_plan import PdoPlan
 from bridge.text import Said
 
 _RPDOS: Final = 2
-"""Identifiers that are remembered of one RPDO: a node that lies does not fill the memory."""
+"""Identifiers remembered for one RPDO: a node that lies does not fill the memory."""
 
 _RESETS: Final = 3
-"""Errors in a row for which a node that does not start is reset: one with ever new ones is left alone."""
+"""Errors in a row for which a node that does not start is reset: one with ever new errors is left alone."""
 
 
 CountWrite = Callable[[str, str, str], Said]
-"""One more write to an EEPROM: owner, object, name. Returns a warning or an empty text, and raises
+"""Counts one more write to an EEPROM: owner, object, name. Returns a warning or an empty text, and raises
 ``ParameterError`` where it is one too many (``parameter.ledger``)."""
 
 
@@ -32,18 +32,19 @@ def _not_counted(owner: str, address: str, name: str) -> Said:
 
 @dataclass(slots=True)
 class BootMemory:
-    """Kept for as long as the bridge runs; ``start_anew`` is called when the node has started or an
+    """Memory kept for as long as the bridge runs; ``start_anew`` is called when the node has restarted or an
     operator has reset it."""
 
     may_run: bool = True
-    """Drives may be running: the node has not started since it was in operation, or since the bridge has."""
+    """True if drives may be running: the node has not restarted since it was in operation, or since the
+    bridge started."""
     is_at_rest: bool = False
-    """The node has said that it is in a state in which its drives do not run, and has not been in operation
+    """True if the node has reported a state in which its drives do not run, and has not been in operation
     since."""
     did_not_start: bool = False
-    """The boot-up before this one has come as far as the start, and the node did not follow."""
+    """True if the boot-up before this one got as far as the start, and the node did not follow."""
     unsaved: bool = False
-    """Something was written that has not been stored (1010h) yet."""
+    """True if something was written that has not been stored (1010h) yet."""
     unanswered_stores: int = 0
     count_write: CountWrite = _not_counted
     _not_kept: dict[tuple[int, int], bytes] = field(default_factory=dict[tuple[int, int], bytes])
@@ -59,8 +60,8 @@ class BootMemory:
         self._resets.clear()
 
     def was_reset(self) -> None:
-        """A boot-up that failed has reset the node: its communication objects are as they were stored. That
-        is no reason to write its EEPROM once more."""
+        """Note a reset by a boot-up that failed: the communication objects are as they were stored, which is
+        no reason to write the EEPROM once more."""
         self.did_not_start = False
         self._not_kept = {
             key: data
@@ -69,22 +70,22 @@ class BootMemory:
         }
 
     def note_not_kept(self, index: int, sub: int, data: bytes) -> None:
-        """The node has taken these bytes and holds others."""
+        """Note bytes that the node has taken, though it holds others."""
         self._not_kept[index, sub] = data
 
     def was_not_kept(self, index: int, sub: int, data: bytes) -> bool:
-        """Whether writing these bytes has been tried, in vain."""
+        """Whether writing these bytes has been tried in vain."""
         return self._not_kept.get((index, sub)) == data
 
     def note_command(self, index: int, sub: int, data: bytes) -> None:
-        """A command was carried out by a boot-up that may still fail."""
+        """Note a command that was carried out by a boot-up that may still fail."""
         self._commands.add((index, sub, data))
 
     def has_done(self, index: int, sub: int, data: bytes) -> bool:
         return (index, sub, data) in self._commands
 
     def boot_succeeded(self) -> None:
-        """The next boot-up begins with all its commands."""
+        """Note a success: the next boot-up begins with all its commands."""
         self._commands.clear()
         self._resets.clear()
         self.may_run = True
@@ -101,13 +102,13 @@ class BootMemory:
         self.did_not_start = False
 
     def note_rpdo(self, drive: str, number: int, plan: PdoPlan) -> None:
-        """The node listens for the words of ``drive`` in this RPDO."""
+        """Note an RPDO in which the node listens for the words of ``drive``."""
         known = self._rpdos.get((drive, number), [])
         others = [one for one in known if one.cob_id != plan.cob_id]
         self._rpdos[drive, number] = [*others, plan][-_RPDOS:]
 
     def rpdos_of(self, drive: str) -> Iterator[PdoPlan]:
-        """Where the node has listened for this drive; of one RPDO the last comes last."""
+        """RPDOs in which the node has listened for this drive; of one RPDO the newest plan comes last."""
         for (name, _), plans in self._rpdos.items():
             if name == drive:
                 yield from plans

@@ -1,4 +1,5 @@
-"""What each drive does by itself when the bridge falls silent: set where the site file enforces it, read."""
+"""Own supervision of each drive, its reaction to a silent bridge: set where the site file enforces it, then
+read."""
 
 from __future__ import annotations
 
@@ -24,10 +25,10 @@ Raws = dict[tuple[int, int], int]
 
 
 def set_own_supervision(node: Node, result: BootResult) -> Do:
-    """Read every drive's own supervision into ``result.own``; what ``own_timeout_ms`` says is written
-    first where ``enforce`` is true and the node holds something else.
+    """Read every drive's own supervision into ``result.own``; ``own_timeout_ms`` is written first where
+    ``enforce`` is true and the node holds something else.
 
-    Raises BootError J where a value that is enforced is not taken.
+    Raises BootError J where an enforced value is not taken.
     """
     if not node.drives:
         return
@@ -51,7 +52,7 @@ def set_own_supervision(node: Node, result: BootResult) -> Do:
 
 
 def bring_node(node: Node, result: BootResult) -> Generator[Action, bytes | None, Raws]:
-    """The node's own objects, brought to what is wanted. Raises BootError J."""
+    """Values of the node's own objects, brought to what is wanted. Raises BootError J."""
     of_node = yield from read_places(node, None, read=_reader(node, result))
     for want in wanted(node.family, node.bus, node.table):
         if not want.place.per_drive:
@@ -64,7 +65,7 @@ Reader = Callable[[int, int, int], Generator[SdoRead, bytes | None, bytes | None
 
 
 def _reader(node: Node, result: BootResult) -> Reader:
-    """What is only judged, and not enforced, is not needed."""
+    """Reader of the objects. A value that is only judged, not enforced, is optional."""
     return optional if node.table.enforce else partial(wish, result)
 
 
@@ -75,8 +76,8 @@ def read_places(
     link: bool = False,
     read: Reader = optional,
 ) -> Generator[SdoRead, bytes | None, Raws]:
-    """Values of the node's own objects, or of those that each drive has for itself, and a device not. What
-    cannot be read is left out."""
+    """Values of the node's own objects, or, for a drive, of those that each drive has for itself. Objects
+    that cannot be read are left out."""
     raw: Raws = {}
     channel = FIRST if member is None else member.sdo_channel
     if channel is None:
@@ -101,7 +102,7 @@ def read_places(
 
 
 def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, result: BootResult) -> Do:
-    """Bring one object to what is wanted, once; ``raw`` has what it holds, and will hold."""
+    """Bring one object to its wanted value, once; ``raw`` has the present value, and gets the new one."""
     place = want.place
     have = raw.get(place.key)
     if have is not None and want.met_by(have):
@@ -152,15 +153,15 @@ def _bring(node: Node, want: OwnWant, raw: Raws, channel: int, owner: str, resul
 
 
 def _wears(family: Family, place: OwnPlace) -> bool:
-    """Whether writing it may go to an EEPROM. A switch that keeps writes in the RAM is not asked: one write
-    too many counted does no harm."""
+    """Whether writing the object may go to an EEPROM. A switch that keeps writes in the RAM is not consulted:
+    one write too many in the count does no harm."""
     if family.eeprom is None or family.eeprom.written_on_save_only:
         return False
     return not any(parameter.volatile and parameter.name == place.name for parameter in family.parameter)
 
 
 def _note_who_runs_on(node: Node, result: BootResult) -> None:
-    """One note for all drives of the node about which the same is to be said."""
+    """Add one note for all drives of the node that run on for the same reason."""
     names: dict[Said, list[str]] = {}
     for drive in node.drives:
         own = result.own[drive.name]

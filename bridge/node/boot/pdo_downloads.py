@@ -18,7 +18,7 @@ from bridge.node.boot.pdo_settings import FIXED_BITS, Change, NotTaken, PdoObjec
 
 _PDOS: Final = (range(0x1400, 0x1800), range(0x1800, 0x1C00))
 _MAPPING: Final = 0x0200
-"""A mapping object stands so far behind its communication object."""
+"""Offset of a mapping object from its communication object."""
 
 
 def is_pdo(index: int) -> bool:
@@ -27,12 +27,12 @@ def is_pdo(index: int) -> bool:
 
 
 def pdo_parameter(index: int) -> int:
-    """The communication object of the PDO that an object belongs to."""
+    """Communication object of the PDO that an object belongs to."""
     return index & ~_MAPPING
 
 
 def download_pdo(downloads: Sequence[Download], memory: BootMemory) -> Generator[Action, bytes | None, int]:
-    """The objects of one PDO, only if one differs; how many did. Raises BootError J."""
+    """Download the objects of one PDO, only if one differs; returns how many did. Raises BootError J."""
     parameter = pdo_parameter(downloads[0].index)
     objects = PdoObjects(parameter, parameter + _MAPPING, 0)
     wanted = {

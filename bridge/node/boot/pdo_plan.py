@@ -10,8 +10,8 @@ from bridge.node.places.word_map import WordPlace
 
 @dataclass(frozen=True, slots=True)
 class PdoPlan:
-    """One PDO as the node has it. ``places`` says for each entry where it stands among the words of
-    ``process.rpdo`` or ``process.tpdo``, or None for what we do not know."""
+    """One PDO as the node has it. ``places`` has the place of each entry among the words of ``process.rpdo``
+    or ``process.tpdo``, None if unknown."""
 
     cob_id: int
     transmission_type: int
@@ -19,13 +19,13 @@ class PdoPlan:
     codec: PdoCodec
     places: tuple[WordPlace | None, ...]
     remote_allowed: bool = True
-    """Bit 30 of a TPDO's COB-ID is 0: it may be asked for by remote frame."""
+    """True if a TPDO may be requested by remote frame: bit 30 of its COB-ID is 0."""
     name: str = ""
-    """Such as RPDO1."""
+    """Name of the PDO, such as RPDO1."""
 
     @property
     def words(self) -> frozenset[int]:
-        """Places of the words that it carries, whole or in part."""
+        """Indices of the words that it carries, in whole or in part."""
         return frozenset(
             place.word + part for place in self.places if place is not None for part in range(place.span)
         )

@@ -23,15 +23,15 @@ from bridge.node.boot.unusable import Unusable
 from bridge.text import Text
 
 FIXED_BITS: Final = 0x6000_0000
-"""Bits 30 and 29 of a COB-ID: what the node has there stays."""
+"""Bits 30 and 29 of a COB-ID, which stay as the node has them."""
 MOST_ENTRIES: Final = 64
-"""Objects in one PDO, at most (CiA 301 §7.5.2.36)."""
+"""Largest number of objects in one PDO (CiA 301 §7.5.2.36)."""
 MPDO_KINDS: Final = {0xFE: Text.of("boot.mpdo_sources"), 0xFF: Text.of("boot.mpdo_destinations")}
-"""By sub-index 0 of the mapping (CiA 301 §7.5.2.36, §7.5.2.38)."""
+"""Kinds of MPDO, by sub-index 0 of the mapping (CiA 301 §7.5.2.36, §7.5.2.38)."""
 
 
 class NotTaken(Unusable):
-    """The node refuses a value, or does not keep it: ``what`` says which."""
+    """A value that the node refuses, or does not keep: ``what`` says which."""
 
     def __init__(self, what: Text) -> None:
         super().__init__(Text.of("boot.failed", letter="J", what=what))
@@ -40,7 +40,7 @@ class NotTaken(Unusable):
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One object that is to hold ``value``, as ``size`` bytes."""
+    """One object and the ``value`` that it is to hold, in ``size`` bytes."""
 
     index: int
     sub: int
@@ -54,7 +54,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class PdoObjects:
-    """The communication and mapping object of one PDO and its COB-ID by the pre-defined set."""
+    """Communication and mapping object of one PDO, and its COB-ID by the predefined connection set."""
 
     parameter: int
     mapping: int
@@ -62,8 +62,8 @@ class PdoObjects:
 
 
 def table_for(pdo: Pdo, factory: Sequence[PdoEntry], asked: PdoTable | None) -> PdoTable | None:
-    """What this PDO is to be brought to: what the site file asks, and beside that, where the mapping file
-    says ``write``, what that has. None where nothing is to be written."""
+    """Settings that this PDO is to get: the site file's and, beside those, the mapping file's where it says
+    ``write``. None where nothing is to be written."""
     if not pdo.write:
         return asked
     own: dict[str, object] = {
@@ -77,8 +77,8 @@ def table_for(pdo: Pdo, factory: Sequence[PdoEntry], asked: PdoTable | None) -> 
 
 
 def set_pdo(objects: PdoObjects, wanted: PdoTable, result: BootResult) -> Do:
-    """Bring one PDO to what ``wanted`` says; what it leaves out stays. Raises NotTaken where the
-    node refuses a value or does not keep it."""
+    """Bring one PDO to ``wanted``; what that leaves out stays. Raises NotTaken where the node refuses a value
+    or does not keep it."""
     have_id = number((yield from optional(objects.parameter, 1)), objects.default_cob_id)
     want_id = _cob_id(objects, wanted, have_id)
     changes: list[Change] = []
@@ -114,7 +114,7 @@ def set_pdo(objects: PdoObjects, wanted: PdoTable, result: BootResult) -> Do:
 
 
 def _cob_id(objects: PdoObjects, wanted: PdoTable, have: int) -> int:
-    """What 14xxh:1 or 18xxh:1 is to hold."""
+    """Value for 14xxh:1 or 18xxh:1."""
     identifier = have & cobid.COB_ID_MASK
     if wanted.cob_id is not None:
         identifier = wanted.cob_id
@@ -125,7 +125,7 @@ def _cob_id(objects: PdoObjects, wanted: PdoTable, have: int) -> int:
 
 
 def _mapping(index: int) -> Generator[Action, bytes | None, list[int]]:
-    """The mapping as the node has it, without places that are not used; empty where it has none."""
+    """Mapping as the node has it, without unused places; empty where it has none."""
     count = number((yield from optional(index)), size=U8)
     words = [0] * min(count, MOST_ENTRIES)
     for place in range(len(words)):
@@ -142,10 +142,11 @@ def write_pdo(
     changes: Sequence[Change],
     memory: BootMemory,
 ) -> Do:
-    """Off, mapping (where ``mapped`` has entries), communication, on; then everything is read back.
+    """Write one PDO: off, mapping (where ``mapped`` has entries), communication, on; then read all of it
+    back.
 
-    Raises NotTaken where the node refuses a value or does not keep it. Where one of the values was
-    not kept before, nothing is written.
+    Raises NotTaken where the node refuses a value or does not keep it. Where one of the values was not kept
+    before, nothing is written.
     """
     parameter, mapping = objects.parameter, objects.mapping
     off = Change(parameter, 1, 4, have_id | cobid.PDO_DISABLED)
@@ -175,7 +176,7 @@ def _write_one(change: Change) -> Do:
 
 
 def _verify(change: Change, memory: BootMemory) -> Do:
-    """Raises NotTaken where the node holds something else, and remembers that."""
+    """Read a value back. Raises NotTaken where the node holds something else, and remembers that."""
     read = number((yield from optional(change.index, change.sub)), -1, size=change.size)
     # Some nodes fix bits 30 and 29 of a COB-ID.
     ignored = FIXED_BITS if change.index & 0x0200 == 0 and change.sub == 1 else 0

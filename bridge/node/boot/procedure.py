@@ -1,4 +1,5 @@
-"""Boot-up of one node as a generator (after CiA 302-2): it asks, is answered, and ends with a plan."""
+"""Boot-up of one node as a generator (after CiA 302-2): it yields requests, gets answers and returns a
+plan."""
 
 from __future__ import annotations
 
@@ -38,15 +39,15 @@ from bridge.text import Text
 
 _GOES_OPERATIONAL_S: Final = 2.0
 _SYNCS: Final = 2
-"""At least one of this many SYNC periods contains a SYNC, however late that is."""
+"""SYNC periods that contain at least one SYNC, however late that is."""
 
 
 def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | None = None) -> Boot:
-    """Boot ``node``; returns what it has learned.
+    """Boot ``node``; returns what was learned.
 
     Raises BootError if the node is another device, cannot be configured or does not go operational, SdoError
-    if it does not answer. ``downloads`` come before what the tables of the site file say. ``memory`` is what
-    the node's earlier boot-ups have left.
+    if it does not answer. ``downloads`` come before the tables of the site file. ``memory`` is that of the
+    node's earlier boot-ups.
     """
     result = BootResult(memory=memory or BootMemory())
     # Outside Operational it takes no RPDO: so first stop its drives, then do what may fail.
@@ -87,7 +88,7 @@ def boot(node: Node, downloads: Sequence[Download] = (), memory: BootMemory | No
 
 
 def _start(table: NodeTable, result: BootResult) -> Do:
-    """Error control first, then NMT start; the node's own messages confirm both. Raises BootError if they do
+    """Start error control, then the node by NMT; its own messages confirm both. Raises BootError if they do
     not come."""
     not_heard = "F" if table.supervision == "guarding" else "K"
     what = Text.of("boot_step.wait", supervision=Text.word("supervision", table.supervision))

@@ -1,4 +1,4 @@
-"""Where a node that may be running listens: its RPDOs, read before anything that may fail."""
+"""RPDOs in which a node that may be running listens, read before anything that may fail."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ _FACTORY_TYPE: Final = 255
 
 
 def find_rpdos(node: Node, result: BootResult) -> Do:
-    """Note where the node listens for each drive's words, so that a stop reaches it there. While a drive may
-    be running nothing waits for a node that is silent: SdoError at once."""
+    """Note the RPDOs in which the node listens for each drive's words, so that a stop reaches it there. While
+    a drive may be running nothing waits for a silent node: SdoError at once."""
     yield BootStep(Text.of("boot_step.listen"), "J", needed_by="drive")
     for drive in node.drives:
         for pdo in drive.slot.rpdo:
@@ -31,7 +31,7 @@ def find_rpdos(node: Node, result: BootResult) -> Do:
 
 
 def _rpdo(drive: Drive, pdo: Pdo, result: BootResult) -> Generator[Action, bytes | None, PdoPlan | None]:
-    """One RPDO as the node has it; None where it is off, or not known to the node."""
+    """One RPDO as the node has it; None where it is off, or unknown to the node."""
     parameter, mapping = (base + pdo.number - 1 for base in RPDO)
     cob_id = number((yield from wish(result, parameter, 1, may_be_silent=False)), cobid.PDO_DISABLED)
     identifier = cob_id & cobid.COB_ID_MASK
@@ -54,8 +54,8 @@ def rpdo_plan(
     entries: Sequence[PdoEntry] = (),
     kind: int = _FACTORY_TYPE,
 ) -> PdoPlan:
-    """An RPDO of a drive with this mapping; with the mapping file's where there is none, or none that can be
-    packed."""
+    """Plan of a drive's RPDO with this mapping; with the mapping file's where there is none, or none that can
+    be packed."""
     known = layouts(slot.rpdo, [family.rpdo_words(one) for one in slot.rpdo], family.process.rpdo)
     have = tuple(entries) or factory_entries(pdo)
     try:

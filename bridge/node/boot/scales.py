@@ -1,4 +1,4 @@
-"""The drive's own values of the parameters that scale its words, and of those that say what they carry."""
+"""Parameters that scale a drive's words, and those that say what the words carry, as read from the drive."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ class NotANumber(ValueError):
 
 
 def meanings_of(drive: Drive) -> list[tuple[Meaning, int, ObjectRef]]:
-    """What a drive is asked for about its words: of which word, in which parameter set, and where."""
+    """Objects to be read for what a drive's words carry: the word's meaning, the parameter set, the
+    object."""
     family = drive.family
     groups = ("command", "actual")
     asked = [one for group in groups for run in family.meanings_of(drive.slot, group) for one in run]
@@ -38,8 +39,8 @@ def meanings_of(drive: Drive) -> list[tuple[Meaning, int, ObjectRef]]:
 
 
 def deciding_of(drive: Drive, codes: Codes) -> list[tuple[Parameter, int, ObjectRef]]:
-    """The parameters that a drive whose words have these codes is asked for, because they scale a value or
-    say whether there is one: in which parameter set, and where."""
+    """Parameters to be read for a drive whose words have these codes, because they scale a value or decide
+    whether there is one; each with its parameter set and object."""
     family = drive.family
     return [
         (one, in_set, family.object_in_set(family.object_of(one), in_set))
@@ -49,7 +50,8 @@ def deciding_of(drive: Drive, codes: Codes) -> list[tuple[Parameter, int, Object
 
 
 def code_of(family: Family, meaning: Meaning, data: bytes | None) -> int | None:
-    """The code in an answer, where the drive has refused one in ``absent``; None where it is none."""
+    """Code in an answer; ``absent`` of the meaning where the drive has refused one, None where the answer is
+    no code."""
     if data is None:
         return meaning.absent
     parameter, _ = family.parameter_and_set(meaning.parameter)
@@ -61,7 +63,7 @@ def code_of(family: Family, meaning: Meaning, data: bytes | None) -> int | None:
 
 
 def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action, bytes | None, WordFacts]:
-    """Over the SDO channel that reaches this drive."""
+    """Read what a drive's words mean, over the SDO channel that reaches it."""
     found = WordFacts()
     channel = drive.spec.sdo_channel
     asked = meanings_of(drive)
@@ -88,7 +90,7 @@ def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action
 
 
 def _go_on_without(error: SdoError, channel: int, result: BootResult) -> None:
-    """What a word means is not known then. Raises ``error`` where nobody is behind the channel."""
+    """Go on without the meaning of a word. Raises ``error`` where nobody is behind the channel."""
     if channel != FIRST and not error.was_answered:
         raise error
     go_on_without(error, result)
@@ -119,7 +121,7 @@ def _read_parameters(
 
 
 def _compare(drive: Drive, parameter: Parameter, value: float, result: BootResult) -> None:
-    """With what the site file says of set 1."""
+    """Note a value of set 1 that differs from the site file's."""
     given = drive.given_parameters.get(parameter.name)
     if given is not None and abs(given - value) > 1e-6:
         note = Text.of(
@@ -134,7 +136,7 @@ def _compare(drive: Drive, parameter: Parameter, value: float, result: BootResul
 
 
 def parameter_value(parameter: Parameter, data: bytes) -> float:
-    """The value of a parameter from its bytes, in its unit. Raises NotANumber where it is none."""
+    """Value of a parameter in its unit, from its bytes. Raises NotANumber where it is none."""
     number = NUMBERS.get(parameter.data_type)
     if number is None:
         said = Text.of("boot.parameter_no_number", parameter=parameter.name, type=parameter.data_type)

@@ -21,7 +21,7 @@ from bridge.text import Text
 
 _PARAMETER: Final = 0x1200
 _OFF: Final = cobid.PDO_DISABLED
-"""Bit 31 means the same as in a PDO's COB-ID."""
+"""Bit 31, as in a PDO's COB-ID."""
 _COMPARED: Final = _OFF | cobid.COB_ID_MASK
 
 
@@ -46,7 +46,7 @@ def _not_opened(channel: int, error: SdoError) -> BootError:
 
 
 def _open(server: SdoServer, node_id: int, result: BootResult) -> Generator[Action, bytes | None, bool]:
-    """Open one server; True where something had to be changed."""
+    """Open one server; True where something was changed."""
     index = _PARAMETER + server.number - 1
     changed = False
     for sub, base in ((1, server.request), (2, server.reply)):

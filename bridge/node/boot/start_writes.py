@@ -1,4 +1,4 @@
-"""What a family needs written for each drive at boot-up, such as its mode of operation."""
+"""Objects that a family needs written for each drive at boot-up, such as its mode of operation."""
 
 from __future__ import annotations
 

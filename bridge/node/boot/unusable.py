@@ -1,4 +1,4 @@
-"""Why PDOs of a node cannot be used."""
+"""Reasons why PDOs of a node cannot be used."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bridge.text import Text, render
 
 
 class Unusable(MappingError):
-    """A PDO, or what it carries, that cannot be used: ``said`` names it."""
+    """A PDO, or its content, that cannot be used: ``said`` names it."""
 
     def __init__(self, said: Text) -> None:
         super().__init__(said)
@@ -20,7 +20,7 @@ class Unusable(MappingError):
 
 
 def why_unusable(error: MappingError | SdoError) -> Text:
-    """What there is to say of it."""
+    """Reason of the error, as a text."""
     match error:
         case Unusable():
             return error.said

@@ -1,4 +1,4 @@
-"""Which mapped object is which word, by the layouts that the mapping file knows."""
+"""Assignment of mapped objects to words, by the layouts in the mapping file."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from bridge.node.places.word_map import WORD_BITS, WordPlace
 from bridge.text import Text
 
 Layouts = Mapping[int, Sequence[MappedObject]]
-"""By the word's place, the objects that may stand for it; those at one position belong together."""
+"""Objects that may stand for each word, by the word's index; those at one position belong together."""
 _Object = tuple[int, int]
 
 
 def layouts(pdos: Sequence[Pdo], words: Sequence[Sequence[str]], process: Sequence[str]) -> Layouts:
-    """What may stand for each word of a drive. ``words`` has the names of the words of each PDO."""
+    """Objects that may stand for each word of a drive. ``words`` has the word names of each PDO."""
     return {
         process.index(name): refs
         for pdo, names in zip(pdos, words, strict=True)
@@ -26,8 +26,7 @@ def layouts(pdos: Sequence[Pdo], words: Sequence[Sequence[str]], process: Sequen
 
 
 def factory_entries(pdo: Pdo) -> tuple[PdoEntry, ...]:
-    """The mapping as the mapping file has it. An object that is named for several words in a row fills
-    them all."""
+    """Mapping by the mapping file. An object that is named for several words in a row fills them all."""
     entries: list[PdoEntry] = []
     before: MappedObject | None = None
     for refs in pdo.objects:
@@ -44,7 +43,8 @@ def factory_entries(pdo: Pdo) -> tuple[PdoEntry, ...]:
 
 
 def match_words(entries: Sequence[PdoEntry], known: Layouts) -> tuple[WordPlace | None, ...]:
-    """For each entry its place, by the layout of the mapping file that explains the most of them."""
+    """Place of each entry, by the layout in the mapping file that explains the most of them; None where it
+    explains none."""
     best: tuple[WordPlace | None, ...] = (None,) * len(entries)
     for layout in range(max((len(refs) for refs in known.values()), default=0)):
         places = _places(known, layout)
@@ -75,14 +75,14 @@ def _places(known: Layouts, layout: int) -> dict[_Object, WordPlace]:
 
 
 class Missing(NamedTuple):
-    """A part of a word that is made from several objects: the bits that no object fills."""
+    """Part of a word made from several objects, and the bits that no object fills."""
 
     part: ObjectRef
     mask: int
 
 
 def missing_parts(refs: Sequence[MappedObject], mapped: Set[_Object]) -> list[Missing]:
-    """What this word lacks: by the layout that lacks least, none where no object of it is mapped."""
+    """Missing parts of this word, by the layout that lacks least; none where no object of it is mapped."""
     found: list[list[Missing]] = []
     for ref in refs:
         lacks: list[Missing] = []
@@ -99,7 +99,7 @@ def missing_parts(refs: Sequence[MappedObject], mapped: Set[_Object]) -> list[Mi
 def differences(
     entries: Sequence[PdoEntry], expected: Sequence[PdoEntry], places: Sequence[WordPlace | None]
 ) -> list[Text]:
-    """What the node has otherwise than the mapping file, entry by entry."""
+    """Differences of the node's mapping from the mapping file, entry by entry."""
     told: list[Text] = []
     bits = {(entry.index, entry.sub): entry.bits for entry in expected}
     for entry, place in zip(entries, places, strict=True):

@@ -1,5 +1,5 @@
-"""What clients may not do to the drives' own supervision of the bridge, and what is no longer known of it
-once they have written it. Sans-IO."""
+"""Writes of clients to the drives' own supervision of the bridge: which of them are refused, and after which
+it is no longer known. Sans-IO."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bridge.text import Said, Text
 
 
 class OwnWatch:
-    """Of the drives of one node."""
+    """Guard over the own supervision of one node's drives."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -23,7 +23,8 @@ class OwnWatch:
         self._places = {drive.name: places(drive.family) for drive in node.drives}
 
     def why_kept(self, drive: ParameterHolder, entry: ParameterEntry, value: Value) -> Said:
-        """Why this is not written: a drive of the site is stopped by silence, and would not stop."""
+        """Reason to refuse a write: a drive of the site is stopped by silence, and would no longer stop.
+        Empty for none."""
         key = entry.address.index, entry.address.sub
         silent: list[str] = []
         for one in self._owners(drive, entry) or self._node.drives:
@@ -38,8 +39,8 @@ class OwnWatch:
     def forget(
         self, drive: ParameterHolder, entry: ParameterEntry, now: float, *, is_certain: bool = True
     ) -> None:
-        """What the boot-up has read of it is not true any more, or, where it is not ``is_certain`` that it
-        was written, may not be; the next boot-up reads it again."""
+        """Forget what the boot-up has read of the own supervision, because this was written or, without
+        ``is_certain``, may have been; the next boot-up reads it again."""
         if not self._protection.tells_own_supervision(entry.address):
             return
         why = Text.of("own.changed" if is_certain else "own.may_have_changed", parameter=entry.name)
@@ -58,7 +59,7 @@ class OwnWatch:
 
 
 def _raw(place: OwnPlace, entry: ParameterEntry, value: Value) -> int | None:
-    """What the object would hold; None for a value that it does not take."""
+    """Raw value that the object would hold; None for a value that it does not take."""
     try:
         return place.number.decode(encode_value(entry, value, None))
     except ParameterError:

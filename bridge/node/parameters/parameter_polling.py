@@ -1,7 +1,7 @@
-"""Which parameter point is read next: in turn, within a budget, after everything else. Sans-IO.
+"""Order in which parameter points are read: in turn, within a budget, after everything else. Sans-IO.
 
-Every point is read once after its node has booted, and those with ``every_ms`` again and again. One at a time
-is read; if more are due than the budget allows, all are read less often.
+Every point is read once after its node has booted, and those with ``every_ms`` periodically. Points are read
+one at a time; if more are due than the budget allows, all are read less often.
 """
 
 from __future__ import annotations
@@ -16,36 +16,37 @@ from bridge.command.node import Node
 from bridge.parameter import ParameterEntry
 
 MOST_PER_S: Final = 20.0
-"""Reads of one node in a second: drives answer an SDO in 20 … 50 ms (Lenze: 30 ms and 20 ms typical)."""
+"""Reads of one node per second: drives answer an SDO in 20 … 50 ms (Lenze: 30 ms and 20 ms typical)."""
 BUS_SHARE: Final = 0.05
-"""How much of the bus the polls of all nodes together may take."""
+"""Share of the bus that the polls of all nodes together may take."""
 _BITS: Final = 2 * 135
-"""A request and its answer with the most stuff bits (ISO 11898-1)."""
+"""Bits of a request and its answer with the most stuff bits (ISO 11898-1)."""
 _PATIENCE_S: Final = 5.0
-"""One that failed is asked again after this time at the earliest."""
+"""Shortest time in seconds before a failed read is repeated."""
 
 
 class Came(Enum):
-    """What became of a read."""
+    """Result of a read."""
 
     READ = "read"
     FAILED = "failed"
     NEVER = "never"
-    """The drive does not have it."""
+    """The drive does not have the parameter."""
 
 
 Ask = Callable[[ParameterHolder, ParameterEntry, Callable[[Came], None]], None]
 
 
 class ParameterPolling:
-    """``ask`` reads one point and tells what came of it; ``nodes`` share the budget."""
+    """Polls of one node's parameter points. ``ask`` reads one and reports its result; ``nodes`` share the
+    budget."""
 
     def __init__(self, node: Node, nodes: int, ask: Ask) -> None:
         self._node = node
         self._ask = ask
         share = BUS_SHARE * node.bus.bitrate / _BITS / max(nodes, 1)
         self.pause_s = 1.0 / min(MOST_PER_S, share)
-        """The time between two reads."""
+        """Time between two reads, in seconds."""
         self._due: list[tuple[float, int]] = []
         self._places: list[tuple[ParameterHolder, ParameterEntry]] = []
         self._next_at = 0.0

@@ -1,4 +1,4 @@
-"""Shows what is known of parameters in the image: value, quality, and when it was read. Sans-IO."""
+"""Parameters in the image: value, quality, and the time at which they were read. Sans-IO."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ParameterView:
         self._dead_at: float | None = None
 
     def on_node(self, state: NodeState, now: float) -> None:
-        """The node is in another state: what was read from it may have changed."""
+        """Judge all points anew: in the node's new state what was read from it may have changed."""
         self._dead_at = None
         match state:
             case NodeState.OPERATIONAL | NodeState.CONFIG_ERROR | NodeState.ABSENT:
@@ -47,7 +47,7 @@ class ParameterView:
         self._judge(quality, now, REASONS[state])
 
     def unreached(self, drives: Iterable[ParameterHolder], now: float) -> None:
-        """No open SDO channel leads to these."""
+        """Mark the points of drives that no open SDO channel leads to."""
         names = {drive.name for drive in drives}
         for (name, _), index in self._indices.items():
             if name in names:
@@ -62,13 +62,13 @@ class ParameterView:
         return self._dead_at
 
     def _judge(self, quality: Quality, now: float, reason: Text) -> None:
-        """What never had a value waits on, except where the node is out of service."""
+        """Judge all points; one that never had a value stays waiting, unless the node is out of service."""
         for index in self._indices.values():
             if self._image[index].quality is not Quality.WAITING or quality is Quality.DISABLED:
                 self._image.judge((index,), quality, now, reason)
 
     def show(self, drive: str, reading: ParameterReading) -> None:
-        """A value as the drive holds it."""
+        """Show a value as the drive holds it."""
         index = self._indices.get((drive, reading.entry.address))
         if index is not None:
             value = reading.value
@@ -80,7 +80,7 @@ class ParameterView:
         return error.abort_code in _FINAL_ABORTS or error.why in (Why.NOT_CONFIGURED, Why.WRITE_ONLY)
 
     def failed(self, drive: str, entry: ParameterEntry, error: ParameterError, now: float) -> None:
-        """It could not be read: the last value stays, but is not current."""
+        """Mark a point that could not be read: the last value stays, but is not current."""
         index = self._indices.get((drive, entry.address))
         if index is None:
             return

@@ -1,4 +1,4 @@
-"""Runs procedures that read and write parameters on SDO channels. Sans-IO."""
+"""Runner of procedures that read and write parameters on SDO channels. Sans-IO."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def run(
     ``clock`` gives the latest known time in monotonic seconds. A value is as old as the request that read it.
     """
     refused: list[Text] = []
-    """Why the write that is under way was not begun."""
+    """Reason why the write that is under way was not begun, if any."""
 
     def carry_out(transfer: Transfer, now: float) -> bool:
         index, sub = transfer.address.index, transfer.address.sub

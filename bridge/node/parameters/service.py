@@ -1,4 +1,4 @@
-"""The parameters of one node's drives: requests, and the points that show them. Sans-IO.
+"""Parameters of one node's drives: requests, and the points that show them. Sans-IO.
 
 Each drive's parameters use the SDO channel that reaches it. Requests of clients come before polls; clients
 that read the same parameter at the same time share one answer, and only one client at a time writes a
@@ -63,13 +63,13 @@ _CODES: Final = {
     Why.NOT_CONFIGURED: Code.NOT_CONFIGURED,
 }
 _ANSWERS: Final = frozenset((NodeState.OPERATIONAL, NodeState.STOPPED, NodeState.CONFIG_ERROR))
-"""Where a node can be asked: it is heard, and its boot-up does not need the channel. One in Pre-operational
-answers (CiA 301 §7.3.2.2.2), one in Stopped does not."""
+"""States in which a node can be asked: it is heard, and its boot-up does not need the channel. One in
+Pre-operational answers (CiA 301 §7.3.2.2.2), one in Stopped does not."""
 Waiting = list[Callable[[ParameterReading | ParameterError], None]]
 
 
 class NodeParameters:
-    """``sdo`` gives the channels, and lets whoever holds the node look at its deadlines."""
+    """Parameter access for one node. ``sdo`` gives the channels, and has the node's deadlines looked at."""
 
     def __init__(self, node: Node, side: BusSide, sdo: Callable[[], SdoChannels]) -> None:
         self._node = node
@@ -103,7 +103,7 @@ class NodeParameters:
     # the node
 
     def on_node(self, state: NodeState, now: float) -> None:
-        """The node is in another state."""
+        """Take over the node's state."""
         self._now = max(now, self._now)
         before, self._state = self._state, state
         if state is before:
@@ -141,7 +141,7 @@ class NodeParameters:
             self._conclude(request, drive, reply, _failed(error))
 
     def _refusal(self, request: Request, drive: ParameterHolder) -> Outcome | None:
-        """Why this is not even asked of the drive."""
+        """Outcome of a request that is not even forwarded to the drive; None if it is."""
         why = None if request.action is Action.READ_PARAMETER else _why_not_set(request.identity, drive)
         if why:
             return _no(Code.NOT_ALLOWED, why)
@@ -154,7 +154,7 @@ class NodeParameters:
         return None
 
     def _begin(self, request: Request, drive: ParameterHolder, now: float, reply: Reply) -> None:
-        """Raises ``ParameterError`` where the request itself is wrong."""
+        """Begin a request. Raises ``ParameterError`` where the request itself is wrong."""
         access = self._access[drive.name]
         conclude = partial(self._conclude, request, drive, reply)
         command = request.command
@@ -193,7 +193,8 @@ class NodeParameters:
         self._run(access.save(now, gate), drive, partial(self._on_saved, conclude))
 
     def _gate(self, identity: Identity, drive: ParameterHolder, entry: ParameterEntry) -> Gate:
-        """What is not of the drive's own axis may move every one that the same channel reaches."""
+        """Gate of a write: an object outside the drive's own axis may move every drive that the same channel
+        reaches."""
         channel = self._channels[drive.name]
         sharing = [one for one in self._node.members if one.spec.sdo_channel == channel]
         moved = [drive] if self._node.is_of(drive, entry.address) else sharing
@@ -245,7 +246,7 @@ class NodeParameters:
         conclude: Reply,
         result: ParameterReading | ParameterError,
     ) -> None:
-        """``raw`` is the object whose bytes are asked for."""
+        """Conclude a read; ``raw`` is the object whose bytes are asked for."""
         if isinstance(result, ParameterError):
             conclude(_failed(result))
             return
@@ -284,7 +285,7 @@ class NodeParameters:
     def _as_listed(
         self, drive: ParameterHolder, entry: ParameterEntry, reading: ParameterReading
     ) -> ParameterReading | ParameterError:
-        """What was written as bytes, as the value that it is of."""
+        """Reading of bytes that were written, decoded as the parameter that they belong to."""
         listed = drive.spec.names.resolve(str(entry.address))
         held = self._access[drive.name].held(entry)
         if listed.definition is None or listed.definition == reading.entry.definition or held is None:
@@ -303,7 +304,7 @@ class NodeParameters:
         conclude(Outcome(Code.OK, Text.of("parameter.is_saved")))
 
     def _conclude(self, request: Request, drive: ParameterHolder, reply: Reply, outcome: Outcome) -> None:
-        """Tell the outcome; a refusal of a write is an event, too."""
+        """Reply with the outcome; a refused write is an event, too."""
         if outcome.abort_code:
             drive.on_sdo_refused(outcome.abort_code, self._now)
         if not outcome.ok and request.action is not Action.READ_PARAMETER:
@@ -322,7 +323,7 @@ class NodeParameters:
     # points
 
     def _poll(self, drive: ParameterHolder, entry: ParameterEntry, done: Callable[[Came], None]) -> None:
-        """Read a point."""
+        """Read a point, and report its result to ``done``."""
 
         def on_result(result: ParameterReading | ParameterError) -> None:
             if isinstance(result, ParameterError):
@@ -346,8 +347,8 @@ class NodeParameters:
 
 
 def _why_not_set(identity: Identity, drive: ParameterHolder) -> Text | None:
-    """Why ``identity`` may not set parameters: an engineer may, and where its protocol knows no roles, who
-    controls the drive or could."""
+    """Reason why ``identity`` may not set parameters, None if it may: an engineer may, and where its protocol
+    knows no roles, whoever controls the drive or could."""
     if identity.role >= Role.ENGINEER:
         return None
     if not identity.may_set_parameters:

@@ -1,1 +1,1 @@
-"""Where a node's parameters and words are: its SDO channels, and the places in its PDOs."""
+"""Places of a node's parameters and words: its SDO channels, and the entries of its PDOs."""

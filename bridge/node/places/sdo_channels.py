@@ -1,4 +1,4 @@
-"""The SDO channels of one node: the first, and those that the site file has opened. Sans-IO.
+"""SDO channels of one node: the first, and those that the site file has opened. Sans-IO.
 
 Each has one transfer at a time; channels do not wait for each other.
 """
@@ -18,19 +18,19 @@ from bridge.command.node import Node
 from bridge.mapping.model import SdoServer
 
 _SEGMENT_BITS: Final = 135
-"""A frame of eight bytes with the most stuff bits and the pause behind it (ISO 11898-1)."""
+"""Bits of a frame of eight bytes with the most stuff bits and the pause behind it (ISO 11898-1)."""
 _SHARE: Final = 0.5
-"""How much of the bus a block transfer may take."""
+"""Share of the bus that a block transfer may take."""
 
 
 def opened_servers(node: Node | NodeSpec) -> list[SdoServer]:
-    """The further servers that the site file wants to be used, in its order."""
+    """Further SDO servers that the site file opens, in its order."""
     servers = {server.number: server for server in node.family.sdo}
     return [servers[number] for number in node.table.sdo_channels if number in servers]
 
 
 class SdoChannels:
-    """By number: 1 is the server of object 1200h."""
+    """SDO channels of a node by number: 1 is the server of object 1200h."""
 
     def __init__(self, node: Node | NodeSpec) -> None:
         table = node.table
@@ -52,11 +52,11 @@ class SdoChannels:
         self._all = tuple(self._channels.values())
         same = (server.number for server in opened_servers(node) if server.slot is None)
         self.for_polls = self._channels[next(same, FIRST)]
-        """One that keeps polls out of the way of boot-up and commands, where there is one that reaches the
-        same objects as the first."""
+        """Channel that keeps polls out of the way of boot-up and commands, if one reaches the same objects as
+        the first; else the first."""
 
     def __getitem__(self, number: int) -> SdoChannel:
-        """Raises KeyError where this channel is not open."""
+        """Channel of this number. Raises KeyError where it is not open."""
         return self._channels[number]
 
     def __iter__(self) -> Iterator[SdoChannel]:
@@ -64,15 +64,15 @@ class SdoChannels:
 
     @property
     def unmatched(self) -> int:
-        """Frames on the reply COB-IDs that were no answer."""
+        """Number of frames on the reply COB-IDs that were no answer."""
         return sum(channel.unmatched for channel in self._all)
 
     def take_learned(self) -> list[Learned]:
-        """Why block transfer is not used any more on a channel, once for each."""
+        """Reasons why a channel no longer uses block transfer, each told once."""
         return [why for channel in self._all if (why := channel.take_learned())]
 
     def forget_block(self) -> None:
-        """Another device is there: what was learned of the one before does not count."""
+        """Forget what was learned of block transfer: another device is there."""
         for channel in self._all:
             channel.forget_block()
 

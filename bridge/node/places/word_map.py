@@ -1,4 +1,4 @@
-"""From the entries of a PDO to the 16-bit words of a drive and back."""
+"""Conversion of PDO entries to the 16-bit words of a drive and back."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _WORD_MASK: Final = 0xFFFF
 
 
 class WordPlace(NamedTuple):
-    """The place of a mapped object among the words of its drive.
+    """Place of a mapped object among the words of its drive.
 
-    It fills ``span`` words from ``word`` on, the low one first; or, with ``bits``, so many bits of one
-    word from ``shift`` on.
+    It fills ``span`` words from ``word`` on, the low one first; or, with ``bits``, that many bits of one word
+    from ``shift`` on.
     """
 
     word: int
@@ -25,14 +25,14 @@ class WordPlace(NamedTuple):
 
 
 class WordMap:
-    """Unpacks the values of one PDO's entries into words and back.
+    """Conversion of one PDO's values into words and back.
 
-    An object that is longer than a word fills several; one that is shorter fills its word with its sign
-    or with zeros, unless it shares the word with others.
+    An object that is longer than a word fills several; one that is shorter fills its word with its sign or
+    with zeros, unless it shares the word with others.
     """
 
     def __init__(self, entries: Sequence[PdoEntry], places: Sequence[WordPlace | None], words: int) -> None:
-        """``words`` is how many the drive has; what lies beyond them is left out."""
+        """``words`` is the number of words that the drive has; entries beyond them are left out."""
         self._count = len(entries)
         whole: list[tuple[int, int, int]] = []
         parts: list[tuple[int, int, int, int]] = []
@@ -50,11 +50,11 @@ class WordMap:
         short = all(entry.bits <= WORD_BITS for entry in entries)
         in_order = [(number, number) for number in range(len(entries))]
         self.in_order = len(entries) if short and [item[:2] for item in whole] == in_order else 0
-        """How many of the words the values are, from the first on as they are and without a sign; 0 where
-        they are anything else."""
+        """Number of words, from the first on, that are the values as they are and without a sign; 0 where the
+        mapping is any other."""
 
     def unpack(self, values: Sequence[int], words: list[int]) -> None:
-        """Write the values into their places of ``words``."""
+        """Write the values to their places in ``words``."""
         for place, entry, shift in self._whole:
             words[place] = values[entry] >> shift & _WORD_MASK
         if self._parts:
@@ -64,7 +64,7 @@ class WordMap:
                 words[place] |= (values[entry] & mask) << shift & _WORD_MASK
 
     def pack(self, words: Sequence[int]) -> list[int]:
-        """The values of the entries; what is mapped beside the words is 0."""
+        """Values of the entries; anything mapped beside the words is 0."""
         values = [0] * self._count
         for place, entry, shift in self._whole:
             values[entry] |= words[place] << shift

@@ -1,4 +1,4 @@
-"""By which identifiers the drives of a node are commanded, and what a frame on one of them asks. Sans-IO."""
+"""Identifiers that command the drives of a node, and what a frame on one of them asks for. Sans-IO."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ NO_OUTPUTS: Final[Mapping[str, OutputPdos]] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class CommandFrame:
-    """One RPDO."""
+    """One RPDO that commands a drive or outputs."""
 
     label: Text
     words: ControlWords
     rpdo: DriveRpdo | OutputRpdo
 
     def said(self, data: bytes) -> Words:
-        """The words for what ``data`` asks of the drive; bytes where that is nothing."""
+        """Text of what ``data`` asks of the drive; the bytes where that is nothing."""
         raw = data.hex(" ").upper()
         word = self.rpdo.control_word(data)
         if word is None:
@@ -48,8 +48,8 @@ def commands_of(
     stop_words: StopWords,
     output_pdos: Mapping[str, OutputPdos] = NO_OUTPUTS,
 ) -> dict[int, CommandFrame]:
-    """By COB-ID: of drives that are ``connected`` the RPDOs that the node has; of the others those under
-    which they may listen; of drives that the site leaves out those of the factory; and those of outputs."""
+    """RPDOs by COB-ID: of ``connected`` drives those that the node has; of the others those under which they
+    may listen; of drives that the site leaves out those of the factory; and those of outputs."""
     family = node.family
     words, count = ControlWords(family.control_word), len(family.process.rpdo)
     drives = {drive.slot.name: drive for drive in node.drives}

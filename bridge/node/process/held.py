@@ -1,4 +1,5 @@
-"""How long before its owner's deadline the bridge may fail and the kernel still stops the drive. Pure."""
+"""Time before its owner's deadline at which the bridge may fail and the kernel still stops the drive.
+Pure."""
 
 from __future__ import annotations
 
@@ -13,8 +14,8 @@ _ROUNDING: Final = 1e-9
 
 
 def held_s(bus: BusTable, transmission_type: int) -> float:
-    """How long before its owner's deadline the bridge may fail so that the drive still stops in time; 0 if it
-    never does. ``transmission_type`` is that of the RPDO with the control word.
+    """Longest time in seconds before the owner's deadline at which the bridge may fail so that the drive
+    still stops in time; 0 if it never does. ``transmission_type`` is that of the RPDO with the control word.
 
     No burst outlasts the dead-man time, SYNC's neither: a drive may supervise SYNC, too. From the deadline on
     the stop takes up to two RPDO periods (``burstend.sequence``), then a synchronous RPDO waits for its SYNC;
@@ -29,7 +30,7 @@ def held_s(bus: BusTable, transmission_type: int) -> float:
 
 
 def least_deadman_ms(bus: BusTable, transmission_type: int) -> int:
-    """The shortest dead-man time with which the stop of a synchronous RPDO becomes effective without the
+    """Shortest dead-man time in ms with which the stop of a synchronous RPDO takes effect without the
     bridge."""
     period_ms = 1000 * bus.rpdo_period_s
     stop_in_syncs = math.floor(2 * period_ms / bus.sync_period_ms + _ROUNDING) + 2
@@ -42,7 +43,7 @@ def _syncs(transmission_type: int) -> int:
 
 
 def _reach_s(period_s: float, deadman_ms: int, most: int | None = None) -> float:
-    """The least time to the last frame of a burst; 0 if the kernel does not send it."""
+    """Shortest time in seconds to the last frame of a burst; 0 if the kernel does not send it."""
     count = burst_length(period_s, deadman_ms)
     if count < SHORTEST:
         return 0.0

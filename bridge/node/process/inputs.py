@@ -18,7 +18,7 @@ Reject = Callable[[Frame, Text], None]
 def connect_inputs(
     device: Device, plan: SignalPlan, sync_period_ms: int, reject: Reject, now: float
 ) -> dict[int, Callable[[Frame], None]]:
-    """Tell ``device`` what the boot-up has found; who takes its TPDOs, by COB-ID."""
+    """Tell ``device`` what the boot-up has found; returns the handlers of its TPDOs, by COB-ID."""
     device.on_pdos([_input_pdo(tpdo, sync_period_ms) for tpdo in plan.pdos], plan.unserved, now)
     return {
         tpdo.cob_id: partial(_on_frame, device, place, tpdo, reject) for place, tpdo in enumerate(plan.pdos)

@@ -17,7 +17,7 @@ from bridge.text import Text
 
 
 class OutputRpdo:
-    """Packs one RPDO from what the outputs get."""
+    """One RPDO, packed from the words of the outputs."""
 
     def __init__(self, plan: PdoPlan, outputs: Outputs) -> None:
         self.cob_id = plan.cob_id
@@ -33,7 +33,7 @@ class OutputRpdo:
         self._packed: dict[tuple[int, ...], Frame] = {}
 
     def frame(self, wired: tuple[int, ...]) -> Frame:
-        """The frame by which the outputs get these words; the same one while they stay."""
+        """Frame that carries these words to the outputs; the same object while they stay."""
         known = self._packed.get(wired)
         if known is None:
             values = [self._words.raw(wired, place) if place else 0 for place in self._places]
@@ -42,11 +42,12 @@ class OutputRpdo:
         return known
 
     def last_frame(self) -> Frame:
-        """The frame in which a burst ends."""
+        """Frame in which a burst ends."""
         return self.frame(self._channel.on_wire(self._channel.output_then()))
 
     def control_word(self, data: bytes) -> int | None:
-        """As if it were that of a drive: whether a frame with this data leaves every output of it safe."""
+        """Control word as if it were a drive's: 0 if a frame with this data leaves every output safe, else
+        ACTIVE; None if the data are too short."""
         if len(data) < self._codec.length:
             return None
         values = self._codec.unpack(data[: self._codec.length])
@@ -57,7 +58,7 @@ class OutputRpdo:
 
 
 class OutputPdos:
-    """All RPDOs of one device, to be used as those of a drive are. Whether they are followed is read back
+    """All RPDOs of one device, used like those of a drive. Whether they are followed is read back
     (``read_back.py``), or told by TPDOs that are its inputs'."""
 
     tpdos: tuple[DriveTpdo, ...] = ()
@@ -66,7 +67,7 @@ class OutputPdos:
     def __init__(self, outputs: Outputs, plans: Sequence[PdoPlan]) -> None:
         self._channel = outputs.channel
         self.control_words = outputs.channel.words
-        """To whom a telegram's control word says whether it is active."""
+        """Control words by which a telegram says whether it is active."""
         self.rpdos = tuple(OutputRpdo(plan, outputs) for plan in plans)
         kind = min(plan.transmission_type for plan in plans)
         self.rpdo_type = kind
@@ -75,7 +76,7 @@ class OutputPdos:
         self.handlers: dict[int, Callable[[Frame], None]] = {}
 
     def repetitions(self, period_s: float) -> list[Repetition]:
-        """The frames that belong on the bus now."""
+        """Frames that belong on the bus now."""
         channel = self._channel
         wired, until = channel.on_wire(channel.output), channel.until
         hold_at = (until - self._held_s,) if until is not None and self._held_s else ()
@@ -85,7 +86,7 @@ class OutputPdos:
         ]
 
     def frames_with_stop(self) -> list[Frame]:
-        """The frames by which every output is safe."""
+        """Frames that make every output safe."""
         safe = self._channel.output_words.safe(self._channel.output_words.held)
         return [rpdo.frame(safe) for rpdo in self.rpdos]
 
@@ -97,7 +98,8 @@ def _last(rpdo: OutputRpdo) -> Frame | None:
 def connect_outputs(
     outputs: Outputs, plan: SignalPlan, result: BootResult, is_taken: Callable[[int], bool], now: float
 ) -> OutputPdos | None:
-    """Tell ``outputs`` what the boot-up has found; their RPDOs, None where there is none that can be used."""
+    """Tell ``outputs`` what the boot-up has found; returns their RPDOs, None where there is none that can be
+    used."""
     plans: list[PdoPlan] = []
     for one in plan.pdos:
         if is_taken(one.cob_id):

@@ -1,5 +1,5 @@
-"""What has to be polled: objects, after everything else that wants the SDO channel, and TPDOs that come only
-on a remote frame."""
+"""Polling of a node: objects, after everything else that wants the SDO channel, and TPDOs that come only on a
+remote frame."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bridge.node.process.remote_polling import RemotePolling
 
 
 class Polling:
-    """The polls of one mapping file, each with its point ``place``/NAME in the image."""
+    """Polls of one mapping file, each with its point ``place``/NAME in the image."""
 
     def __init__(self, polls: list[Poll], sdo: SdoChannel, image: Image, place: str) -> None:
         self._polls = polls
@@ -24,19 +24,19 @@ class Polling:
         self._image, self._place = image, place
         self._due: list[tuple[float, int]] = []
         self._asked: set[int] = set()
-        """Polls that wait for their answer: of a node that is slow, no more of them pile up."""
+        """Polls that wait for their answer: those of a slow node do not pile up."""
         self._now = 0.0
         self._spared: dict[str, float] = {}
         self._remote = RemotePolling()
 
     def start(self, drives: Iterable[DrivePdos], now: float) -> None:
-        """Begin; of ``drives``, whose TPDOs have to be asked for are asked."""
+        """Begin; TPDOs of ``drives`` that come on request only are requested."""
         self._due = [(now, number) for number in range(len(self._polls))]
         self._asked.clear()
         self._remote.start(drives, now)
 
     def on_pdo(self, name: str, value: int, now: float, until: float) -> None:
-        """A PDO has brought this value: it is not asked for before ``until``."""
+        """Show a value that a PDO has brought: it is not asked for before ``until``."""
         self._spared[name] = until
         self._show(name, value, now)
 

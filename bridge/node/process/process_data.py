@@ -25,11 +25,12 @@ Reject = Callable[[Frame, Text], None]
 
 
 class Repetition(NamedTuple):
-    """One identifier: the frames to be repeated in turn, and how often. They may be on the bus no longer than
-    ``until``; ``then`` gives the frame that follows, None for silence.
+    """Frames to be repeated in turn on one identifier, and their period. They may be on the bus no longer
+    than ``until``; ``then`` gives the frame that follows, None for silence.
 
     A burst that is handed over at one of ``hold_at`` or later lasts as long as a drive needs to stop without
-    us (``held.py``)."""
+    us (``held.py``).
+    """
 
     frames: tuple[Frame, ...]
     period_s: float
@@ -39,8 +40,8 @@ class Repetition(NamedTuple):
 
 
 class RunningBurst(NamedTuple):
-    """What a bus repeats at present: ``frames`` until then, ``ends`` at the latest if nobody renews it, as it
-    has been told ``at`` that time."""
+    """Present repetition of a bus: ``frames`` up to ``until``, and to ``ends`` at the latest if nobody renews
+    it; handed over ``at`` that time."""
 
     frames: tuple[Frame, ...]
     until: float | None
@@ -48,7 +49,7 @@ class RunningBurst(NamedTuple):
     at: float
 
     def ends_as(self, wanted: Repetition, now: float) -> bool:
-        """Whether it does so at the right time without being told again."""
+        """Whether it ends as ``wanted`` without being handed over again."""
         if any(self.at < at <= now for at in wanted.hold_at):
             return False
         earliest = min((time for time in (self.until, wanted.until) if time is not None), default=self.ends)
@@ -56,7 +57,7 @@ class RunningBurst(NamedTuple):
 
 
 class DriveTpdo:
-    """Unpacks one TPDO of a drive into the drive's words. ``further`` is None for the one with the status
+    """One TPDO of a drive, unpacked into the drive's words. ``further`` is None for the one with the status
     word, by which the drive's freshness is judged."""
 
     def __init__(self, drive: Drive, plan: PdoPlan, further: FurtherTpdo | None, reject: Reject) -> None:
@@ -70,7 +71,7 @@ class DriveTpdo:
         self._length = plan.codec.length
         self._map = WordMap(plan.codec.entries, plan.places, len(drive.words))
         self._in_order = self._map.in_order == len(drive.words) and not plan.codec.has_signed
-        """The codec's values are the words as they are."""
+        """True if the codec's values are the words as they are."""
         self._words = list(drive.words)
         self._last: bytes | None = None
 
@@ -79,7 +80,7 @@ class DriveTpdo:
         return self.plan.transmission_type <= LAST_SYNCHRONOUS
 
     def on_frame(self, frame: Frame) -> None:
-        """The TPDO with the status word."""
+        """Take the TPDO with the status word."""
         data = frame.data
         if data == self._last:
             self._drive.on_unchanged_data(frame.time)
@@ -97,7 +98,7 @@ class DriveTpdo:
         self._drive.on_process_data(words, frame.time)
 
     def on_further(self, frame: Frame) -> None:
-        """Another TPDO."""
+        """Take another TPDO."""
         further = self.further
         if further is None:
             return
@@ -110,7 +111,7 @@ class DriveTpdo:
             self._drive.on_further_data(further, frame.time)
 
     def _values(self, frame: Frame) -> tuple[int, ...] | None:
-        """The values of a frame; None where it is too short."""
+        """Values of a frame; None where it is too short."""
         data = frame.data
         length = self._length
         if len(data) != length:
@@ -126,7 +127,7 @@ class DriveTpdo:
 
 
 class DriveRpdo:
-    """Packs one RPDO of a drive from the channel's output."""
+    """One RPDO of a drive, packed from the channel's output."""
 
     def __init__(self, plan: PdoPlan, words: int) -> None:
         self.cob_id = plan.cob_id
@@ -137,21 +138,21 @@ class DriveRpdo:
         self._map = WordMap(plan.codec.entries, plan.places, words)
         first = self._map.in_order
         self._in_order = struct.Struct(f"<{first}H") if first and plan.codec.length == 2 * first else None
-        """Packs the first words where the PDO is nothing else."""
+        """Packer of the first words, where the PDO carries nothing else."""
         self._words: Sequence[int] = ()
         self._packed = (Frame(plan.cob_id),)
         self._last_words: Sequence[int] = ()
         self._last = Frame(plan.cob_id)
 
     def frames(self, words: Sequence[int]) -> tuple[Frame, ...]:
-        """The burst that carries these words; the same one while they stay."""
+        """Burst that carries these words; the same object while they stay."""
         if words != self._words:
             self._words = words
             self._packed = (self.frame(words),)
         return self._packed
 
     def last_frame(self, output: RpdoWords) -> Frame | None:
-        """The frame in which a burst ends, kept as well; None where it ends in silence."""
+        """Frame in which a burst ends, kept as well; None where it ends in silence."""
         if output.silent:
             return None
         if output.words != self._last_words:
@@ -160,14 +161,14 @@ class DriveRpdo:
         return self._last
 
     def frame(self, words: Sequence[int]) -> Frame:
-        """The frame that carries these words, the control word first; what is mapped beside them is 0."""
+        """Frame that carries these words, the control word first; anything else that is mapped is 0."""
         if self._in_order:
             first = words[: self._in_order.size // 2]
             return Frame(self.cob_id, self._in_order.pack(*[word & 0xFFFF for word in first]))
         return Frame(self.cob_id, self._codec.pack(self._map.pack(words)))
 
     def control_word(self, data: bytes) -> int | None:
-        """The control word of a frame with this data; None where it has none."""
+        """Control word of a frame with this data; None where it has none."""
         if not self._has_control_word or len(data) < self._codec.length:
             return None
         words = [0] * self._count
@@ -176,8 +177,8 @@ class DriveRpdo:
 
 
 class DrivePdos:
-    """All PDOs of one drive. Of several the one with the status word is the first of ``tpdos``, and the
-    one with the control word the last of ``rpdos``: setpoints are there when an enable comes."""
+    """All PDOs of one drive. The one with the status word is the first of ``tpdos``, the one with the control
+    word the last of ``rpdos``: setpoints are there when an enable comes."""
 
     def __init__(
         self, drive: Drive, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan], reject: Reject
@@ -189,7 +190,7 @@ class DrivePdos:
         kind = rpdos[0].transmission_type
         self._held_s = held_s(drive.bus, kind)
         self.needs_sync = kind <= LAST_SYNCHRONOUS
-        """Whether a stop has to be taken over by SYNC."""
+        """Whether a stop takes effect with SYNC only."""
         main, *others = tpdos
         self.tpdos = (
             DriveTpdo(drive, main, None, reject),
@@ -198,7 +199,7 @@ class DrivePdos:
 
     @property
     def handlers(self) -> dict[int, Callable[[Frame], None]]:
-        """Who takes which identifier."""
+        """Handlers of the TPDOs, by COB-ID."""
         main, *others = self.tpdos
         return {main.cob_id: main.on_frame, **{tpdo.cob_id: tpdo.on_further for tpdo in others}}
 
@@ -211,7 +212,7 @@ class DrivePdos:
         return self._drive.channel.output.silent
 
     def repetitions(self, period_s: float) -> list[Repetition]:
-        """The frames that belong on the bus now, those of each identifier together."""
+        """Frames that belong on the bus now, those of each identifier together."""
         channel = self._drive.channel
         words, until = channel.output.words, channel.until
         hold_at = (until - self._held_s,) if until is not None and self._held_s else ()
@@ -220,7 +221,7 @@ class DrivePdos:
         ]
 
     def frames_with(self, words: Sequence[int]) -> list[Frame]:
-        """The frames that carry these words."""
+        """Frames that carry these words."""
         return [rpdo.frame(words) for rpdo in self.rpdos]
 
 
@@ -233,7 +234,7 @@ def _further(drive: Drive, plan: PdoPlan) -> FurtherTpdo:
 
 
 def _deadline_s(drive: Drive, tpdo: PdoPlan) -> float | None:
-    """When a TPDO is late."""
+    """Time in seconds after which a TPDO is late; None where it never is."""
     given_ms = drive.table.tpdo_deadline_ms
     if given_ms is not None:
         return given_ms / 1000 or None
@@ -249,8 +250,8 @@ def connect(
     is_taken: Callable[[int], bool],
     now: float,
 ) -> dict[str, DrivePdos]:
-    """Give the drives what the boot-up has found: identity, scales, PDOs. Those without PDOs that can be
-    used are left out, and those whose identifiers another node of the bus has (``is_taken``)."""
+    """Give the drives what the boot-up has found: identity, scales, PDOs. Those without usable PDOs are left
+    out, and those whose identifiers another node of the bus has (``is_taken``)."""
     connected: dict[str, DrivePdos] = {}
     for drive in node.drives:
         drive.on_identification(result.identification, now)
@@ -287,7 +288,7 @@ def _of(drive: Drive, what: Text) -> Text:
 
 
 def _without_effect(bus: BusTable, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan]) -> list[Text]:
-    """What these PDOs wait for and will not get from us."""
+    """Notes on PDOs that wait for something that they will not get from us."""
     found: list[Text] = []
     listed = [("RPDO", plan, LAST_SYNCHRONOUS) for plan in rpdos]
     listed += [("TPDO", plan, REMOTE_SYNCHRONOUS) for plan in tpdos]

@@ -1,4 +1,4 @@
-"""Asks for TPDOs of types 252 and 253, which come on a remote frame only (CiA 301 §7.5.2.37)."""
+"""Requests for TPDOs of types 252 and 253, which come on a remote frame only (CiA 301 §7.5.2.37)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class _Polled:
 
 
 class RemotePolling:
-    """The TPDOs of one node that have to be asked for, each in its drive's ``rtr_poll_ms``."""
+    """TPDOs of one node that come on request only, each requested every ``rtr_poll_ms`` of its drive."""
 
     def __init__(self) -> None:
         self._asked: list[_Polled] = []

@@ -29,25 +29,26 @@ IsForeign = Callable[[int], bool]
 
 
 class StopWords:
-    """``downloads`` are what the site's files configure; ``memory`` has what the node has said."""
+    """Stop words of one node. ``downloads`` are what the site's files configure; ``memory`` has what the node
+    has said."""
 
     def __init__(self, node: Node, downloads: Sequence[Download], memory: BootMemory) -> None:
         self._node = node
         self._memory = memory
         self._known = {drive.name: list(_known(node, drive, downloads)) for drive in node.drives}
         self.given_ids = frozenset(_given_ids(node, downloads))
-        """Identifiers of PDOs that the site's files give this node: no other node's stop goes there."""
+        """Identifiers that the site's files give to PDOs of this node: no other node's stop goes there."""
 
     def plans(self, drive: Drive) -> dict[int, PdoPlan]:
-        """The RPDOs under which this drive may listen, by their COB-IDs."""
+        """RPDOs under which this drive may listen, by COB-ID."""
         # Of one identifier what the node itself has said of it counts, and that comes last.
         plans = [*self._known[drive.name], *self._memory.rpdos_of(drive.name)]
         return {plan.cob_id: plan for plan in plans}
 
     def frames(self, connected: Mapping[str, DrivePdos], is_foreign: IsForeign) -> list[Frame]:
-        """A stop for every drive and no setpoints: by its PDOs what stops it at present, which may be a ramp;
-        where they are not known a stopped word. Identifiers of other nodes (``is_foreign``) are left alone.
-        """
+        """Stop for every drive, without setpoints: on its PDOs the words that stop it at present, which may
+        be a ramp; where they are not known, a stopped word. Identifiers of other nodes (``is_foreign``) are
+        left alone."""
         frames: list[Frame] = []
         for drive in self._node.drives:
             channel = drive.channel
@@ -68,8 +69,8 @@ class StopWords:
 
 
 def _known(node: Node, drive: Drive, downloads: Sequence[Download]) -> Iterator[PdoPlan]:
-    """The RPDOs of a drive as the mapping file has them, those that are off at factory left out, then as the
-    configuration and the site file want them."""
+    """RPDOs of a drive by the mapping file, without those that are off at the factory, then by the
+    configuration and the site file."""
     for pdo in drive.slot.rpdo:
         factory_id = pdo.cob_id + node.table.id
         if not pdo.optional:
@@ -84,7 +85,8 @@ def _known(node: Node, drive: Drive, downloads: Sequence[Download]) -> Iterator[
 
 
 def _configured(pdo: Pdo, downloads: Sequence[Download]) -> tuple[int, list[PdoEntry]] | None:
-    """COB-ID and mapping that are downloaded for this PDO; no entries where none are."""
+    """COB-ID and mapping that are downloaded for this PDO, without entries where no mapping is; None where it
+    is off."""
     held = {(one.index, one.sub): int.from_bytes(one.data, "little") for one in downloads}
     cob_id = held.get((_RPDO + pdo.number - 1, 1), cobid.PDO_DISABLED)
     if cob_id & (cobid.PDO_DISABLED | cobid.PDO_EXTENDED):

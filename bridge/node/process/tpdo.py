@@ -1,4 +1,4 @@
-"""TPDOs of a node that belong to none of its drives: they carry what would be polled otherwise."""
+"""TPDOs of a node that belong to none of its drives: they carry values that would be polled otherwise."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ Reject = Callable[[Frame, Text], None]
 def node_tpdos(
     plans: Sequence[NodePdoPlan], sync_period_ms: int, show: Show, reject: Reject
 ) -> dict[int, Callable[[Frame], None]]:
-    """Who takes these TPDOs, by COB-ID."""
+    """Handlers of these TPDOs, by COB-ID."""
     return {plan.pdo.cob_id: NodeTpdoReader(plan, sync_period_ms, show, reject).on_frame for plan in plans}
 
 
 class NodeTpdoReader:
-    """One of them. ``show`` gets name, value and time, and until when nobody need ask by SDO."""
+    """Reader of one such TPDO. ``show`` gets name, value, time, and the time until which nobody need ask by
+    SDO."""
 
     def __init__(
         self,

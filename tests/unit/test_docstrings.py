@@ -17,7 +17,7 @@ ROOMS = (
     "canclient",
     "canopen",
     "cli",
-    "command/leg",
+    "command",
     "condition",
     "dbc",
     "derive",

@@ -22,6 +22,7 @@ ROOMS = (
     "dbc",
     "derive",
     "dictionary",
+    "drive",
     "eds",
     "image",
     "lint",

@@ -19,6 +19,7 @@ ROOMS = (
     "cli",
     "command",
     "condition",
+    "config",
     "dbc",
     "derive",
     "dictionary",

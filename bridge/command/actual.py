@@ -59,7 +59,7 @@ class ActualData:
         image: Image,
         on_code: Callable[[Meaning, int, float], None],
     ) -> None:
-        """``on_code`` gets the code of a word's meaning, where a TPDO brings it."""
+        """Process data of one drive. ``on_code`` gets the code of a word's meaning from a TPDO."""
         drive, family = channel.name, channel.family
         self._on_code = on_code
         told = [(one, family.told_by(slot, one)) for one in _meanings(channel, slot)]
@@ -257,7 +257,7 @@ class ActualData:
             self._image.judge((point.index,), own, now, why or reason)
 
     def _quality_of(self, point: _Judged, quality: Quality) -> tuple[Quality, Said]:
-        """A point's quality, and the reason where that is not the one of the drive's ``quality``."""
+        """Quality of a point, and the reason where that is not the one of the drive's ``quality``."""
         if not quality.has_value:
             return quality, ""
         if point.lack and not point.lack.quality.has_value:

@@ -38,7 +38,7 @@ IGNORED: Final = "ignored"
 SUMMARY_S: Final = 60.0
 """Interval in seconds of the entries for what was only counted."""
 SETPOINTS_S: Final = 1.0
-"""While only setpoints change, one telegram of each drive gets an entry in this time, and the last one."""
+"""Interval in seconds of the entries for one drive while only setpoints change; the last one gets its own."""
 AT_ONCE: Final = 20
 """Entries written at once; then one in ``REFUSED_EVERY_S`` for all that one client is refused, whatever it
 asks for and calls itself, and one in ``DONE_EVERY_S`` for what it does with one drive or node in one way."""
@@ -46,14 +46,14 @@ REFUSED_EVERY_S: Final = 3.0
 DONE_EVERY_S: Final = 1.0
 _MOST_SHARES: Final = 1000
 _MOST_SUMS: Final = 4
-"""Pairs of user and target that a summary of one client, action and code tells apart."""
+"""Most pairs of user and target that a summary of one client, action and code tells apart."""
 _OTHERS: Final = "others"
 _CARRIED_OUT: Final = (Code.OK, Code.TIMED_OUT, Code.CANCELLED, Code.REFUSED_BY_DRIVE, IGNORED)
 """Outcomes of requests that reached a drive or node; the others were refused before."""
 _BRIDGE: Final = Identity(Source.NONE, "drivebridge", Role.ENGINEER)
 _ACTIONS: Final = frozenset(Action) | {"call"}
 _READS: Final = "read_"
-"""Actions that only read begin with it."""
+"""Prefix of actions that only read."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ _ASYNCHRONOUS: Final = 255
 
 
 class StopCheck(Protocol):
-    """Outcome of the last stop of something that is commanded, as far as it is known."""
+    """Outcome of the last stop of a drive or of outputs, as far as it is known."""
 
     @property
     def follows(self) -> bool:
@@ -94,8 +94,7 @@ class Commanded(Protocol):
         ...
 
     def on_own_supervision_changed(self, why: Text, now: float) -> None:
-        """Forget what it does by itself when the bridge falls silent: an object that decides it was
-        written."""
+        """Forget its own reaction to a silent bridge: an object that decides it was written."""
         ...
 
     def on_handed_over(self, now: float) -> None:
@@ -111,7 +110,7 @@ class Commanded(Protocol):
         ...
 
     def refresh(self, now: float) -> None:
-        """Bring every point up to date; called when something has changed."""
+        """Bring all points up to date, after something has changed."""
         ...
 
     def look(self, now: float) -> None:
@@ -131,7 +130,7 @@ def is_enabling(one: Commanded) -> bool:
 
 
 class WordTiming:
-    """Times that the words of something that is commanded take, in seconds unless the name says otherwise."""
+    """Times that the words of a drive or of outputs take, in seconds unless the name says otherwise."""
 
     def __init__(self, bus: BusTable) -> None:
         self.bus = bus

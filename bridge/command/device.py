@@ -180,7 +180,7 @@ class Device:
         heard.told_values = told
 
     def on_time(self, now: float) -> None:
-        """Judge what is late by now."""
+        """Judge which TPDOs are late, and show their age."""
         for heard in self._heard:
             heard.link.on_time(now)
         self._judge(now)

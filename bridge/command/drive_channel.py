@@ -68,7 +68,7 @@ class DriveChannel(Channel):
 
     @property
     def silence_stops(self) -> bool:
-        """The drive is known to stop by itself when it gets no RPDO any more, or nobody has asked it yet."""
+        """The drive is known to stop by itself without RPDOs, or nobody has asked it yet."""
         return self.leg.silence_stops
 
     @property

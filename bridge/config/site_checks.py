@@ -143,8 +143,7 @@ def _check_control(drive: RawTable, file: TomlFile) -> None:
 
 
 def _check_life_sign(drive: RawTable, file: TomlFile) -> None:
-    """Check time-outs: a token read at the last moment is ``LIFE_SIGN_MS`` old when a program brings it
-    back."""
+    """Check time-outs: a token that is read last thing is ``LIFE_SIGN_MS`` old when a program returns it."""
     if drive.text("control") not in (*_PROTOCOLS, "lease"):
         file.fault((*drive.key, "life_sign"), "has no effect: nobody controls the drive", "leave it out")
         return

@@ -25,7 +25,7 @@ _GENERAL: Final[dict[Language, tuple[str, str, str]]] = {
 
 
 _NUMBERS: Final = re.compile(r"(\d+\.\d)[\d./… ]*")
-"""The drive's own numbers before the text of a code: 20.1 … 21.3."""
+"""Numbers of the drive's own before the text of a code: 20.1 … 21.3."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class FaultWords:
         return FORM_FIELD.sub(digits, self._faults.form)
 
     def _whole(self, number: int, mask: int | None = None) -> str:
-        """``mask``: bits beside it are not known, and shown as x."""
+        """Number in the maker's form. Bits beside ``mask`` are not known, and shown as x."""
         form = self._faults.form
         if not form or self._is_decimal:
             return str(number)

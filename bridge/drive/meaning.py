@@ -27,8 +27,8 @@ class Meanings:
     """Meanings of one drive's words. Before the boot-up none is known, and values that need one wait."""
 
     def __init__(self, family: Family, slot: Slot, given: Mapping[str, float]) -> None:
-        """``given`` are the scaling parameters of the site file: those of set 1, where no name tells another
-        (``P112.2``)."""
+        """Meanings with the scaling parameters that are ``given`` in the site file: those of set 1, where no
+        name tells another (``P112.2``)."""
         self._family = family
         self._slot = slot
         self.sets = range(_FIRST, family.sets + 1)
@@ -283,8 +283,8 @@ def _absent(family: Family) -> dict[str, float]:
 
 
 def deciding(family: Family, slot: Slot, codes: Codes) -> list[Parameter]:
-    """The parameters that decide what the values mean that are in the words of a drive with these codes, in
-    one of its parameter sets."""
+    """Parameters that decide the meaning of the values in the words of a drive with these codes, in one of
+    its parameter sets."""
     groups = {
         group: [run for run in family.meanings_of(slot, group) if run] for group in ("command", "actual")
     }
@@ -313,8 +313,8 @@ def default_codes(family: Family) -> Codes:
 def codecs(
     family: Family, slot: Slot, group: str, words: Sequence[str], given: Mapping[str, float]
 ) -> list[ValueCodec]:
-    """The commands or the actual values of a drive, scaled by the parameters that are ``given``. Those whose
-    place only the drive knows have none."""
+    """Codecs of the commands or the actual values of a drive, scaled by the parameters that are ``given``.
+    Those whose place only the drive knows have none."""
     return [
         ValueCodec(value, words, _scale(value, given))
         for value in family.values_of(slot)

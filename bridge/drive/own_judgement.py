@@ -60,7 +60,7 @@ class OwnJudgement:
 
     @property
     def first(self) -> DriveWatch | None:
-        """The watch that stops it first."""
+        """Watch that stops it first; None where none does."""
         stops = [(one.bridge_ms, n) for n, one in enumerate(self.watches) if one.bridge_ms is not None]
         return self.watches[min(stops)[1]] if stops else None
 
@@ -211,7 +211,7 @@ def _time(
 
 
 def _reaction(family: Family, one: OwnReaction | None, raw: Raw) -> tuple[str, OwnVerdict, Said]:
-    """The reaction in words, what the drive does then, and why that is not to stop."""
+    """Reaction in words, the drive's behaviour then, and the reason why that is no stop."""
     if one is None:
         return "stops", OwnVerdict.STOPS, ""
     place = place_of(family, one)

@@ -20,10 +20,11 @@ _EXACT: Final = 1 << 53
 
 @dataclass(frozen=True, slots=True)
 class LinearScale:
-    """value = word × full / at + offset; ``limit`` is the largest magnitude as a multiple of ``full``.
+    """Scale of a word: value = word × full / at + offset; ``limit`` is the largest magnitude as a multiple of
+    ``full``.
 
-    The word is a number of ``raw``, 16 or 32 bits. ``least`` and ``most`` are what the family allows
-    beside that, in the value's unit.
+    The word is a number of ``raw``, 16 or 32 bits. ``least`` and ``most`` are what the family allows beside
+    that, in the value's unit.
     """
 
     full: float

@@ -21,8 +21,8 @@ from typing import Final, NamedTuple
 from bridge.command.messages.request import STOP_ACTIONS, Action, Request
 
 GRAIN_MS: Final = 25
-"""A shorter wait cannot be told from none. A telegram can be this much older than assumed: it is the way
-through the bridge's buffers in ``worst_case_stop_ms``."""
+"""Shortest wait in ms that can be told from none. A telegram can be this much older than assumed: it is the
+way through the bridge's buffers in ``worst_case_stop_ms``."""
 
 NOW_S: Final = 0.001
 """Time in seconds from reading to handling that counts as none; part of the grain."""
@@ -40,8 +40,8 @@ _CALM_MOST: Final = 32
 
 
 HANG_MS: Final = 100
-"""An event loop without a turn for this long has hung. Where the connections cannot be seen, a shorter hang
-is not noticed."""
+"""Shortest hang of the event loop in ms, a time without a turn. Where the connections cannot be seen, a
+shorter one is not noticed."""
 _SEEN: Final = frozenset(("opcua", "modbus"))
 """Protocols whose connections are seen; with a lease it may be any."""
 
@@ -54,7 +54,7 @@ def way_ms(control: str) -> int:
 
 
 NEVER: Final = float("-inf")
-"""The time of a telegram that may have waited for any time."""
+"""Time of a telegram that may have waited for any time."""
 TAKEN_LATE: Final = STOP_ACTIONS | {Action.WRITE, Action.RELEASE_CONTROL}
 """Actions that are taken however late: nothing is too old to stop a drive. Whether a write stops one is seen
 when it has been decoded."""
@@ -92,7 +92,7 @@ class LoopPulse(NamedTuple):
 
 
 class Inflow:
-    """The age of what arrives through one connection.
+    """Age of what arrives through one connection.
 
     ``is_hidden``: the connections cannot be seen, and this is everything from one asker. What arrives after a
     hang may have waited somewhere, and cannot be told from what has not.

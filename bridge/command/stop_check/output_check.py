@@ -98,7 +98,7 @@ class OutputStopCheck:
         self._sent: tuple[int, ...] | None = None
         self._is_there = False
         self._stop = 0
-        """Counts what has been judged: an answer that comes late is about another stop."""
+        """Count of the stops that were judged: an answer that comes late is about another one."""
         self._since: float | None = None
         """Time at which the stop was handed to the bus; None without one, and where the node is not there."""
         self._counts_from = inf

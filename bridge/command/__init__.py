@@ -1,4 +1,4 @@
-"""Who may command which drive, what is sent to it, and what happens when the controller falls silent."""
+"""Command side: ownership of drives, the words sent to them, the reaction to a silent controller."""
 
 from bridge.command.audit import Rejection as Rejection
 from bridge.command.commanded import Commanded as Commanded

@@ -1,4 +1,4 @@
-"""What a drive reports in its TPDOs, in the image: words, values made of them, and their quality."""
+"""Process data of a drive's TPDOs in the image: raw words, the values made of them, and their quality."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bridge.text import Said, Text
 
 _GOOD: Final = (Quality.GOOD, "")
 _SPEEDS: Final = ("frequency", "velocity")
-"""Names of the value by which one sees whether a drive slows down."""
+"""Names of the actual value that shows whether a drive slows down."""
 _STATUS: Final = ("status_word", "drive_status_word", "state", "emcy_code")
 
 
@@ -30,7 +30,7 @@ class _Plain(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Judged:
-    """One point of the process data: why it is not served, if so, and the further TPDOs it comes by."""
+    """Point of the process data: its lack, None where it is served, and the further TPDOs that bring it."""
 
     index: int
     lack: Lack | None = None
@@ -39,13 +39,13 @@ class _Judged:
 
 @dataclass(frozen=True, slots=True)
 class _Compiled:
-    """How the words become values in one parameter set: first those that are computed without a call."""
+    """Decoding of the words in one parameter set; plain values, computed without a call, come first."""
 
     plain: tuple[_Plain, ...]
     others: tuple[ValueCodec, ...]
     judged: tuple[_Judged, ...]
     speed: ValueCodec | None
-    """None where the TPDO with the status word brings no actual speed."""
+    """Codec of the actual speed; None where the TPDO with the status word brings none."""
 
 
 class ActualData:
@@ -59,7 +59,7 @@ class ActualData:
         image: Image,
         on_code: Callable[[Meaning, int, float], None],
     ) -> None:
-        """``on_code`` gets the code of a word's meaning, where a TPDO brings it."""
+        """Process data of one drive. ``on_code`` gets the code of a word's meaning from a TPDO."""
         drive, family = channel.name, channel.family
         self._on_code = on_code
         told = [(one, family.told_by(slot, one)) for one in _meanings(channel, slot)]
@@ -101,7 +101,7 @@ class ActualData:
 
     @property
     def told_by_tpdo(self) -> frozenset[str]:
-        """The words whose meaning the drive's TPDOs tell, by their leaves."""
+        """Leaves of the words whose meaning the drive's TPDOs tell."""
         return frozenset(one.leaf for _, one in self._telling)
 
     def _look_for_codes(self, now: float) -> None:
@@ -122,7 +122,7 @@ class ActualData:
         )
 
     def _is_speed(self, codec: ValueCodec, lack: Lack | None) -> bool:
-        """Served by the TPDO with the status word. Its scale does not matter."""
+        """An actual speed that the TPDO with the status word brings; its scale may be unknown."""
         unserved = [
             f"actual/{leaf}" for leaf in (codec.model.name, *(self._process[n] for n in codec.places))
         ]
@@ -133,7 +133,7 @@ class ActualData:
         )
 
     def _use(self, status_word: int) -> None:
-        """Words mean what they mean in the parameter set that the drive tells."""
+        """Use the meanings of the parameter set that the status word tells."""
         compiled = self._of_sets[self._set.of(status_word)]
         self._plain, self._others, self._judged = compiled.plain, compiled.others, compiled.judged
         self._speed = compiled.speed
@@ -158,14 +158,14 @@ class ActualData:
         return tuple(pdo for pdo in self._channel.link.further if not pdo.places.isdisjoint(places))
 
     def on_heard_again(self) -> None:
-        """The drive could not be heard for a while: the values of its further TPDOs may have changed."""
+        """Call the further TPDOs stale: their values may have changed while the drive was not heard."""
         for pdo in self._channel.link.further:
             if pdo.quality is Quality.GOOD:
                 pdo.quality = Quality.STALE
         self._shown = None
 
     def on_further_data(self, pdo: FurtherTpdo, now: float) -> None:
-        """One of the further TPDOs; its words are in ``words`` already."""
+        """Take over a further TPDO, whose words are in ``words`` already."""
         if self._has_followers:
             self._channel.on_actual_words(self.words, now)
         if pdo.on_data(now):
@@ -175,15 +175,14 @@ class ActualData:
         self.refresh(now)
 
     def look(self, now: float) -> None:
-        """Judge how good everything is at this moment: of a deadline that has passed the image learns
-        otherwise when a timer runs."""
+        """Judge the quality of all points; a deadline that has passed otherwise shows when a timer runs."""
         if [pdo for pdo in self._channel.link.further if pdo.on_time(now)]:
             self._shown = None
         if not self._is_good(now):
             self.refresh(now)
 
     def on_process_data(self, words: Sequence[int], now: float) -> None:
-        """The TPDO with the status word, changed; ``words`` are raw, in the order of ``process.tpdo``."""
+        """Take over a changed TPDO with the status word; ``words`` are raw, ordered as ``process.tpdo``."""
         held, channel = self.words, self._channel
         if self._has_followers:
             channel.on_actual_words(words, now)
@@ -203,7 +202,7 @@ class ActualData:
         self._judge_stop(now)
 
     def on_unchanged_data(self, now: float) -> None:
-        """A TPDO that says what the last one said."""
+        """Take note of a TPDO with the same data as the last one."""
         self._stop_check.before_pdo(now)
         self._channel.on_unchanged(now)
         self._judge_stop(now)
@@ -211,7 +210,7 @@ class ActualData:
             self.refresh(now)
 
     def _judge_stop(self, now: float) -> None:
-        """By the TPDO that has just come."""
+        """Tell the stop check of the TPDO that has just arrived."""
         self._stop_check.after_pdo(now)
         if self._channel.leg.drive is DriveState.OPERATION_ENABLED:
             speed = None if self._speed is None else float(self._speed.from_words(self.words))
@@ -236,7 +235,7 @@ class ActualData:
         return self._shown is _GOOD and self._channel.link.quality(now) is Quality.GOOD
 
     def _refresh_values(self, now: float) -> None:
-        """What TPDOs bring beside the status word, as it is and as values."""
+        """Show the words beside the status word, raw and as values."""
         words = self.words
         values: list[Value] = [*words[1:]] if self._has_all else [words[place] for place in self._places]
         for place, full, at in self._plain:
@@ -258,7 +257,7 @@ class ActualData:
             self._image.judge((point.index,), own, now, why or reason)
 
     def _quality_of(self, point: _Judged, quality: Quality) -> tuple[Quality, Said]:
-        """A point's quality, and the reason where that is not the one of the drive's ``quality``."""
+        """Quality of a point, and the reason where that is not the one of the drive's ``quality``."""
         if not quality.has_value:
             return quality, ""
         if point.lack and not point.lack.quality.has_value:
@@ -281,7 +280,7 @@ def _meanings(channel: DriveChannel, slot: Slot) -> list[Meaning]:
 
 
 def _plain(codec: ValueCodec) -> _Plain:
-    """With an unknown scale the bare number, without a word zero."""
+    """Factor of a plain codec: 1 where its scale is unknown, 0 where it has no word."""
     if not codec.places:
         return _Plain(0, 0, 1)
     scale = codec.scale
@@ -289,7 +288,7 @@ def _plain(codec: ValueCodec) -> _Plain:
 
 
 def _unserved(unserved: Mapping[str, Text], leaves: Iterable[str]) -> Lack | None:
-    """What there is to say of these actual values, where the node's PDOs do not carry one of them."""
+    """Lack of these actual values, of which the node's PDOs do not carry one; None where they carry all."""
     for leaf in leaves:
         why = unserved.get(f"actual/{leaf}")
         if why:

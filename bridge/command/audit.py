@@ -1,4 +1,4 @@
-"""What was asked of the plant, by whom, and how it ended: every write, accepted or refused.
+"""Audit trail of the plant: every write and command, accepted or refused, with its sender and outcome.
 
 Sans-IO: requests and outcomes in, entries out. A controller that writes a hundred times a second must not
 fill a disk: its telegrams get an entry if they change something, and are counted otherwise.
@@ -36,24 +36,24 @@ Values = dict[str, Value]
 IGNORED: Final = "ignored"
 """The outcome of a stop that the drive did not follow."""
 SUMMARY_S: Final = 60.0
-"""How often there is an entry for what was only counted."""
+"""Interval in seconds of the entries for what was only counted."""
 SETPOINTS_S: Final = 1.0
-"""While only setpoints change, one telegram of each drive gets an entry in this time, and the last one."""
+"""Interval in seconds of the entries for one drive while only setpoints change; the last one gets its own."""
 AT_ONCE: Final = 20
-"""How many entries at once, then one every so many seconds: for what one client is refused, whatever it asks
-for and whatever it calls itself; for what it has done with one drive or node in one way."""
+"""Entries written at once; then one in ``REFUSED_EVERY_S`` for all that one client is refused, whatever it
+asks for and calls itself, and one in ``DONE_EVERY_S`` for what it does with one drive or node in one way."""
 REFUSED_EVERY_S: Final = 3.0
 DONE_EVERY_S: Final = 1.0
 _MOST_SHARES: Final = 1000
 _MOST_SUMS: Final = 4
-"""Pairs of user and target that a summary of one client, action and code tells apart."""
+"""Most pairs of user and target that a summary of one client, action and code tells apart."""
 _OTHERS: Final = "others"
 _CARRIED_OUT: Final = (Code.OK, Code.TIMED_OUT, Code.CANCELLED, Code.REFUSED_BY_DRIVE, IGNORED)
 """Outcomes of requests that reached a drive or node; the others were refused before."""
 _BRIDGE: Final = Identity(Source.NONE, "drivebridge", Role.ENGINEER)
 _ACTIONS: Final = frozenset(Action) | {"call"}
 _READS: Final = "read_"
-"""Actions that only read begin with it."""
+"""Prefix of actions that only read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ class Rejection:
 
 
 class AuditOutcome(NamedTuple):
-    """An outcome, or what a protocol says that it has refused by itself."""
+    """Outcome of a request, or of one that a protocol has refused by itself."""
 
     code: str
     said: Said = ""
@@ -86,8 +86,8 @@ class AuditOutcome(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class AuditEntry:
-    """One line. ``time`` is when the request came, in monotonic seconds; ``old`` and ``new`` have what it
-    was about to change. ``count`` says how many requests like this one are told by it alone."""
+    """One line. ``time`` is when the request came, in monotonic seconds; ``old`` and ``new`` are the values
+    that it was to replace and to write; ``count`` is the number of like requests that it stands for."""
 
     time: float
     identity: Identity
@@ -106,7 +106,7 @@ class AuditEntry:
 
 @dataclass(slots=True)
 class _Telegrams:
-    """What one drive's owner has written recently."""
+    """Recent telegrams of one drive's owner."""
 
     identity: Identity
     new: Values
@@ -121,8 +121,8 @@ _Sum = tuple[str, Role, str, str, bool] | None
 
 
 def shared_by(one: Identity, other: Identity) -> Identity:
-    """What is true of both, of one protocol: ``user`` is empty where they are not the same with the same
-    role, ``address`` where they are not at the same address, without its port where that is another one."""
+    """Identity with what two of one protocol have in common. ``user`` is empty unless both are the same user
+    with the same role, ``address`` unless both have the same; it has no port where only that differs."""
     is_same = one.is_same(other) and one.role is other.role
     address = one.address
     if address != other.address:
@@ -132,7 +132,7 @@ def shared_by(one: Identity, other: Identity) -> Identity:
 
 
 def _sum_of(one: AuditEntry, other: AuditEntry) -> AuditEntry:
-    """An entry for both, of one protocol, with one code; empty in what they differ."""
+    """One entry for two of one protocol with the same code; fields in which they differ are empty."""
     first, last = one.ending, other.ending
     said = last.said if first.said == last.said else ""
     return replace(
@@ -153,7 +153,7 @@ class _Share:
     is_new: bool = True
     is_used: bool = True
     left_out: dict[_Sum, AuditEntry] = field(default_factory=dict[_Sum, AuditEntry])
-    """What was counted for each, as one entry; beyond ``_MOST_SUMS`` for all others."""
+    """Entries beyond the limit, summed by user and target; beyond ``_MOST_SUMS`` all others in one."""
 
     def allows(self, now: float) -> bool:
         """Whether one more is written at once."""
@@ -161,7 +161,7 @@ class _Share:
         return self.limit.allows(now)
 
     def takes(self, entry: AuditEntry) -> bool:
-        """Whether it is written now; otherwise it is counted."""
+        """Whether an entry is written now; otherwise it is counted."""
         # The first of its kind is written whatever else the client was refused.
         is_new = self.is_new
         if self.allows(entry.time) or is_new:
@@ -175,8 +175,8 @@ class _Share:
         return False
 
     def sum_up(self, now: float) -> list[AuditEntry]:
-        """Those that were left out, one for each user and target, with what is true of all that it counts.
-        But for the first they take from what may be written next."""
+        """Summaries of the entries left out, one for each user and target, with what is true of all that it
+        counts. All but the first are charged to the limit."""
         sums = [replace(one, time=now, old={}, new={}) for one in self.left_out.values()]
         self.limit.charge(max(0, len(sums) - 1))
         self.is_used, self.left_out = False, {}
@@ -184,7 +184,7 @@ class _Share:
 
 
 class AuditTrail:
-    """Follows requests as soon as somebody wants to be told."""
+    """Audit trail of all requests, kept while there is a listener."""
 
     def __init__(self, image: Image) -> None:
         self.tell_to(None)
@@ -192,16 +192,15 @@ class AuditTrail:
         self._telegrams: dict[str, _Telegrams] = {}
         self._shares: dict[tuple[str, ...], _Share] = {}
         self._limits: dict[tuple[str, ...], RateLimit] = {}
-        """What each client was refused."""
+        """Limits for refused requests, by client."""
         self._summary_at = float("-inf")
 
     def tell_to(self, listener: Callable[[AuditEntry], None] | None, *, every_telegram: bool = False) -> None:
-        """``listener`` gets the entries from now on; None: nothing is followed. With ``every_telegram``
-        nothing is left out."""
+        """Pass entries to ``listener`` from now on; None ends that. ``every_telegram``: none is left out."""
         self._listener, self._every_telegram = listener, every_telegram
 
     def follow(self, request: Request, now: float, reply: Reply) -> Reply:
-        """To be used in place of ``reply``: it notes the outcome first."""
+        """Reply to use in place of ``reply``: it notes the outcome first."""
         if self._listener is None or request.action.startswith(_READS):
             return reply
         old = self._held(request)
@@ -215,20 +214,20 @@ class AuditTrail:
         return conclude
 
     def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
-        """``count`` of this kind, the last of them ``now``."""
+        """Note ``count`` rejections of this kind, the last of them at ``now``."""
         if self._listener is not None:
             who, ending = rejection.identity, AuditOutcome(rejection.code, rejection.said)
             new = rejection.values
             self._note(AuditEntry(now, who, rejection.target, rejection.action, ending, new=new, count=count))
 
     def stop_ended(self, target: str, outcome: str, said: Text, now: float) -> None:
-        """A stop that was forwarded has been followed or ignored."""
+        """Note that a stop which was forwarded has been followed or ignored."""
         if self._listener is not None:
             ending = AuditOutcome(Code.OK if outcome == "followed" else outcome, said, forwarded=True)
             self._note_other(AuditEntry(now, _BRIDGE, target, "stop_ended", ending))
 
     def _held(self, request: Request) -> Values:
-        """What the points hold that ``request`` is about to change."""
+        """Present values of the points that ``request`` is about to change."""
         top = f"{request.target}/command/"
         match request.command:
             case Write(values=values):
@@ -287,7 +286,7 @@ class AuditTrail:
     def _tell_waiting(
         self, target: str, telegrams: _Telegrams, tell: Callable[[AuditEntry], None], now: float
     ) -> None:
-        """The newest setpoints, and how many telegrams have gone untold up to ``now``."""
+        """Tell the newest setpoints, and the number of telegrams that have gone untold up to ``now``."""
         entry, telegrams.waiting = telegrams.waiting, None
         if entry is not None:
             tell(entry)
@@ -302,8 +301,8 @@ class AuditTrail:
             self._tell(entry)
 
     def _share(self, entry: AuditEntry) -> _Share:
-        """Refused requests are counted by action and code and limited by client: targets and names can be
-        made up."""
+        """Share of an entry. Refused requests are counted by action and code and limited by client: targets
+        and names can be made up."""
         client = (entry.identity.source.label, client_of(entry.identity))
         kind = (entry.action if entry.action in _ACTIONS else "", str(entry.ending.code))
         key = (*client, *kind) if entry.is_refused else (*client, *kind, entry.target)
@@ -349,8 +348,8 @@ class AuditTrail:
 
 
 def client_of(identity: Identity) -> str:
-    """Where a request came from: the client's address without its port, or nothing where the protocol does
-    not know it, whatever its clients call themselves."""
+    """Origin of a request: the client's address without its port, empty where the protocol does not know it.
+    Names that clients give themselves do not count."""
     address = identity.address
     if address.startswith("["):
         return address[1:].partition("]")[0]

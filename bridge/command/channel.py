@@ -77,17 +77,16 @@ class Channel:
 
     @property
     def wired(self) -> RpdoWords | tuple[int, ...]:
-        """What the bus gets by ``output``."""
+        """Words that ``output`` puts on the bus."""
         return self.leg.sent
 
     @property
     def until(self) -> float | None:
-        """Until when ``output`` may be on the bus if nothing more is heard of the owner; None where no time
-        ends it."""
+        """Time until which ``output`` may be on the bus if no more is heard of the owner; None for ever."""
         return until(self.leg_settings, self.leg)
 
     def output_then(self) -> RpdoWords:
-        """What belongs on the bus from ``until`` on."""
+        """Words that belong on the bus from ``until`` on."""
         return output_then(self.leg_settings, self.leg)
 
     @property
@@ -116,7 +115,7 @@ class Channel:
         return self.leg.timer.timeout_ms
 
     def left_ms(self, now: float) -> int:
-        """Time until the trip; 0 when the timer does not run."""
+        """Time until the trip, in ms; 0 when the timer does not run."""
         deadline = self.leg.timer.deadline
         if deadline is None or self.watchdog_state is not WatchdogState.RUNNING:
             return 0
@@ -127,8 +126,8 @@ class Channel:
         return self.leg.stage.is_tripped
 
     def refusal(self, identity: Identity) -> Text | None:
-        """Why ``identity`` may not command it, whose owner is there, over any of its connections; None where
-        it may."""
+        """Reason why ``identity`` may not command it, None where it may. An owner counts as there, and may
+        command it over any of its connections."""
         owner = self.leg.owner.identity
         if owner is not None and identity.is_same(owner):
             identity = replace(identity, connection=owner.connection)
@@ -144,7 +143,7 @@ class Channel:
     # the node
 
     def on_node(self, state: NodeState, now: float) -> None:
-        """The node behind it is in another state now."""
+        """Take over the state of its node."""
         before = self.link.node
         self.link.on_node(state, now)
         if state is not before:
@@ -165,7 +164,7 @@ class Channel:
         return Way(link.may_enable, why, self._why_unplaced(now), is_heard, link.why_unsent)
 
     def on_sending(self, why_not: Said, now: float) -> None:
-        """Whether ``output`` is repeated on the bus: ``why_not``, or an empty text."""
+        """Take over whether ``output`` is repeated on the bus: ``why_not`` is empty where it is."""
         if why_not != self.link.why_unsent:
             self.link.why_unsent = why_not
             self._happen(self._way(now), now)
@@ -173,24 +172,24 @@ class Channel:
     # time
 
     def on_time(self, now: float) -> None:
-        """Let everything happen that is due by ``now``. Call it when the bus has been drained."""
+        """Do all that is due by ``now``. Call it when the bus has been drained."""
         is_lost = self.link.on_time(now)
         self._happen(event.Time(self._way(now)), now, is_lost=is_lost)
 
     def next_deadline(self, now: float) -> float | None:
-        """When ``on_time`` is to be called; ``now`` where something is due already, None for never."""
+        """Time of the next ``on_time``: ``now`` where something is due already, None for never."""
         of_link, of_leg = self.link.next_deadline(), next_deadline(self.leg)
         if of_link is None:
             return None if of_leg is None else max(of_leg, now)
         return max(of_link if of_leg is None else min(of_link, of_leg), now)
 
     def on_bridge_gap(self, now: float) -> None:
-        """The bridge itself was not there for longer than the dead-man time: start as if anew."""
+        """Start anew: the bridge itself was away for longer than the dead-man time."""
         self._happen(event.BridgeGap(), now)
 
     def start_anew(self, now: float) -> None:
-        """The bus was gone, or the node was stopped or has restarted: whatever it was told does not count
-        any more, not even where communication errors are ignored."""
+        """Start anew: the bus was gone, or the node was stopped or has restarted. Nothing that it was told
+        before counts, not even where communication errors are ignored."""
         self._happen(event.StartAnew(), now)
 
     # requests
@@ -202,8 +201,8 @@ class Channel:
     def on_connection(
         self, identity: Identity, now: float, *, is_there: bool, has_others: bool = False
     ) -> None:
-        """A connection of ``identity`` has begun or ended, and the same user has others or not: no telegram,
-        and no end of control."""
+        """Note that a connection of ``identity`` has begun or ended, and whether the same user has others. It
+        is no telegram, and no end of control."""
         connection = event.Connection(identity, is_there, has_others)
         self.leg, _ = step(self.leg_settings, self.leg, connection, now)
 
@@ -212,7 +211,7 @@ class Channel:
         self._effects.due[self.name] = None
 
     def on_refused(self, now: float) -> None:
-        """A request about it was refused elsewhere, and counts as one that is refused here."""
+        """Count a request about it that was refused elsewhere as one refused here."""
         self.refused_writes += 1
         self._settled(now)
 
@@ -235,7 +234,7 @@ class Channel:
     def _take_in(
         self, leg: LegState, effects: list[Effect], now: float, reply: Reply | None
     ) -> list[tuple[Reply, Outcome]]:
-        """Be in this state; the outcomes that are to be told once everybody can see it."""
+        """Take over a state of the leg; returns the outcomes to be told once everybody can see it."""
         self.leg = leg
         outcomes: list[tuple[Reply, Outcome]] = []
         for effect in effects:
@@ -280,24 +279,24 @@ class Channel:
     # what is different for drives and outputs
 
     def _reaction(self) -> Text:
-        """What the watchdog does that has just tripped, for people."""
+        """Reaction of the watchdog that has just tripped, in words."""
         raise NotImplementedError
 
     def _on_ignored(self, now: float) -> None:
-        """The controller is silent, and the site file has that ignored."""
+        """Note that the controller is silent where the site file has that ignored."""
 
     def _on_heard(self, names: tuple[str, ...]) -> None:
-        """A telegram of the owner counts, which has brought these commands."""
+        """Note a valid telegram of the owner, which has brought these commands."""
 
     def _on_let_go(self) -> None:
-        """Somebody has stopped it by a command."""
+        """Note that somebody has stopped it by a command."""
 
     def _node_has_changed(self, state: NodeState, now: float) -> None:
-        """The node is in another state than before."""
+        """React to another state of the node."""
 
     def _is_silent(self, now: float) -> None:
-        """It has been silent for longer than it may."""
+        """React to a drive that sends no process data for longer than the telegram downtime."""
 
     def _why_unplaced(self, now: float) -> Said:
-        """Why the position is not known that setpoints have to follow; empty where it is."""
+        """Reason why the position that setpoints have to follow is not known; empty where it is."""
         return ""

@@ -1,4 +1,4 @@
-"""Whatever an owner commands, a drive or the outputs of another node; and how long its words take."""
+"""Drives and outputs as their owners command them, and the times that their words take."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ASYNCHRONOUS: Final = 255
 
 
 class StopCheck(Protocol):
-    """Outcome of the last stop of something that is commanded, as far as it is known."""
+    """Outcome of the last stop of a drive or of outputs, as far as it is known."""
 
     @property
     def follows(self) -> bool:
@@ -42,8 +42,8 @@ class StopCheck(Protocol):
 
 
 class Commanded(Protocol):
-    """A drive, or the outputs of a node that is none: a channel with an owner, a stop that is judged, points
-    in the image. Times are monotonic seconds."""
+    """A drive, or the outputs of a node without drives: a channel with an owner, a stop that is judged,
+    points in the image. Times are monotonic seconds."""
 
     @property
     def name(self) -> str: ...
@@ -72,7 +72,7 @@ class Commanded(Protocol):
 
     @property
     def is_heard(self) -> bool:
-        """It says by itself what it does, and is heard."""
+        """It reports by itself what it does, and is heard."""
         ...
 
     @property
@@ -90,12 +90,11 @@ class Commanded(Protocol):
         ...
 
     def on_wire(self, wire: Wire, now: float) -> None:
-        """Take over the figures that are predicted of its bus."""
+        """Take over the predicted delays of its bus."""
         ...
 
     def on_own_supervision_changed(self, why: Text, now: float) -> None:
-        """Forget what it does by itself when the bridge falls silent: an object that decides it was
-        written."""
+        """Forget its own reaction to a silent bridge: an object that decides it was written."""
         ...
 
     def on_handed_over(self, now: float) -> None:
@@ -103,19 +102,19 @@ class Commanded(Protocol):
         ...
 
     def on_time(self, now: float) -> Sequence[StopVerdict]:
-        """Let everything happen that is due by ``now``; how stops have ended."""
+        """Do all that is due by ``now``. Returns the verdicts on stops that have ended."""
         ...
 
     def next_deadline(self, now: float) -> float | None:
-        """When ``on_time`` is to be called; None for never."""
+        """Time of the next ``on_time``; None for never."""
         ...
 
     def refresh(self, now: float) -> None:
-        """Bring every point up to date; called when something has changed."""
+        """Bring all points up to date, after something has changed."""
         ...
 
     def look(self, now: float) -> None:
-        """Bring to this moment what changes by itself."""
+        """Bring to ``now`` what changes by itself."""
         ...
 
 
@@ -131,23 +130,23 @@ def is_enabling(one: Commanded) -> bool:
 
 
 class WordTiming:
-    """Times that the words of something that is commanded take, in seconds unless the name says otherwise."""
+    """Times that the words of a drive or of outputs take, in seconds unless the name says otherwise."""
 
     def __init__(self, bus: BusTable) -> None:
         self.bus = bus
         self.rpdo_type = _ASYNCHRONOUS
         """Transmission type of the RPDO with the control word; known after boot-up."""
         self.wire = Wire()
-        """What is predicted of its bus."""
+        """Predicted delays of its RPDOs on the bus."""
         self.burst_s = bus.deadman_ms / 1000 + bus.rpdo_period_s
-        """How far ahead the bus may have been told what to send."""
+        """Longest time for which the bus may have been told in advance what to send."""
 
     @property
     def rpdo_period_ms(self) -> int:
-        """How long a new word may be on its way: until its frame, and until SYNC takes that over."""
+        """Longest time in ms that a new word is on its way: until its frame, and until SYNC takes it over."""
         return round(1000 * self.bus.rpdo_period_s) + sync_wait_ms(self.bus, self.rpdo_type)
 
     @property
     def takeover_s(self) -> float:
-        """How long a stopped word may wait for SYNC: while its node is in Operational."""
+        """Longest time that a stopped word waits for SYNC, while its node is in Operational."""
         return takeover_ms(self.bus, self.rpdo_type) / 1000

@@ -7,11 +7,11 @@ from math import inf
 from typing import Final, Generic, Protocol, TypeVar
 
 _AHEAD_S: Final = 0.005
-"""What is to be looked at within this time is looked at before the timer is set: mostly its deadline has been
-put off meanwhile, and nobody has to wake up for that."""
+"""Look-ahead in seconds: owners with a deadline this near are looked at before the timer is set. Mostly it
+has been put off meanwhile, and no wake-up is needed."""
 _SWEEPS: Final = 10
 _MOST_ENTRIES: Final = 8
-"""For each owner, before those that count no more are thrown away."""
+"""Heap entries for each owner, beyond which those that no longer count are thrown away."""
 
 
 class DeadlineOwner(Protocol):
@@ -24,10 +24,10 @@ T = TypeVar("T", bound=DeadlineOwner)
 
 
 class Deadlines(Generic[T]):
-    """For each of its owners when to look at it, which is never later than its earliest deadline.
+    """Deadlines of many owners, each of which is looked at no later than its earliest one.
 
-    A deadline that was put off (each TPDO and telegram does that) is noticed when the old one comes. Of one
-    that was brought forward ``touch`` must be told. Times are monotonic seconds.
+    A deadline that was put off (each TPDO and telegram does that) is noticed when the old one comes.
+    ``touch`` must tell of one that was brought forward. Times are monotonic seconds.
     """
 
     def __init__(self) -> None:
@@ -47,17 +47,16 @@ class Deadlines(Generic[T]):
         self._planned.append(inf)
 
     def touch(self, owner: T) -> None:
-        """The owner may have an earlier deadline than it had."""
+        """Note that the owner may have an earlier deadline than it had."""
         self._touched[self._places[owner]] = None
 
     @property
     def is_touched(self) -> bool:
-        """Somebody may have an earlier deadline than ``next`` has said."""
+        """An owner may have an earlier deadline than ``next`` has said."""
         return bool(self._touched)
 
     def take_due(self, now: float) -> list[T]:
-        """Who has a deadline that has come, in the order of the owners. What they do about it makes all of
-        their deadlines uncertain."""
+        """Owners whose deadline has come, in their order; acting on it makes all of theirs uncertain."""
         heap, planned = self._heap, self._planned
         if not self._touched and (not heap or heap[0][0] > now):
             return []
@@ -77,7 +76,7 @@ class Deadlines(Generic[T]):
         return [self._owners[place] for place in sorted(due)]
 
     def next(self, now: float) -> float | None:
-        """When to ask ``take_due`` next."""
+        """Time of the next ``take_due``; None for never."""
         self._plan_touched(now)
         heap, planned = self._heap, self._planned
         while heap:
@@ -92,8 +91,8 @@ class Deadlines(Generic[T]):
         return None
 
     def sweep(self, now: float) -> list[T]:
-        """Look at the next few owners, whoever has been told of: all of them in ten calls. Gives those with a
-        deadline of which ``touch`` should have been told."""
+        """Look at the next few owners, touched or not: at all of them in ten calls. Returns those with a
+        deadline that ``touch`` should have told of."""
         count = len(self._owners)
         first, self._swept = self._swept, self._swept + -(-count // _SWEEPS)
         missed = [
@@ -117,7 +116,7 @@ class Deadlines(Generic[T]):
                 self._plan(place, self._next_of(place, now))
 
     def _plan(self, place: int, at: float) -> None:
-        """Look at it then, unless it is looked at before."""
+        """Look at an owner ``at`` that time, unless it is looked at before."""
         heap, planned = self._heap, self._planned
         if at >= planned[place]:
             return

@@ -1,4 +1,4 @@
-"""A node that is no drive: what its TPDOs tell, as points, and how good that is."""
+"""Device, a node without drives: the signals of its TPDOs as points, and their quality."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ class InputPdo:
 
 @dataclass(slots=True)
 class _InputTpdo:
-    """One TPDO: the points that its entries are shown by, and how good they are shown to be."""
+    """One TPDO: the points that show its entries, and their quality."""
 
     pdo: InputPdo
     link: DriveLink
     shown: list[tuple[int, Signal, int]] = field(default_factory=list[tuple[int, Signal, int]])
-    """Entry, what it is, and its point."""
+    """Place of the entry, its signal, and the index of its point."""
     quality: tuple[Quality, Said] | None = None
     told: tuple[tuple[int, ObjectRef, int], ...] = ()
-    """Entries that are outputs: the entry, its object, and the mask that takes its sign away."""
+    """Entries that are outputs: place, object, and the mask that takes the sign away."""
     told_values: list[tuple[ObjectRef, int]] = field(default_factory=list[tuple[ObjectRef, int]])
-    """Values of those the last time."""
+    """Last values of these."""
 
     @property
     def points(self) -> list[int]:
@@ -101,14 +101,14 @@ class Device:
             image.index[f"{node.name}/supervision/{leaf}"] for leaf in ("refused_writes", "sdo_abort_code")
         )
         self.identification = Identification()
-        """Who it is, by its last boot-up."""
+        """Identity of its node, by the last boot-up."""
         channels = (one.channel for one in commanded)
         self._access: Access = next(channels, InputAccess(image, self._refused))
         self._heard: list[_InputTpdo] = []
         self._unserved: dict[int, Text] = {}
         """Points that no TPDO carries, with the reason."""
         self._state: tuple[Quality, Said] = (Quality.WAITING, "")
-        """How good those inputs are of which no TPDO is known."""
+        """Quality of the inputs that no known TPDO carries."""
 
     def begin(self, now: float) -> None:
         """Show what is known from the start."""
@@ -117,7 +117,7 @@ class Device:
         self._judge(now)
 
     def on_pdos(self, pdos: Sequence[InputPdo], unserved: Mapping[ObjectRef, Text], now: float) -> None:
-        """What the boot-up has found; ``unserved`` has the reason for each input that no TPDO carries."""
+        """Take over the TPDOs found at boot-up; ``unserved`` has the reason for inputs that none carries."""
         self._heard = []
         in_charge = _in_charge(pdos)
         for place, pdo in enumerate(pdos):
@@ -135,7 +135,7 @@ class Device:
         self._judge(now)
 
     def _find_told(self, outputs: Outputs, in_charge: Mapping[ObjectRef, int]) -> None:
-        """Note the outputs that its TPDOs bring, too."""
+        """Note the outputs that its TPDOs carry, too."""
         masks = {one.object: (1 << one.size) - 1 for one in self.family.output}
         for place, heard in enumerate(self._heard):
             heard.told = tuple(
@@ -156,10 +156,10 @@ class Device:
             outputs.channel.on_node(state, now)
 
     def on_heard_again(self) -> None:
-        """Its node is heard again: its inputs come with the next TPDOs."""
+        """Do nothing: its inputs come with the next TPDOs."""
 
     def on_data(self, place: int, values: Sequence[int], now: float) -> None:
-        """The TPDO at this place of ``pdos`` has come: the values of its entries, with their signs."""
+        """Take over the TPDO at this place of ``pdos``: the values of its entries, with their signs."""
         heard = self._heard[place]
         if heard.told:
             self._tell(heard, values, now)
@@ -170,7 +170,7 @@ class Device:
         self._image.set_values(heard.points, shown, now)
 
     def _tell(self, heard: _InputTpdo, values: Sequence[int], now: float) -> None:
-        """The link does not know of the TPDO yet."""
+        """Tell the outputs of their values in a TPDO, before the link knows of it."""
         told = [(ref, values[entry] & mask) for entry, ref, mask in heard.told]
         last, deadline_s = heard.link.last_pdo, heard.pdo.deadline_s
         is_late = last is not None and deadline_s is not None and now - last > deadline_s
@@ -180,14 +180,14 @@ class Device:
         heard.told_values = told
 
     def on_time(self, now: float) -> None:
-        """Judge what is late by now."""
+        """Judge which TPDOs are late, and show their age."""
         for heard in self._heard:
             heard.link.on_time(now)
         self._judge(now)
         self._image.keep(self._age, self.age_ms(now), now)
 
     def look(self, now: float) -> None:
-        """Bring to this moment what changes by itself: how good its inputs are, and times of its outputs."""
+        """Bring to ``now`` what changes by itself: the quality of its inputs, and times of its outputs."""
         self.on_time(now)
         for outputs in self.commanded:
             outputs.look(now)
@@ -198,16 +198,16 @@ class Device:
 
     @property
     def quality(self) -> Quality:
-        """That of its inputs as a whole: the worst of its TPDOs."""
+        """Quality of its inputs as a whole: the worst of its TPDOs."""
         return worst_of([heard.quality[0] for heard in self._shown if heard.quality] or [self._state[0]])
 
     def age_ms(self, now: float) -> int:
-        """Of the oldest of its TPDOs; FFFFFFFFh where one has never come."""
+        """Age in ms of the oldest of its TPDOs; FFFFFFFFh where one has never come."""
         return max((heard.link.age_ms(now) for heard in self._shown), default=0xFFFF_FFFF)
 
     @property
     def _shown(self) -> list[_InputTpdo]:
-        """The TPDOs that points are shown by."""
+        """TPDOs that carry points."""
         return [heard for heard in self._heard if heard.shown]
 
     # a member of its node
@@ -218,7 +218,7 @@ class Device:
         return any(outputs.is_moving for outputs in self.commanded)
 
     def refusal(self, identity: Identity) -> Text | None:
-        """Why ``identity`` may not command it; None where it may."""
+        """Reason why ``identity`` may not command it; None where it may."""
         return self._access.refusal(identity)
 
     @property
@@ -226,15 +226,15 @@ class Device:
         return self._access.refused_writes
 
     def on_refused(self, now: float) -> None:
-        """A request about it was refused elsewhere."""
+        """Count a request about it that was refused elsewhere."""
         self._access.on_refused(now)
 
     def on_sdo_refused(self, abort_code: int, now: float) -> None:
-        """It has refused an SDO that a client had asked for."""
+        """Show the abort code of an SDO that a client had asked for."""
         self._image.set(self._abort_code, abort_code, now)
 
     def on_parameter(self, name: str, setting: float, now: float) -> None:
-        """Nothing of it depends on a parameter."""
+        """Do nothing: none of its points depends on a parameter."""
 
     def _judge(self, now: float) -> None:
         for heard in self._heard:
@@ -276,8 +276,8 @@ class Device:
 
 
 def _in_charge(pdos: Sequence[InputPdo]) -> dict[ObjectRef, int]:
-    """By which TPDO each object is shown where several carry it, as encoders have it: the one that comes most
-    often. One that is sent on change only, or waits for a SYNC that is not sent, is the last choice."""
+    """Place of the TPDO that shows each object: of several that carry it, as encoders have them, the one that
+    comes most often. One sent on change only, or waiting for a SYNC that is not sent, is the last choice."""
     chosen: dict[ObjectRef, int] = {}
     order = sorted(range(len(pdos)), key=lambda place: (pdos[place].deadline_s or float("inf"), place))
     for place in order:

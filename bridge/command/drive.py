@@ -1,4 +1,4 @@
-"""One drive of the site: its channel, and where its points stand in the image."""
+"""One drive of the site: its channel and its points in the image."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ _SUPERVISION: Final = (
     "restart_interlock",
     "refused_writes",
 )
-"""In the order in which ``_refresh_supervision`` shows them."""
+"""Leaves in the order in which ``_refresh_supervision`` shows them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """What 1018h and 1008h of the node hold; a value the node does not give is 0 or empty."""
+    """Identity of the node by 1018h and 1008h; a value that it does not give is 0 or empty."""
 
     vendor: int = 0
     product: int = 0
@@ -55,17 +55,14 @@ class Identification:
 
 
 class _Command(NamedTuple):
-    """A scaled command in one parameter set, and why it is not served there."""
+    """A scaled command in one parameter set; ``lack`` is None where it is served there."""
 
     codec: ValueCodec
     lack: Lack | None
 
 
 class Drive(WordTiming):
-    """One drive: its channel, and where its points stand in the image.
-
-    All that is not process data is shown when the channel says that it has settled.
-    """
+    """One drive: its channel and its points. All but process data is shown when the channel has settled."""
 
     def __init__(self, spec: DriveSpec, image: Image, effects: Effects) -> None:
         super().__init__(spec.bus)
@@ -84,8 +81,7 @@ class Drive(WordTiming):
         self.stop_check = DriveStopCheck(self.channel)
         self.identification = Identification()
         self.own: OwnJudgement | None = None
-        """What it does by itself when the bridge falls silent; None until the boot-up has read it, and empty
-        where that is not true any more."""
+        """Its own reaction to a silent bridge; None until the boot-up has read it, empty when outdated."""
         self.sync_period_ms = spec.bus.sync_period_ms
         self.given_parameters = table.parameters
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
@@ -100,7 +96,7 @@ class Drive(WordTiming):
         self.news = MeaningNews(self, effects.events)
 
     def _find_points(self) -> None:
-        """Where its points stand in the image."""
+        """Look up its points in the image."""
         family, words = self.family, self.family.process.rpdo[1:]
         carried = family.carried(self.slot)[0][1:]
         self._setpoints = [(words.index(word), f"command/{word}") for word in carried]
@@ -154,10 +150,10 @@ class Drive(WordTiming):
         deadline_s: float | None,
         rpdo_type: int,
     ) -> None:
-        """What the boot-up has found: ``unserved`` has the reason for each word or value that the node does
-        not carry, by its leaf such as ``actual/value_2``; ``further`` are the TPDOs beside the one with the
-        status word, which is late after ``deadline_s``. ``rpdo_type`` is the transmission type of the RPDO
-        with the control word."""
+        """Take over the findings of the boot-up: ``unserved`` has the reason for each word or value that the
+        node does not carry, by its leaf such as ``actual/value_2``. ``further`` are the TPDOs beside the one
+        with the status word, which is late after ``deadline_s``; ``rpdo_type`` is the transmission type of
+        the control word's RPDO."""
         self.channel.link.on_boot(deadline_s, further)
         self.rpdo_type = rpdo_type
         self.channel.unserved.clear()
@@ -166,25 +162,25 @@ class Drive(WordTiming):
         self.refresh(now)
 
     def on_heard_again(self) -> None:
-        """Its node could not be heard for a while, and goes on as it was; the state that follows shows it."""
+        """Go on after a pause in which its node was not heard; the state that follows shows it."""
         self._actual.on_heard_again()
 
     def on_parameter(self, name: str, setting: float, now: float) -> None:
-        """Its own setting of a parameter, in set 1, that decides what its words mean."""
+        """Take over its own setting, in set 1, of a parameter that decides the meaning of its words."""
         self.news.on_parameter(name, setting, now)
 
     @property
     def told_by_tpdo(self) -> frozenset[str]:
-        """The words whose meaning its TPDOs tell, by their leaves: it need not be asked."""
+        """Leaves of the words whose meaning its TPDOs tell, so that it need not be asked."""
         return self._actual.told_by_tpdo
 
     def _on_code(self, meaning: Meaning, code: int, now: float) -> None:
-        """A TPDO has brought the code of a word's meaning. What else depends on it is asked at once."""
+        """Take over the code of a word's meaning from a TPDO, and have what depends on it asked at once."""
         self.news.is_to_be_asked = True
         self.news.on_code(meaning, code, now)
 
     def in_force(self) -> dict[str, InForce]:
-        """The scaled commands that are served with the control word that counts, by their names."""
+        """Scaled commands that are served under the control word in force, by their names."""
         setpoints = self.channel.setpoints
         commands = self._commands_in[self._set.of(self.channel.control_word)]
         return {
@@ -194,20 +190,20 @@ class Drive(WordTiming):
         }
 
     def on_codes(self, codes: Codes, why_unread: Text | None = None) -> bool:
-        """What the drive's parameters say that its words carry. True where a setpoint that was written before
-        means something else now: it must not be sent to a drive that is enabled next."""
+        """Take over the codes of what its words carry. Returns True where a setpoint written before means
+        something else now: it must not be sent to a drive that is enabled next."""
         meanings = self.channel.meanings
         means_otherwise = meanings.on_codes(codes, why_unread) if why_unread else meanings.on_codes(codes)
         self.compile()
         return means_otherwise
 
     def compile(self) -> None:
-        """Take over what has been read of the meaning of its words."""
+        """Take over the meanings of its words that have been read."""
         self._commands_in = self._compiled_commands()
         self._actual.compile()
 
     def _compiled_commands(self) -> dict[int, list[_Command]]:
-        """The scaled commands in each parameter set."""
+        """Scaled commands in each parameter set."""
         meanings, words = self.channel.meanings, self.family.process.rpdo[1:]
 
         def compiled(codec: ValueCodec, in_set: int) -> _Command:
@@ -219,7 +215,7 @@ class Drive(WordTiming):
         return {in_set: [compiled(codec, in_set) for codec in self._commands] for in_set in meanings.sets}
 
     def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
-        """What the drive does by itself when the bridge falls silent, as the boot-up has read it."""
+        """Take over its own reaction to a silent bridge, as the boot-up has read it."""
         self.own = own
         self.channel.on_own_watch(why_silence_does_not_stop(self.family, own, self.spec.node), now)
         self._refresh_supervision(now)
@@ -232,13 +228,13 @@ class Drive(WordTiming):
         self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, why)
 
     def on_own_supervision_changed(self, why: Text, now: float) -> None:
-        """What the boot-up has read of it is not true any more."""
+        """Forget its own reaction to a silent bridge: an object that decides it was written."""
         self.own = OwnJudgement()
         self.channel.on_own_watch(why, now)
         self._image.set(self._bridge_ms, 0, now, Quality.CONFIG_ERROR, why)
 
     def on_wire(self, wire: Wire, now: float) -> None:
-        """What is predicted of the drive's bus."""
+        """Take over the predicted delays of its bus."""
         self.wire = wire
         self._show_stop_time(now)
 
@@ -265,27 +261,26 @@ class Drive(WordTiming):
 
     @property
     def is_enabled(self) -> bool:
-        """It is in motion, or what it gets enables it."""
+        """It is in motion, or the word that it gets enables it."""
         channel = self.channel
         return channel.state in MOVING or channel.words.enables(channel.output.words[0])
 
     def refusal(self, identity: Identity) -> Text | None:
-        """Why ``identity`` may not command it; None where it may."""
+        """Reason why ``identity`` may not command it; None where it may."""
         return self.channel.refusal(identity)
 
     def on_refused(self, now: float) -> None:
-        """A request about it was refused elsewhere, and counts as one that is refused here."""
+        """Count a request about it that was refused elsewhere as one refused here."""
         self.channel.on_refused(now)
 
     def on_sdo_refused(self, abort_code: int, now: float) -> None:
-        """It has refused an SDO that a client had asked for."""
+        """Show the abort code of an SDO that a client had asked for."""
         self._image.set(self._abort_code, abort_code, now)
 
     # time
 
     def on_time(self, now: float) -> Sequence[StopVerdict]:
-        """Let everything happen that is due by ``now``; how stops have ended. Call it when the bus has been
-        drained."""
+        """Do all that is due by ``now``, with the bus drained. Returns verdicts on stops that have ended."""
         self.channel.on_time(now)
         verdicts = self.stop_check.on_time(now)
         if verdicts:
@@ -293,18 +288,18 @@ class Drive(WordTiming):
         return verdicts
 
     def next_deadline(self, now: float) -> float | None:
-        """When ``on_time`` is to be called; ``now`` where something is due already, None for never."""
+        """Time of the next ``on_time``: ``now`` where something is due already, None for never."""
         at, of_stop = self.channel.next_deadline(now), self.stop_check.next_deadline()
         if of_stop is None:
             return at
         return max(now, of_stop if at is None else min(at, of_stop))
 
     def on_handed_over(self, now: float) -> None:
-        """What the channel puts out has been handed to the bus."""
+        """Begin the bound of its stop: the output of the channel has been handed to the bus."""
         self.stop_check.on_handed_over(now, self.rpdo_period_ms, self.own)
 
     def on_cut_off(self, now: float) -> None:
-        """The bridge takes its node out of operation, with stopped words before it."""
+        """Judge its stop by the last report: the bridge cuts off its node, with stopped words before that."""
         self.stop_check.on_cut_off(now, self.rpdo_period_ms, self.own)
 
     # its stops
@@ -328,7 +323,7 @@ class Drive(WordTiming):
     # into the image
 
     def refresh(self, now: float) -> None:
-        """Bring every point of the drive up to date; called when something about it has changed."""
+        """Bring all points up to date, after something about the drive has changed."""
         self.channel.plan_anew()
         self.stop_check.on_settled()
         self._actual.refresh(now)
@@ -337,7 +332,7 @@ class Drive(WordTiming):
         self._refresh_follows(now)
 
     def _refresh_follows(self, now: float) -> None:
-        """As good as what the drive says; which stop that is about we know ourselves."""
+        """Show ``follows``, as good as the drive's data, and ``last_stop``, which the bridge itself knows."""
         quality = self.channel.link.quality(now)
         reason = self.channel.link.reason(quality)
         follows, last_stop = self._follows
@@ -398,8 +393,7 @@ class Drive(WordTiming):
         self._image.set(self._stop_ms, stop.ms, now, quality, stop.unknown)
 
     def look(self, now: float) -> None:
-        """Bring to this moment what changes by itself: ages, and how good the drive's data are. Called a few
-        times a second, and when somebody wants to know."""
+        """Bring ages and qualities to ``now``: a few times a second, and whenever somebody wants to know."""
         self._actual.look(now)
         self._refresh_follows(now)
         channel = self.channel
@@ -412,6 +406,6 @@ class Drive(WordTiming):
             self._image.keep(self._life[0], life.token(now), now)
 
     def _show(self, indices: Sequence[int], values: Sequence[Value], now: float) -> None:
-        """Values that the bridge itself knows: their quality is always good."""
+        """Show values that the bridge itself knows: their quality is always good."""
         for index, value in zip(indices, values, strict=True):
             self._image.set(index, value, now)

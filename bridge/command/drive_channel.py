@@ -1,4 +1,4 @@
-"""The command channel of one drive: its leg, and what the drive says of itself."""
+"""Command channel of one drive: its leg, and the status that the drive reports."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from bridge.text import Said, Text, Words, render
 
 
 class DriveChannel(Channel):
-    """See ``Channel``. Its link is judged by TPDOs, its stops by the status word."""
+    """Command channel of one drive: its link is judged by TPDOs, its stops by the status word."""
 
     def __init__(
         self,
@@ -39,7 +39,7 @@ class DriveChannel(Channel):
         self.settings = settings
         slot = family.slot_named(settings.slot)
         self.meanings = Meanings(family, slot, settings.parameters)
-        """What the words mean in each parameter set: from the mapping and the site file, and as read from
+        """Meanings of the words in each parameter set: from the mapping and the site file, and as read from
         the drive."""
         self.unserved: dict[str, Text] = {}
         """Points that the node cannot serve, by their leaf, with the reason; known after boot-up."""
@@ -58,17 +58,17 @@ class DriveChannel(Channel):
 
     @property
     def _reported_word(self) -> int | None:
-        """The status word of a drive that is heard."""
+        """Status word of the drive; None while it is not heard."""
         return self._status.word if self.leg.way.is_heard else None
 
     @property
     def control_word(self) -> int:
-        """As if it were the owner's (``bridge.command.leg.word_table``)."""
+        """Control word in force, as if it were the owner's (``bridge.command.leg.word_table``)."""
         return control_word(self.words, self.leg)
 
     @property
     def silence_stops(self) -> bool:
-        """The drive is known to stop by itself when it gets no RPDO any more, or nobody has asked it yet."""
+        """The drive is known to stop by itself without RPDOs, or nobody has asked it yet."""
         return self.leg.silence_stops
 
     @property
@@ -132,7 +132,7 @@ class DriveChannel(Channel):
     # from the drive
 
     def on_own_watch(self, why_not: Said, now: float) -> None:
-        """Whether the drive stops by itself when it gets no RPDO any more: ``why_not``, or an empty text."""
+        """Take over whether the drive stops by itself without RPDOs: ``why_not`` is empty where it does."""
         stops = not why_not
         if stops is self.leg.silence_stops:
             return
@@ -142,7 +142,7 @@ class DriveChannel(Channel):
         self._happen(event.StopsOnSilence(stops), now)
 
     def on_status_word(self, word: int, now: float) -> None:
-        """A TPDO brought this status word."""
+        """Take over the status word of a TPDO."""
         status, leg, handshake = self._status, self.leg, self.leg_settings.handshake
         state = status.words.state(word)
         is_acknowledged = handshake is not None and bool(word & handshake.acknowledged)
@@ -154,13 +154,13 @@ class DriveChannel(Channel):
             self._happen(event.StatusReport(state, is_acknowledged, said), now)
 
     def on_unchanged(self, now: float) -> None:
-        """A TPDO arrived that says what the last one said."""
+        """Take note of a TPDO with the same data as the last one."""
         self.on_pdo(now)
         if self.leg.stage in AWAITS_REPORT or not self.leg.way.is_heard:
             self.on_status_word(self._status.word, now)
 
     def on_actual_words(self, words: Sequence[int], now: float) -> None:
-        """What TPDOs have brought, the status word first, in the order of ``process.tpdo``."""
+        """Take over the words of TPDOs, the status word first, in the order of ``process.tpdo``."""
         follows, rest = self.leg_settings.follows, self.leg.rest
         unknown = self.meanings.unknown_followed(words)
         words = [0 if place in unknown else word for place, word in enumerate(words)] if unknown else words
@@ -168,7 +168,7 @@ class DriveChannel(Channel):
             self._happen(event.ActualWords(tuple(words)), now)
 
     def on_pdo(self, now: float) -> None:
-        """A TPDO arrived; what it says comes after this."""
+        """Take note of a TPDO; its content comes after this."""
         link = self.link
         if link.pdo_deadline_s is not None and link.brings_forward(now):
             self.plan_anew()
@@ -177,7 +177,7 @@ class DriveChannel(Channel):
             self._happen(self._way(now), now)
 
     def on_emcy(self, told: EmergencyMeaning, now: float, *, is_its_own: bool = True) -> None:
-        """An emergency message about this drive, or else about one of those of its node."""
+        """Take over an emergency message about this drive, or else about one of those of its node."""
         self._status.on_emcy(told)
         if is_its_own:
             severity = 100 if told.is_gone else 700
@@ -186,7 +186,7 @@ class DriveChannel(Channel):
         self._settled(now)
 
     def on_drive_fault(self, current: float | None, last: float | None, now: float) -> None:
-        """The drive has been asked for its present and its last fault; None for what it did not tell."""
+        """Take over the drive's answers, its present and its last fault; None for what it did not tell."""
         if self._status.on_drive_fault(current, last):
             self._settled(now)
 

@@ -1,4 +1,4 @@
-"""The drive leg of the watchdog: is this drive's data fresh, and is its node there?
+"""Drive leg of the watchdog: freshness of a drive's data, and presence of its node.
 
 The twin of P513 (BU 2500 §8.1). Pure: told of PDOs and of the node's state, asked for a quality.
 """
@@ -17,7 +17,7 @@ from bridge.text import Said, Text
 REASONS: Final = {
     state: Text.of("quality.node", state=Text.word("node_state", state.value)) for state in NodeState
 }
-"""Why points are not good while their node is in this state."""
+"""Reasons why points are not good, by the state of their node."""
 _NO_DATA: Final = Text.of("watchdog.no_process_data")
 
 
@@ -36,14 +36,14 @@ class FurtherTpdo:
     quality: Quality = Quality.WAITING
 
     def on_data(self, now: float) -> bool:
-        """It has arrived; True if its values were not good before."""
+        """Take note of its arrival; returns True if its values were not good before."""
         self.last = now
         was_good = self.quality is Quality.GOOD
         self.quality = Quality.GOOD
         return not was_good
 
     def on_time(self, now: float) -> bool:
-        """True where it is late from now on."""
+        """Judge its deadline; returns True at the moment it passes."""
         if self.quality is not Quality.GOOD or self.is_fresh(now):
             return False
         self.quality = Quality.STALE
@@ -68,7 +68,7 @@ class DriveLink:
         self._hold_s = hold_ms / 1000
         self.node = NodeState.ABSENT
         self.why_unsent: Said = ""
-        """Why nothing that belongs on the bus is repeated there; empty where it is."""
+        """Reason why nothing that belongs on the bus is repeated there; empty where it is."""
         self.pdo_deadline_s: float | None = None
         self.further: Sequence[FurtherTpdo] = ()
         self.last_pdo: float | None = None
@@ -98,19 +98,19 @@ class DriveLink:
         return self.node is NodeState.OPERATIONAL and self._expired_at is None
 
     def brings_forward(self, now: float) -> bool:
-        """A TPDO that arrives at ``now`` may bring a deadline that is earlier than the one there is: the last
-        one has been judged to be late, or has a later time."""
+        """Whether a TPDO at ``now`` may bring an earlier deadline than the present one: the last TPDO has
+        been judged late, or has a later time."""
         deadline_s, since, last = self.pdo_deadline_s, self._since, self.last_pdo
         # Asked with every PDO: no call.
         last_sign = since if last is None or last < since else last
         return deadline_s is not None and (last_sign + deadline_s <= self._judged_at or now < last_sign)
 
     def on_boot(self, pdo_deadline_s: float | None, further: Sequence[FurtherTpdo]) -> None:
-        """What the boot-up has found."""
+        """Take over the findings of the boot-up."""
         self.pdo_deadline_s, self.further = pdo_deadline_s, further
 
     def on_pdo(self, now: float) -> bool:
-        """A TPDO arrived; True where that ends an expiry."""
+        """Take note of a TPDO; returns True where it ends an expiry."""
         self.last_pdo = now
         if self._expired_at is None or self.node is NodeState.LOST:
             return False
@@ -134,7 +134,7 @@ class DriveLink:
                 pass
 
     def on_time(self, now: float) -> bool:
-        """Judge the telegram downtime; True at the moment it expires."""
+        """Judge the telegram downtime; returns True at the moment it expires."""
         self._judged_at = max(now, self._judged_at)
         limit = self._downtime_deadline()
         if limit is None or now < limit or self._expired_at is not None:
@@ -164,7 +164,7 @@ class DriveLink:
         return self._since if self.last_pdo is None else max(self.last_pdo, self._since)
 
     def quality(self, now: float) -> Quality:
-        """The quality that the drive's data have at ``now``."""
+        """Quality of the drive's data at ``now``."""
         node, last_pdo, deadline_s = self.node, self.last_pdo, self.pdo_deadline_s
         if node is NodeState.OPERATIONAL and last_pdo is not None and self._expired_at is None:
             # First, because it is asked with every PDO.
@@ -181,13 +181,13 @@ class DriveLink:
         return Quality.STALE
 
     def why_lacking(self, places: frozenset[int], now: float) -> Said:
-        """Why these words, by their places in ``process.tpdo``, are not known; empty where they are. The TPDO
-        with the status word is judged by ``quality``."""
+        """Reason why these words, by their places in ``process.tpdo``, are not known; empty where they are.
+        The TPDO with the status word is judged by ``quality``."""
         late = [pdo.name for pdo in self.further if not (pdo.places.isdisjoint(places) or pdo.is_fresh(now))]
         return Text.of("quality.no_pdo", pdo=late[0]) if late else ""
 
     def reason(self, quality: Quality) -> Said:
-        """Why the data have this quality, in a few words; empty where they are good."""
+        """Reason for this quality of the data, in a few words; empty where they are good."""
         if quality is Quality.GOOD:
             return ""
         if self.node is not NodeState.OPERATIONAL:
@@ -195,7 +195,7 @@ class DriveLink:
         return _NO_DATA
 
     def next_deadline(self) -> float | None:
-        """When the quality or the expiry changes by itself, beyond what ``on_time`` has judged."""
+        """Time at which the quality or the expiry changes by itself, beyond what ``on_time`` has judged."""
         if self._expired_at is not None:
             times = (self._expired_at + self._hold_s,)
         else:
@@ -204,7 +204,7 @@ class DriveLink:
         return min(ahead) if ahead else None
 
     def age_ms(self, now: float) -> int:
-        """Age of the last TPDO; 0xFFFFFFFF where there was none."""
+        """Age of the last TPDO in ms; 0xFFFFFFFF where there was none."""
         if self.last_pdo is None:
             return 0xFFFF_FFFF
         return min(max(0, round((now - self.last_pdo) * 1000)), 0xFFFF_FFFE)

@@ -1,4 +1,4 @@
-"""Effects of drives and outputs on the plant that they are of."""
+"""Effects of drives and outputs on their plant."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ from bridge.command.messages.event import EventQueue
 
 @dataclass(slots=True)
 class Effects:
-    """Effects of drives and outputs, collected until their plant applies them. Times are monotonic seconds,
-    and names those of the commanded ones."""
+    """Effects of drives and outputs, by name, until their plant applies them. Times are monotonic seconds."""
 
     events: EventQueue
     settled: dict[str, float] = field(default_factory=dict[str, float])
-    """Those of which more has changed than the status word, and when."""
+    """Drives and outputs of which more has changed than the status word, and when."""
     due: dict[str, None] = field(default_factory=dict[str, None])
-    """Those that may have an earlier deadline than they have given."""
+    """Drives and outputs that may have an earlier deadline than they have given."""
     stop_due: float | None = None
-    """Time at which the first stop was due of the drives that have tripped; None where none has."""
+    """Earliest due time of the stops of drives that have tripped; None where none has."""
 
     def tripped(self, due: float) -> None:
-        """The watchdog of a drive has tripped, which was due then."""
+        """Note that the watchdog of a drive has tripped, which was due then."""
         self.stop_due = due if self.stop_due is None else min(due, self.stop_due)

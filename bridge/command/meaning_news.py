@@ -1,5 +1,4 @@
-"""What a drive's settings make of its words, when somebody has changed them: events, and what becomes of
-setpoints that are in force."""
+"""Changes of what a drive's words mean by its settings: events, and what becomes of setpoints in force."""
 
 from __future__ import annotations
 
@@ -38,19 +37,19 @@ class HasWords(Protocol):
 
 
 class MeaningNews:
-    """Of one drive; nothing is told of what is read for the first time."""
+    """News of one drive's settings; those read for the first time are none."""
 
     def __init__(self, drive: HasWords, events: EventQueue) -> None:
         self._drive = drive
         self._events = events
         self._is_commanded_otherwise = False
-        """A setpoint that is held was written for another meaning of its words."""
+        """A setpoint in force was written for another meaning of its words."""
         self.is_to_be_asked = False
         """Something has happened after which the words may mean something else."""
 
     def on_parameter(self, name: str, setting: float | None, now: float, in_set: int = 1) -> None:
-        """What the drive says of a parameter that decides what its words mean, in the parameter's unit; None
-        where it refuses to tell."""
+        """Take over the setting of a parameter that decides the meaning of words, in the parameter's unit;
+        None where the drive refuses to tell it."""
         drive, meanings = self._drive, self._drive.channel.meanings
         if meanings.has_told(name, setting, in_set):
             return
@@ -69,7 +68,7 @@ class MeaningNews:
         self._tell((name, in_set), setting, had, affected, now)
 
     def on_code(self, meaning: Meaning, code: int | None, now: float, in_set: int = 1) -> None:
-        """What the drive says of what one word carries; None where it refuses to tell."""
+        """Take over the code of what one word carries; None where the drive refuses to tell it."""
         known = self._drive.channel.meanings.codes
         of_sets = [*known.get(meaning.leaf, (None,) * self._drive.family.sets)]
         had, of_sets[in_set - 1] = of_sets[in_set - 1], code
@@ -81,14 +80,14 @@ class MeaningNews:
         self._tell((meaning.parameter, in_set), code, had, affected, now)
 
     def on_overdue(self, overdue: frozenset[Key], now: float) -> None:
-        """What decides the meaning of words and has not been read again in time."""
+        """Take over the settings that decide the meaning of words and have not been read again in time."""
         if self._drive.channel.meanings.on_overdue(overdue):
             self._drive.compile()
             self._drive.refresh(now)
 
     def drop_old_setpoints(self, now: float) -> None:
-        """Those that were written for another meaning of their words, of a drive that is not enabled: it has
-        to be commanded anew. One that runs does already what its words mean."""
+        """Drop setpoints that were written for another meaning of their words, where the drive is not
+        enabled: it has to be commanded anew. One that runs does already what its words mean."""
         channel = self._drive.channel
         is_old = self._is_commanded_otherwise or channel.doubts.has_any(channel.setpoints)
         if is_old and not self._drive.is_enabled:
@@ -104,7 +103,7 @@ class MeaningNews:
         ]
 
     def _affected_by(self, name: str, setting: float | None) -> list[Text]:
-        """The values that depend on a parameter, and what changes with it."""
+        """Texts about the values that depend on a parameter: what changes with it."""
         family = self._drive.family
         found: list[Text] = []
         for value in family.values_of(self._drive.slot):

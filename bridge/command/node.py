@@ -31,7 +31,7 @@ class Enforcement(NamedTuple):
 
 
 class ParameterHolder(Protocol):
-    """A drive, or a node that is none."""
+    """Holder of parameters: a drive, or a device."""
 
     name: str
 
@@ -48,15 +48,15 @@ class ParameterHolder(Protocol):
         ...
 
     def on_refused(self, now: float) -> None:
-        """A request about it was refused elsewhere, and counts as one that is refused here."""
+        """Count a request about it that was refused elsewhere as one refused here."""
         ...
 
     def on_sdo_refused(self, abort_code: int, now: float) -> None:
-        """It has refused an SDO that a client had asked for."""
+        """Show the abort code of an SDO that a client had asked for."""
         ...
 
     def on_parameter(self, name: str, setting: float, now: float) -> None:
-        """Its own setting of a parameter, in set 1, that decides what process data mean."""
+        """Take over its own setting, in set 1, of a parameter that decides the meaning of process data."""
         ...
 
 
@@ -89,7 +89,7 @@ class Member(ParameterHolder, Protocol):
         ...
 
     def look(self, now: float) -> None:
-        """Bring to this moment what changes by itself."""
+        """Bring to ``now`` what changes by itself."""
         ...
 
 
@@ -123,7 +123,7 @@ class Node:
             one.refresh(now)
 
     def show(self, now: float) -> None:
-        """Show the state of a node that has something commanded and its 102.0, which is there while a
+        """Show the state of a node with drives or outputs, and its fault 102.0, which is there while a
         controller is silent; it clears by itself and is then the last fault, as P170 does."""
         channels = [one.channel for one in self.commanded]
         silent = [one for one in channels if one.is_tripped and one.controller_is_overdue]
@@ -141,27 +141,26 @@ class Node:
         return self.spec.axis_names.of()
 
     def is_of(self, who: ParameterHolder, ref: ObjectRef) -> bool:
-        """An object is that of one who has parameters, and no other drive's of the node: of a node with
-        several axes those of its profile."""
+        """Whether an object belongs to ``who`` and no other drive; with several axes, by its profile."""
         if all(one.spec.axis == 1 for one in self.members):
             return True
         return ref.index in profile_of(who.spec.axis)
 
     def on_state(self, state: NodeState, now: float) -> None:
-        """The node is in another state."""
+        """Take over the state of the node."""
         for one in self.members:
             one.on_node(state, now)
 
     def on_heard_again(self) -> None:
-        """The node is heard again, and did not restart in between."""
+        """Go on: the node is heard again, and did not restart in between."""
         for one in self.members:
             one.on_heard_again()
 
 
 @dataclass(frozen=True, slots=True)
 class BusSide:
-    """The plant as the nodes of one bus have it: who they are, where they show their points, report events
-    and count writes of an EEPROM. ``began`` is the monotonic time of what is known from the start."""
+    """The plant as the nodes of one bus see it: the nodes, the image of their points, and where they report
+    events and count writes of an EEPROM. ``began`` is the monotonic time of what is known from the start."""
 
     nodes: Sequence[Node]
     image: Image

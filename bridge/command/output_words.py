@@ -1,4 +1,4 @@
-"""The values of a node's outputs as the words that the leg carries, and what they are when they are safe."""
+"""Values of a node's outputs as the words that the leg carries, and their safe values."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from bridge.text import Text
 _BITS: Final = 16
 _MASK: Final = (1 << _BITS) - 1
 ACTIVE: Final = 1
-"""The control word of a telegram by which an output is anything but safe; 0 is that of one that stops."""
+"""Control word of a telegram by which an output is anything but safe; that of one that stops is 0."""
 
 
 class OutputPlace(NamedTuple):
-    """Where an output stands: ``span`` words from ``word`` on, the low one first."""
+    """Place of an output: ``span`` words from ``word`` on, the low one first."""
 
     output: Output
     word: int
     span: int
     safe: int | None
-    """What it gets when nobody commands it, as an integer; None: it holds its last value."""
+    """Value that it gets when nobody commands it, as an integer; None: it holds its last value."""
 
 
 class OutputWords:
-    """Knows the outputs of one node, called ``name``. ``held`` are the words that were sent last: what an
-    output holds. Words are 16-bit integers."""
+    """Codec of the outputs of one node, called ``name``. ``held`` are the words that were sent last: the
+    values that outputs hold. Words are 16-bit integers."""
 
     def __init__(self, name: str, outputs: Sequence[Output], on_expiry: Mapping[str, SafeValue]) -> None:
         self._name = name
@@ -47,7 +47,7 @@ class OutputWords:
         self.count = word
         self.held: tuple[int, ...] = self.safe([0] * word)
         self.has_let_go = False
-        """Somebody has stopped them since they got values: what holds has a value, too."""
+        """They have been stopped by a command since they got values: one that holds has a value, too."""
 
     @classmethod
     def of(cls, node: NodeTable, family: Family) -> Self:
@@ -59,7 +59,7 @@ class OutputWords:
         return all(place.safe is None for place in self.places.values())
 
     def raw(self, words: Sequence[int], place: OutputPlace) -> int:
-        """The output's integer without sign among these words."""
+        """Integer of the output among these words, without sign."""
         return sum(words[place.word + n] << n * _BITS for n in range(place.span))
 
     def value(self, words: Sequence[int], place: OutputPlace) -> Value:
@@ -73,7 +73,7 @@ class OutputWords:
             words[place.word + n] = raw >> n * _BITS & _MASK
 
     def safe(self, held: Sequence[int]) -> tuple[int, ...]:
-        """What the outputs get when nobody commands them, after these words."""
+        """Words that the outputs get when nobody commands them, after the words ``held``."""
         words = list(held)
         for place in self.places.values():
             if place.safe is not None:
@@ -81,7 +81,7 @@ class OutputWords:
         return tuple(words)
 
     def take(self, words: tuple[int, ...]) -> None:
-        """An owner's values are sent: what holds its last value holds one of these."""
+        """Take over the values of an owner that are sent: an output that holds keeps these."""
         self.held = words
         self.has_let_go = False
 
@@ -93,7 +93,7 @@ class OutputWords:
         self.take(tuple(words))
 
     def let_go(self) -> None:
-        """Nothing is held any more: what holds its last value gets 0, or what is nearest to it."""
+        """Hold nothing any more: an output that holds its last value gets 0, or the value nearest to it."""
         self.has_let_go = True
         words = list(self.held)
         for place in self.places.values():
@@ -102,13 +102,13 @@ class OutputWords:
         self.held = tuple(words)
 
     def on_wire(self, words: tuple[int, ...]) -> tuple[int, ...]:
-        """What outputs get by the words of the leg, the control word first."""
+        """Words that outputs get by those of the leg, the control word first."""
         return words[1:] if words[0] & ACTIVE else self.safe(self.held)
 
     def decode(self, values: Mapping[str, Value], before: tuple[int, ...], held: int) -> Telegram:
-        """The words of a telegram; outputs that are not written stay as ``before``, and those that hold as
-        they are. A name with a number behind a dot is one bit of an output. A telegram that leaves every
-        output safe or as it is stops. Raises ``Refusal``."""
+        """Words of a telegram; outputs that are not written stay as ``before``, and those that hold as they
+        are. A name with a number behind a dot is one bit of an output. A telegram that leaves every output
+        safe or as it is stops. Raises ``Refusal``."""
         words = list(before)
         for place in self.places.values():
             if place.safe is None:
@@ -140,7 +140,7 @@ class OutputWords:
 
 
 def _off(output: Output) -> int:
-    """The integer of the value nearest to 0 that the output takes."""
+    """Integer of the value nearest to 0 that the output takes."""
     low, high = output.low, output.high
     value = max(0.0 if low is None else low, min(0.0 if high is None else high, 0.0))
     try:

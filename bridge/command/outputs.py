@@ -1,4 +1,4 @@
-"""The outputs of a node that is no drive: commanded by one owner, and safe when nobody does.
+"""Outputs of a node without drives: commanded by one owner, and safe when nobody does.
 
 They are commanded by the same leg as drives. Its control word has one bit: the telegram of an owner that
 leaves every output safe stops, any other is active. So the rules of a drive hold word by word: who owns them,
@@ -55,7 +55,7 @@ _SUPERVISION: Final = (
     "refused_writes",
 )
 _TAKEN_S: Final = 0.25
-"""A node may take this long from an RPDO to its objects, as a drive to its status word (``stopping``)."""
+"""Longest time in seconds from an RPDO to the node's objects, as in ``stopping`` to a drive's status word."""
 _DEADLINES: Final = 3
 
 
@@ -68,7 +68,7 @@ class Telling(NamedTuple):
 
 
 class OutputChannel(Channel):
-    """Who commands the outputs of one node. Words are those of the leg, the control word first."""
+    """Command channel of the outputs of one node. Words are those of the leg, the control word first."""
 
     def __init__(
         self,
@@ -105,7 +105,7 @@ class OutputChannel(Channel):
         return self.on_wire(self.output)
 
     def on_wire(self, output: RpdoWords) -> tuple[int, ...]:
-        """What the outputs get by this output of the leg."""
+        """Words that the outputs get by this output of the leg."""
         return self.output_words.on_wire(output.words)
 
     def handle(self, request: Request, now: float, reply: Reply) -> None:
@@ -130,7 +130,7 @@ class OutputChannel(Channel):
 
 
 class Outputs(WordTiming):
-    """The outputs of one node, and where its points stand in the image. Times are monotonic seconds."""
+    """Outputs of one node: their channel and their points in the image. Times are monotonic seconds."""
 
     def __init__(self, spec: DeviceSpec, image: Image, effects: Effects) -> None:
         super().__init__(spec.bus)
@@ -155,7 +155,7 @@ class Outputs(WordTiming):
         """Longest time in ms from the bridge's hang to outputs that the node itself has made safe, or why
         there is none."""
         self.own: OwnJudgement | None = None
-        """The same in detail."""
+        """The node's own reaction to a silent bridge, in detail."""
         self._image = image
         index = image.index
         self._points = [
@@ -198,8 +198,8 @@ class Outputs(WordTiming):
         bridge_stop: tuple[int, Said],
         now: float,
     ) -> None:
-        """What the boot-up has found: the transmission type of its RPDOs, what none of them carries, what
-        outputs hold, and what the node does by itself when the bridge falls silent."""
+        """Take over the findings of the boot-up: the transmission type of the RPDOs, the outputs that none of
+        them carries, the integers that outputs hold, and the node's own reaction to a silent bridge."""
         self.rpdo_type = rpdo_type
         self.unserved = dict(unserved)
         self.bridge_stop = bridge_stop
@@ -207,7 +207,7 @@ class Outputs(WordTiming):
         self.refresh(now)
 
     def on_telling(self, telling: Mapping[ObjectRef, Telling]) -> None:
-        """What the boot-up has found: the TPDO that brings each of these outputs."""
+        """Take over the TPDO that carries each of these outputs, as the boot-up has found it."""
         self._telling = {
             place.output.object: telling[place.output.object]
             for place in self.words.places.values()
@@ -215,13 +215,13 @@ class Outputs(WordTiming):
         }
 
     def on_own_supervision_changed(self, why: Text, now: float) -> None:
-        """An object that decides what the node does by itself was written: nothing is known of it."""
+        """Forget the node's own reaction to a silent bridge: an object that decides it was written."""
         self.bridge_stop = (0, why)
         self.own = None
         self.refresh(now)
 
     def on_wire(self, wire: Wire, now: float) -> None:
-        """What is predicted of its bus."""
+        """Take over the predicted delays of its bus."""
         self.wire = wire
         self.refresh(now)
 
@@ -229,7 +229,7 @@ class Outputs(WordTiming):
 
     @property
     def is_heard(self) -> bool:
-        """False: what they hold is read, they do not say it."""
+        """False: outputs do not report by themselves, their values are read back."""
         return False
 
     @property
@@ -244,15 +244,15 @@ class Outputs(WordTiming):
         return ignored_by_outputs(self.stop_check, verdict, took_s)
 
     def on_handed_over(self, now: float) -> None:
-        """What the channel puts out has been handed to the bus."""
+        """Begin the bound of its stop: the output of the channel has been handed to the bus."""
         way_s = self.rpdo_period_ms / 1000
         stopped = self._stopped()
         self.stop_check.on_handed_over(now, stopped, way_s=way_s, bound_s=self._bound_s(stopped, way_s))
         self._judged(now)
 
     def _stopped(self) -> list[StoppedOutput]:
-        """What has a value by the stop in force, as far as an RPDO carries it. What holds its last value has
-        none, unless somebody has stopped it by a command."""
+        """Outputs to which the stop in force gives a value, as far as an RPDO carries them. One that holds
+        its last value gets none, unless somebody has stopped it by a command."""
         words = self.words.safe(self.words.held)
         stopped: list[StoppedOutput] = []
         for name, place in self.words.places.items():
@@ -271,12 +271,12 @@ class Outputs(WordTiming):
         return _DEADLINES * max(deadlines, default=0.0) + way_s + _TAKEN_S
 
     def on_answer(self, question: Question, answer: OutputReadback, now: float) -> None:
-        """The answer to a question of ``stop_check``."""
+        """Take over the answer to a question of ``stop_check``."""
         self.stop_check.on_answer(question, answer, now)
         self._judged(now)
 
     def on_told(self, values: Sequence[tuple[ObjectRef, int]], now: float, *, after_pause: bool) -> None:
-        """A TPDO holds these outputs, as integers without sign. ``after_pause``: later than it may."""
+        """Take over outputs from a TPDO, as integers without sign. ``after_pause``: it came late."""
         if after_pause:
             self.stop_check.on_pause(now)
         self.stop_check.on_told(values, now)
@@ -289,7 +289,7 @@ class Outputs(WordTiming):
     # time
 
     def on_time(self, now: float) -> Sequence[StopVerdict]:
-        """Let everything happen that is due by ``now``; how stops have ended."""
+        """Do all that is due by ``now``. Returns the verdicts on stops that have ended."""
         self.channel.on_time(now)
         return self.stop_check.take_verdicts()
 
@@ -300,7 +300,7 @@ class Outputs(WordTiming):
     # into the image
 
     def refresh(self, now: float) -> None:
-        """Bring every point up to date; called when something has changed."""
+        """Bring all points up to date, after something has changed."""
         channel = self.channel
         channel.plan_anew()
         is_active = self.is_active
@@ -336,13 +336,13 @@ class Outputs(WordTiming):
         self.look(now)
 
     def _refresh_follows(self, now: float) -> None:
-        """Which stop that is about we know ourselves, and why it is not followed."""
+        """Show how its last stop has ended, and the reason why it is not followed."""
         check, link = self.stop_check, self.channel.link
         quality = link.quality(now)
         self._image.set(self._follows, check.follows, now, quality, link.reason(quality))
         self._image.set(self._last_stop, int(check.last_stop), now, Quality.GOOD, check.why)
 
     def look(self, now: float) -> None:
-        """Bring to this moment what changes by itself."""
+        """Bring to ``now`` what changes by itself."""
         self._image.keep(self._left, self.channel.left_ms(now), now)
         self._image.keep(self._telegrams, self.channel.telegrams, now)

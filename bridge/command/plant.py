@@ -43,7 +43,7 @@ from bridge.parameter import Ledger
 from bridge.text import Said, Text
 
 CarryOut = Callable[[Request, float, Reply], bool]
-"""Takes a command on a node or a bus, or a request for a parameter; False where there is nobody to do it."""
+"""Executor of a command on a node or a bus, or of a parameter request; False where there is none."""
 
 
 def on_no_bus(request: Request, now: float, reply: Reply) -> bool:
@@ -68,13 +68,13 @@ class Plant:
         self.image = Image(catalogue.points)
         self.audit = AuditTrail(self.image)
         self.eeprom_writes = Ledger()
-        """How often parameters were written; whoever keeps it across restarts fills it first."""
+        """Count of writes of each parameter; whoever keeps it across restarts fills it first."""
         self.events = EventQueue()
         """Events of nodes and buses that nobody has been told of yet."""
         self.unsent_stops: set[Commanded] = set()
         """Drives and outputs with a stop that has not been handed to the bus yet."""
         self.because: Callable[[Event], Said] = lambda event: ""
-        """Finds what has caused an event."""
+        """Finder of an event's cause; empty where none is known."""
         self._effects = Effects(self.events)
         self._changed: dict[str, set[str]] = {bus.name: set() for bus in catalogue.site.bus}
         self._deadlines = Deadlines[Commanded]()
@@ -89,17 +89,17 @@ class Plant:
         self.nodes = {name: self._node(spec) for name, spec in catalogue.nodes.items()}
         self.drives = {drive.name: drive for node in self.nodes.values() for drive in node.drives}
         self.members = {one.name: one for node in self.nodes.values() for one in node.members}
-        """Drives, and nodes that are none."""
+        """Drives and devices, by their names."""
         self._begin(version)
 
     def _node(self, spec: NodeSpec) -> Node:
-        """A node with what it commands."""
+        """A node with its drives, or its device."""
         drives = [self._added(Drive(one, self.image, self._effects)) for one in spec.drives]
         devices = [Device(one, self.image, self._outputs(one)) for one in spec.devices]
         return Node(spec, drives, devices, self.image)
 
     def _outputs(self, spec: DeviceSpec) -> Sequence[Outputs]:
-        """The outputs of a device as one that is commanded; none where it has none."""
+        """Outputs of a device, as one that is commanded; empty where it has none."""
         return [self._added(Outputs(spec, self.image, self._effects))] if spec.is_commanded else []
 
     def _begin(self, version: str) -> None:
@@ -136,13 +136,13 @@ class Plant:
         self._conclude()
 
     def side_of(self, bus: BusTable) -> BusSide:
-        """The plant as the nodes of this bus have it."""
+        """The plant as the nodes of this bus see it."""
         nodes = [node for node in self.nodes.values() if node.bus is bus]
         return BusSide(nodes, self.image, self.events, self.eeprom_writes, self.began)
 
     def take_stop_due(self) -> float | None:
-        """Time at which the first stop was due of those that were handed to a bus since the last call, of
-        drives that had tripped; None where there was none."""
+        """Earliest due time of the stops that were handed to a bus since the last call, of drives that had
+        tripped; None where there was none."""
         due, self._effects.stop_due = self._effects.stop_due, None
         return due
 
@@ -226,13 +226,13 @@ class Plant:
         return is_changed or (until is not None and until < now + one.burst_s)
 
     def reply_later(self, reply: Reply) -> Reply:
-        """A reply that waits for ``deliver_outcomes``: what an outcome causes does not happen in the midst of
+        """Reply that waits for ``deliver_outcomes``: what an outcome causes does not happen in the midst of
         what has brought it about."""
         return lambda outcome: self._outcomes.append((reply, outcome))
 
     @property
     def has_outcomes(self) -> bool:
-        """Somebody waits for one."""
+        """An outcome waits to be delivered."""
         return bool(self._outcomes)
 
     def deliver_outcomes(self) -> None:
@@ -245,14 +245,13 @@ class Plant:
     def on_connection(
         self, identity: Identity, now: float, *, is_there: bool, has_others: bool = False
     ) -> None:
-        """A connection of ``identity`` has begun or ended, and the same user has others or not: no telegram,
-        and no end of control. Told where a protocol knows it."""
+        """Note that a connection of ``identity`` has begun or ended, and whether the same user has others: no
+        telegram, and no end of control. Told where a protocol knows it."""
         for one in self._commanded.values():
             one.channel.on_connection(identity, now, is_there=is_there, has_others=has_others)
 
     def rejected(self, rejection: Rejection, now: float, count: int = 1) -> None:
-        """What a protocol has refused by itself, ``count`` times: counted, told and written to the audit log
-        as what a drive refuses."""
+        """Take over ``count`` refusals by a protocol itself: counted, told and logged as a drive's."""
         self.audit.rejected(rejection, now, count)
         self._refusals.report(
             rejection.action, rejection.identity, rejection.target, rejection.said, now, count
@@ -265,8 +264,8 @@ class Plant:
         self.image.set(index, int(self.image[index].value) + by, now)
 
     def enforcements(self, now: float) -> Iterator[Enforcement]:
-        """Enforcements on the nodes of those that ignore their stops. The timers of every channel run while it
-        is iterated: carry each out before the next is taken, for it decides what becomes of another drive of
+        """Enforcements on the nodes of those that ignore their stops. All channels' timers run while it is
+        iterated: carry each out before the next is taken, for it decides what becomes of another drive of
         that node."""
         self.settle()
         for one in self._deadlines.take_due(now):
@@ -278,7 +277,7 @@ class Plant:
                     yield Enforcement(one.node_name, action, Text.of("stopped_by.plant", name=one.name))
 
     def _stop_ended(self, one: Commanded, verdict: StopVerdict, now: float) -> Action | None:
-        """Report how a stop has ended; what is to be done to the node."""
+        """Report how a stop has ended. Returns the action to be taken on the node."""
         conclusion = concluded(self.nodes[one.node_name], one, verdict, now)
         self.audit.stop_ended(one.name, verdict.outcome.label, conclusion.logged, now)
         if conclusion.event is not None:
@@ -286,7 +285,7 @@ class Plant:
         return conclusion.action
 
     def refresh(self, now: float) -> None:
-        """The slow part: ages, counters and the faults of the nodes; a few times a second."""
+        """Bring ages, counters and qualities up to date: the slow part, called a few times a second."""
         self.settle()
         for one in self._deadlines.sweep(now):
             if self._missed_limit.allows(now):
@@ -302,7 +301,7 @@ class Plant:
         self.set("bridge/refused_writes", refused + self._refusals.count, now)
 
     def _conclude(self) -> None:
-        """Apply and tell what has come of a call."""
+        """Apply the effects of a call, and tell its events."""
         self.settle()
         self.tell_events()
 
@@ -329,14 +328,14 @@ class Plant:
 
     @property
     def has_news(self) -> bool:
-        """Since the last round something has come of a drive beside its values."""
+        """Something beside the values of drives has changed since the last round."""
         effects = self._effects
         if effects.settled or effects.due or self._outcomes:
             return True
         return self._deadlines.is_touched or any(self._changed.values())
 
     def take_changed(self, bus: str) -> set[str]:
-        """The nodes of this bus with a drive that may be sent something else since the last call."""
+        """Names of the nodes of this bus with a drive that may be sent other words since the last call."""
         self.settle()
         changed = self._changed[bus]
         if changed:
@@ -367,7 +366,7 @@ class PlantView:
         self.on_event, self.forget = plant.on_event, plant.forget
 
     def hurry(self, *, is_wanted: bool) -> None:
-        """Changes are here at once anyway."""
+        """Do nothing: changes are here at once anyway."""
 
     def look(self, drive: str) -> None:
         self._plant.members[drive].look(self._clock())
@@ -384,7 +383,7 @@ class PlantView:
                 self._wake()
 
     def rejected(self, rejection: Rejection, at: float | None = None, count: int = 1) -> None:
-        """``count`` of this kind, the last of them ``at`` a time of the plant's, or now."""
+        """Pass on ``count`` rejections of this kind, the last ``at`` a time of the plant's, or now."""
         self._plant.rejected(rejection, self._clock() if at is None else at, count)
 
     def count(self, leaf: str, by: int = 1) -> None:

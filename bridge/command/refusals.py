@@ -1,4 +1,4 @@
-"""Refusals of what no drive refuses by itself."""
+"""Refusals of requests by others than drives: the plant, nodes and protocols."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bridge.command.messages.request import Action, Identity, Outcome, Reply, Re
 from bridge.text import Said, Text
 
 _LONGEST_NAME: Final = 80
-"""Clients may call anything a drive."""
+"""Most characters of a target's name that are shown: clients may call anything a drive."""
 
 
 class Refusals:
@@ -26,8 +26,7 @@ class Refusals:
     def report(
         self, what: str, identity: Identity, target: str, why: Said, now: float, count: int = 1
     ) -> None:
-        """Report ``count`` refusals of one kind. Of a ``target`` that is not there the event is the bridge's,
-        and names it."""
+        """Report ``count`` refusals of one kind; for an unknown ``target`` the bridge's event names it."""
         source = self._sources.get(target)
         unknown = target[:_LONGEST_NAME] if source is None else ""
         who = str(identity) if identity.user else identity.source.label
@@ -36,7 +35,7 @@ class Refusals:
         self._events.report(Event(now, EventKind.REFUSED, source or "bridge", 300, said))
 
     def counted(self, request: Request, now: float, reply: Reply) -> Reply:
-        """``reply``, after a refusal was reported."""
+        """Reply that reports a refusal before ``reply`` is called."""
 
         def conclude(outcome: Outcome) -> None:
             if not outcome.ok and request.action is not Action.READ_PARAMETER:
@@ -47,8 +46,8 @@ class Refusals:
 
 
 def _refused(what: str, target: str, who: str, why: Said) -> Text:
-    """``what`` is empty where several requests that differ in it are told as one, ``target`` where the event
-    is of it."""
+    """Text of the event. ``what`` is empty where several requests that differ in it are told as one,
+    ``target`` where the event is of it."""
     action = Text.plain(what) if what else Text.of("request.several")
     if what in Action.__members__.values():
         action = Text.word("action", what)

@@ -10,7 +10,7 @@ from bridge.text import Said, Text
 
 
 class InForce(NamedTuple):
-    """One scaled command: where its words stand, the words that are held, and what they mean."""
+    """One scaled command: the places of its words, the words that are held, and the value that they mean."""
 
     places: tuple[int, ...]
     words: tuple[int, ...]
@@ -23,14 +23,14 @@ class InForce(NamedTuple):
 
 
 class SetpointDoubts:
-    """The word stays, for the drive acts on it; nobody has asked for the value that it means. So a point is
-    in doubt until its command is written anew, or another word has taken its place."""
+    """Commands in doubt. The word stays, for the drive acts on it, but nobody has asked for its new value: a
+    point is in doubt until its command is written anew, or another word has taken its place."""
 
     def __init__(self) -> None:
         self._doubts: dict[str, tuple[InForce, Text]] = {}
 
     def note(self, name: str, before: InForce, after: InForce) -> Said:
-        """``name`` of the command group means another value; what there is to say, empty where nobody would
+        """Note that command ``name`` means another value; gives the doubt, empty where nobody would
         notice."""
         if before.words != after.words or before.value == after.value:
             return ""
@@ -41,7 +41,7 @@ class SetpointDoubts:
         return why
 
     def why(self, name: str, setpoints: Sequence[int]) -> Said:
-        """Why a command is in doubt, with these words in force; empty where it is not."""
+        """Reason why a command is in doubt, with these words in force; empty where it is not."""
         if not self._doubts or name not in self._doubts:
             return ""
         written, why = self._doubts[name]
@@ -52,7 +52,7 @@ class SetpointDoubts:
         return any(self.why(name, setpoints) for name in self._doubts)
 
     def forget(self, names: Iterable[str], written: Iterable[int]) -> None:
-        """These commands, and those made of the words at these places, have been written."""
+        """Forget doubts about these commands and those of the words at these places, now written anew."""
         if not self._doubts:
             return
         names, places = set(names), set(written)
@@ -70,6 +70,6 @@ def words_of(places: Iterable[int], setpoints: Sequence[int]) -> tuple[int, ...]
 
 
 def in_force(codec: ValueCodec, setpoints: Sequence[int]) -> InForce:
-    """What a command with a place means with these words."""
+    """Command that has a place, as it is in force with these words."""
     value = codec.from_words(setpoints)
     return InForce(codec.places, words_of(codec.places, setpoints), float(value), codec.model.unit)

@@ -1,4 +1,4 @@
-"""What a drive says of itself: status word, emergency, faults."""
+"""Status of a drive by its own reports: status word, emergency, faults."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class DriveStatus:
         self.link_fault = 0.0
         """Present fault of the leg between bridge and drive."""
         self.drive_fault: float = 0.0
-        """Present fault as the drive itself was asked for it."""
+        """Present fault as read from the drive itself."""
         self._drive_last: float = 0.0
         self.last_fault = 0.0
 
@@ -29,8 +29,8 @@ class DriveStatus:
         self._told = None if told.is_gone else told
 
     def on_drive_fault(self, current: float | None, last: float | None) -> bool:
-        """What the drive answered; True where that changes something. Of the last faults that the bridge
-        and the drive tell, the newest counts."""
+        """Take over the drive's answers; returns True where they change something. Of the last faults that
+        the bridge and the drive tell, the newest counts."""
         before = (self.drive_fault, self.last_fault)
         if current is not None:
             if current and current != self.drive_fault:

@@ -1,6 +1,6 @@
-"""How long a drive may still be enabled after the last telegram of its owner, term by term. Pure.
+"""Longest time that a drive is still enabled after the last telegram of its owner, term by term. Pure.
 
-What each term is, and what is in none of them: ``docs/explanation/dead-man-chain.md``.
+The terms, and what is in none of them: ``docs/explanation/dead-man-chain.md``.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from bridge.config import IGNORE_ALL_S, BusTable, DriveTable, OutputsTable
 from bridge.text import Said, Text, render
 
 REACTION_BOUND_MS: Final = 20
-"""How late the bridge may be itself, or the kernel's timer in its place."""
+"""Longest delay in ms of the bridge itself, or of the kernel's timer in its place."""
 _THREAD_QUEUE_MS: Final = 50.0
-"""How long a frame may wait for python-can's thread (``bridge/can/pythoncan.py``)."""
+"""Longest time in ms that a frame waits for python-can's thread (``bridge/can/pythoncan.py``)."""
 _KERNEL: Final = ("socketcan", "virtual")
 _LAST_SYNCHRONOUS: Final = 240
 _FOREIGN_SYNC_MS: Final = 100
-"""For how long a SYNC is waited for that somebody else sends: its period is not known here."""
+"""Time in ms for which a SYNC of another producer is waited for: its period is not known here."""
 _ROUNDING: Final = 1e-9
 
 
@@ -47,7 +47,7 @@ class StopTime:
 
     @property
     def ms(self) -> int:
-        """Rounded up; 0 where there is none."""
+        """Sum in ms, rounded up; 0 where there is none."""
         return math.ceil(sum(term.ms for term in self.terms) - _ROUNDING)
 
     def __str__(self) -> str:
@@ -63,8 +63,8 @@ class StopTime:
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """How long a drive's RPDOs take on their bus, and what may be sent before them. ``before_ms`` is None if
-    nothing bounds it."""
+    """Predicted delays of a drive's RPDOs on their bus: ``frames_ms`` of their own, ``before_ms`` of frames
+    that may go first, None if nothing bounds them."""
 
     frames_ms: float = 0.0
     before_ms: float | None = 0.0
@@ -78,10 +78,10 @@ def stop_time(
     wire: Wire,
     own_ms: float | None = 0.0,
 ) -> StopTime:
-    """From the owner's last telegram to the last frame that enables the drive, and to the first that does
-    not. ``transmission_type`` is that of the RPDO with the control word. With silence the reaction is the
-    drive's own, ``own_ms`` after its last RPDO. If it has none (0), it gets disable voltage instead; None:
-    the drive has not been asked yet."""
+    """Stop time from the owner's last telegram to the last frame that enables the drive, and to the first
+    that does not. ``transmission_type`` is that of the RPDO with the control word. With silence the reaction
+    is the drive's own, ``own_ms`` after its last RPDO. If it has none (0), it gets disable voltage instead;
+    None: the drive has not been asked yet."""
     if not timeout_ms or table.telegram_downtime_s == IGNORE_ALL_S or table.reaction.holds:
         return StopTime()
     if table.reaction.is_silent and own_ms is None:
@@ -95,7 +95,7 @@ def stop_time(
 
 
 def output_stop_time(table: OutputsTable, bus: BusTable, transmission_type: int, wire: Wire) -> StopTime:
-    """From the owner's last telegram to the first frame with safe values of a node's outputs."""
+    """Stop time from the owner's last telegram to the first frame with safe values of a node's outputs."""
     timeout_ms = table.fieldbus_timeout_ms or 0
     if not timeout_ms:
         return StopTime()
@@ -106,7 +106,7 @@ def output_stop_time(table: OutputsTable, bus: BusTable, transmission_type: int,
 def _to_the_wire(
     control: str, bus: BusTable, timeout_ms: int, transmission_type: int, wire: Wire
 ) -> list[Term] | StopTime:
-    """Until the node has taken over the first frame that stops; or why that is not known."""
+    """Terms until the node has taken over the first frame that stops; or why these are not known."""
     sync_ms = sync_wait_ms(bus, transmission_type)
     is_synchronous = transmission_type <= _LAST_SYNCHRONOUS
     if is_synchronous and not bus.sync_period_ms:
@@ -125,12 +125,12 @@ def _to_the_wire(
 
 
 def sync_wait_ms(bus: BusTable, transmission_type: int) -> int:
-    """How long an RPDO of this type waits for the SYNC that makes it effective (CiA 301 §7.5.2.35)."""
+    """Time in ms that an RPDO of this type waits for the SYNC that takes it over (CiA 301 §7.5.2.35)."""
     return max(1, transmission_type) * bus.sync_period_ms if transmission_type <= _LAST_SYNCHRONOUS else 0
 
 
 def takeover_ms(bus: BusTable, transmission_type: int) -> int:
-    """After how long a word that is on the bus has been taken over, or is no longer waited for: 0 where that
+    """Time in ms after which a word on the bus has been taken over, or is no longer waited for: 0 where that
     takes no SYNC."""
     if transmission_type > _LAST_SYNCHRONOUS:
         return 0

@@ -1,4 +1,4 @@
-"""The site file: which buses, nodes and drives there are, and who may see and command them.
+"""The site file: its buses, nodes and drives, and who may see and command them.
 
 Reference for users: ``docs/reference/site-file.md``.
 """

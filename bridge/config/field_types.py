@@ -19,13 +19,13 @@ ParameterRights = Literal["write", "read"]
 WordOrder = Literal["ABCD", "CDAB", "BADC", "DCBA"]
 
 LIFE_SIGN_MS: Final = 1000
-"""How long each token of a life sign is offered. A program that reads one at the last moment brings back one
-that is this old."""
+"""Time in ms for which each token of a life sign is offered. A program that reads one at the last moment
+brings back one that is this old."""
 IGNORE_ALL_S: Final = -0.1
 """``telegram_downtime_s`` that reports communication errors and otherwise ignores them (P513 = -0.1)."""
 
 LONGEST_TIMEOUT_MS: Final = 32767
-"""Of P151 (BU 2500 §7.1.1)."""
+"""Upper limit of P151 in ms (BU 2500 §7.1.1)."""
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _PREFIX: Final = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)

@@ -86,7 +86,7 @@ Mapped = Annotated[PdoEntry, BeforeValidator(_mapped)]
 
 
 class PdoTable(Table):
-    """How the bridge sets one PDO of the node; what is left out stays as the node has it."""
+    """Settings of one PDO that the bridge writes to the node; what is left out stays as the node has it."""
 
     number: int | None = Field(None, ge=1, le=512, description="left out: the drive's first")
     enable: bool = True
@@ -101,18 +101,18 @@ PdoTables = Annotated[list[PdoTable], BeforeValidator(listed)]
 
 
 def pdo_table(tables: Sequence[PdoTable], number: int, first: int) -> PdoTable | None:
-    """What the site file asks of a drive's PDO; a table without a number is for the drive's ``first``."""
+    """Table of a drive's PDO in the site file; one without a number is for the drive's ``first``."""
     return next((table for table in tables if (table.number or first) == number), None)
 
 
 class AcceptsTable(Table):
-    """What a site takes knowingly, each with its reason."""
+    """Risks that a site accepts, each with its reason."""
 
     runs_on: Reason | None = Field(None, description="why the drive may run on when the bridge falls silent")
 
 
 class CommandedTable(Table):
-    """Owner of something on a bus, what becomes of it without one, and the reaction to an ignored stop."""
+    """Owner of a drive or of outputs, the reaction to its loss, and that to an ignored stop."""
 
     control: Control = "none"
     fieldbus_timeout_ms: int | None = Field(
@@ -125,8 +125,7 @@ class CommandedTable(Table):
 
     @property
     def reacts_to_ignored_stop(self) -> OnIgnoredStop:
-        """What is not commanded here may well be run by somebody else: its node is stopped only if the site
-        file says so."""
+        """Reaction to an ignored stop; by default a report if ``control`` is none: others may run it."""
         is_given = "on_ignored_stop" in self.model_fields_set
         return self.on_ignored_stop if is_given or self.control != "none" else "report"
 
@@ -162,7 +161,7 @@ class DriveTable(CommandedTable):
 
     @property
     def timeout_range_ms(self) -> tuple[int, int]:
-        """What the owner may set. By default never off, and up to ten times the site's own time."""
+        """Range in ms for the owner: by default never off, and up to ten times the site's own time."""
         if self.fieldbus_timeout_range_ms is not None:
             low, high = self.fieldbus_timeout_range_ms
             return low, high
@@ -174,7 +173,7 @@ SafeValue = bool | int | float | Literal["hold"]
 
 
 class OutputsTable(CommandedTable):
-    """Who commands the outputs of a node that is no drive, and what they get when nobody does."""
+    """Owner of the outputs of a node without drives, and their values when nobody commands them."""
 
     on_expiry: dict[str, SafeValue] = Field(
         default_factory=dict[str, SafeValue], description='for each output a value, or "hold"'
@@ -201,7 +200,7 @@ class IdentityTable(Table):
 
 
 class ConfigureTable(Table):
-    """One object that the node is to hold."""
+    """One object, with the value that the node is to hold."""
 
     object: ObjectName = Field(description='an object as "2097:01", index and sub-index in hexadecimal')
     type: TypeName = Field(description="the object's data type, such as uint16")
@@ -226,7 +225,7 @@ class ConfigureTable(Table):
 
 
 MODULES: Final = "modules"
-"""The key of a fault about what is plugged into a device, found in its description."""
+"""Key of a fault about the modules plugged into a device, found in its description."""
 
 
 def mapping_key(mapping: str, modules: Sequence[str]) -> str:
@@ -314,7 +313,7 @@ class BusTable(Table):
 
     @property
     def rpdo_period_s(self) -> float:
-        """How often an unchanged RPDO is repeated: as often as SYNC, or every 20 ms without one."""
+        """Period in seconds of an unchanged RPDO: by default that of SYNC, or 20 ms without one."""
         return (self.rpdo_period_ms or self.sync_period_ms or 20) / 1000
 
 

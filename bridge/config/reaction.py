@@ -1,7 +1,7 @@
 """Reactions to a controller that has fallen silent: the values of ``on_expiry``, and what each of them means.
 
-What reacts, prints or checks one reads its row here. A reaction that consists of other stops is one more row,
-and its name in each language (``bridge.text``).
+Code that applies, prints or checks one reads its row here. A reaction that consists of other stops is one
+more row, and its name in each language (``bridge.text``).
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ class StopKind(StrEnum):
 
 
 class ReactionRule(NamedTuple):
-    """``stop`` is sent until the acknowledge, after ``ramp`` where there is one: that ends when the drive is
-    at rest, or after its time."""
+    """One reaction: ``stop`` is sent until the acknowledge, after ``ramp`` where there is one: that ends when
+    the drive is at rest, or after its time."""
 
     stop: StopKind = StopKind.STOP
     ramp: StopKind | None = None
     is_silent: bool = False
     """Nothing is sent, as long as the drive stops by that; ``stop`` is what breaks the silence."""
     holds: bool = False
-    """What was sent before is still sent, and no stop at all."""
+    """The last words are sent on, and no stop at all."""
 
     @property
     def first(self) -> StopKind:

@@ -1,4 +1,4 @@
-"""What the keys of a site file say together.
+"""Checks of the keys of a site file against each other.
 
 Judged on the raw file, so that these faults are found beside those of single values.
 """
@@ -21,7 +21,7 @@ _MUTUAL_TLS: Final = re.compile(r"(tls|quic)/.*[#;]enable_mtls=(true|1)\b.*")
 _WITHOUT_CONNECTIONS: Final = ("opcua", "zenoh")
 """Protocols of which the command side does not know whether a client is still connected."""
 _BUS: Final = BusTable.model_construct()
-"""Defaults of the site file."""
+"""Bus with the defaults of the site file."""
 
 
 def check(file: TomlFile) -> None:
@@ -95,7 +95,7 @@ def _given(table: RawTable, name: str, default: int) -> int:
 
 
 def _check_node(bus: RawTable, node: RawTable, file: TomlFile) -> None:
-    """Node names are the first word of every point."""
+    """Check a node, whose name is the first word of every point."""
     name, node_id = node.text("name"), node.whole("id")
     if name in _RESERVED_NODES:
         file.fault((*node.key, "name"), f"{name!r} is reserved", "choose another name")
@@ -143,7 +143,7 @@ def _check_control(drive: RawTable, file: TomlFile) -> None:
 
 
 def _check_life_sign(drive: RawTable, file: TomlFile) -> None:
-    """A program that reads a token at the last moment brings back one that is ``LIFE_SIGN_MS`` old."""
+    """Check time-outs: a token that is read last thing is ``LIFE_SIGN_MS`` old when a program returns it."""
     if drive.text("control") not in (*_PROTOCOLS, "lease"):
         file.fault((*drive.key, "life_sign"), "has no effect: nobody controls the drive", "leave it out")
         return
@@ -161,7 +161,7 @@ def _check_life_sign(drive: RawTable, file: TomlFile) -> None:
 
 
 def _check_dead_owner(drive: RawTable, file: TomlFile) -> None:
-    """Without a time-out only the end of its connection shows that an owner is dead."""
+    """Check the time-out: without one only the end of its connection shows that an owner is dead."""
     content = drive.content
     given = content.get("fieldbus_timeout_range_ms")
     low = next(iter(cast("list[object]", given)), None) if isinstance(given, list) else None
@@ -189,7 +189,7 @@ def _check_ports(file: TomlFile) -> None:
 
 
 def _check_page(file: TomlFile) -> None:
-    """Passwords and commands go over it."""
+    """Check the page's encryption: passwords and commands go over it."""
     page = file.root.table("page")
     listen, content = page.text("listen"), page.content
     for one, other in (("certificate", "private_key"), ("private_key", "certificate")):
@@ -205,7 +205,7 @@ def _check_page(file: TomlFile) -> None:
 
 
 def _check_zenoh(file: TomlFile) -> None:
-    """Who may connect may command, so connecting has to take a user or a certificate."""
+    """Check who may connect: each of them may command, so connecting has to take a user or a certificate."""
     zenoh = file.root.table("zenoh")
     given = zenoh.content.get("listen")
     listen = cast("list[object]", given) if isinstance(given, list) else []

@@ -1,4 +1,4 @@
-"""Reading a site file."""
+"""Reading and checking of a site file."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What parameters of the drive say about its values: with which of their settings a value means what the
-mapping file says, and which of them may not be changed."""
+"""Conditions of values by parameters of the drive: the settings with which a value means what the mapping
+file says, and the parameters that may not be changed."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ Key = tuple[str, int]
 
 
 class Lack(NamedTuple):
-    """Why a value is not served, or with the quality *stale*, why it is in doubt."""
+    """Reason why a value is not served, or with the quality *stale*, why it is in doubt."""
 
     quality: Quality
     why: Said
 
 
 class Conditions:
-    """Of one drive: the settings that it has told, in the unit of each parameter."""
+    """Settings that one drive has told, in the unit of each parameter."""
 
     def __init__(self, family: Family) -> None:
         self._family = family
         self._told: dict[Key, float | None] = {}
         self._first: dict[Key, float] = {}
-        """What was told first since the bridge runs."""
+        """First setting told since the bridge runs."""
 
     def key(self, name: str, in_set: int) -> Key:
-        """By which a setting is known that counts in this parameter set."""
+        """Key of the setting that counts in this parameter set."""
         return name, in_set if self._family.parameter_named(name).sets else _FIRST
 
     def told(self, key: Key) -> float | None:
-        """None where the drive does not tell it, or has not been asked."""
+        """Setting told by the drive; None where it refuses, or has not been asked."""
         return self._told.get(key)
 
     def has_been_asked(self, key: Key) -> bool:
@@ -44,21 +44,21 @@ class Conditions:
         return key in self._told
 
     def tell(self, key: Key, value: float | None) -> None:
-        """The drive's answer; None where it refuses one."""
+        """Take over the drive's answer; None where it refuses one."""
         self._told[key] = value
         if value is not None:
             self._first.setdefault(key, value)
 
     def take_defaults(self) -> None:
-        """What is taken where there is no drive to ask: that everything means what the mapping file says."""
+        """Take defaults where there is no drive to ask: everything means what the mapping file says."""
         for value in self._family.value:
             for name, settings in value.when.items():
                 for in_set in range(_FIRST, self._family.sets + 1):
                     self._told[self.key(name, in_set)] = settings[0]
 
     def lack(self, value: ProcessValue, in_set: int, unread: Lack) -> Lack | None:
-        """Why ``value`` does not mean in this set what the mapping file says; None where it does. ``unread``
-        says what there is to say of a parameter that the drive has not told."""
+        """Lack of ``value`` in this set where it does not mean what the mapping file says; None where it
+        does. ``unread`` is the lack of a parameter that the drive has not told."""
         for name, settings in value.when.items():
             setting = self.told(self.key(name, in_set))
             if setting is None:
@@ -81,19 +81,19 @@ class Conditions:
         return Text.of("meaning.setting", parameter=name, value=setting)
 
     def _set_of(self, name: str, in_set: int) -> int | None:
-        """The parameter set that is told with it; None where all have the same."""
+        """Parameter set to be named with the setting; None where all share it."""
         return in_set if self._family.parameter_named(name).sets else None
 
 
 def unread_in(parameters: tuple[str, ...], in_set: int | None, why: Said) -> Text:
-    """What there is to say of parameters that the drive has not told."""
+    """Text about parameters that the drive has not told."""
     if in_set is None:
         return Text.of("meaning.unread", parameters=parameters, why=why)
     return Text.of("meaning.unread_in_set", parameters=parameters, in_set=in_set, why=why)
 
 
 def otherwise_in(otherwise: tuple[Text, ...], in_set: int | None, settings: tuple[Text, ...]) -> Text:
-    """What the mapping file says of values with these settings."""
+    """Text about values that with these settings mean otherwise, as the mapping file has it."""
     if in_set is None:
         return Text.of("meaning.otherwise", otherwise=otherwise, settings=settings)
     return Text.of("meaning.otherwise_in_set", otherwise=otherwise, in_set=in_set, settings=settings)

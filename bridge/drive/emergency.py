@@ -1,4 +1,4 @@
-"""The meaning of an emergency message in a drive family."""
+"""Meaning of an emergency message in a drive family."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bridge.mapping.model import Family
 from bridge.text import Text, Words, render
 
 _VENDOR_BYTE: Final = 3
-"""The manufacturer's bytes begin here (CiA 301 §7.2.7.3.1)."""
+"""Place of the first manufacturer-specific byte (CiA 301 §7.2.7.3.1)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,19 +27,19 @@ class EmergencyMeaning:
 
     @property
     def text(self) -> str:
-        """In English."""
+        """The meaning in English."""
         return render(self.said)
 
 
 class EmergencyReader:
-    """Reads the emergency messages of one family: the event number first, the code second."""
+    """Reader of the emergency messages of one family: the event number first, the code second."""
 
     def __init__(self, family: Family) -> None:
         self._model = family.emcy
         self._words = FaultWords(family)
 
     def read(self, code: int, vendor: bytes) -> EmergencyMeaning:
-        """``vendor`` is the manufacturer's five bytes, fewer where the message was short."""
+        """Meaning of a message; ``vendor`` is the manufacturer's five bytes, fewer in a short message."""
         model = self._model
         if model.event is not None and (event := _byte(vendor, model.event.byte)) is not None:
             is_gone = code == 0 or event == model.event.gone

@@ -21,16 +21,16 @@ _GENERAL: Final[dict[Language, tuple[str, str, str]]] = {
     "en": ("Possible causes: {}.", "General advice: {}", " Details: {}."),
     "de": ("Mögliche Ursachen: {}.", "Allgemeiner Rat: {}", " Genaueres: {}."),
 }
-"""How general advice is marked: its cause, its remedy, and the manual behind it."""
+"""Marks of general advice, by language: its cause, its remedy, and the manual behind it."""
 
 
 _NUMBERS: Final = re.compile(r"(\d+\.\d)[\d./… ]*")
-"""The drive's own numbers before the text of a code: 20.1 … 21.3."""
+"""Numbers of the drive's own before the text of a code: 20.1 … 21.3."""
 
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """``number`` is in the maker's form; a text is empty where nobody says anything."""
+    """A fault explained. ``number`` is in the maker's form; a text is empty where nobody says anything."""
 
     number: str = ""
     text: Words = ""
@@ -51,7 +51,7 @@ class Explained:
 
 
 class FaultWords:
-    """What one family says of its faults, in one language."""
+    """Explanations of one family's faults, in one language."""
 
     def __init__(self, family: Family, language: Language = "en") -> None:
         self._emcy, self._faults = family.emcy, family.faults
@@ -66,13 +66,13 @@ class FaultWords:
         self._no_faults = no_faults(family)
 
     def own(self, fault: float) -> Explained:
-        """A finding of the bridge, under the number that the family has for it."""
+        """Fault found by the bridge, under the number that the family has for it."""
         name = f"{fault:.1f}"
         return self._explained(f"{self._faults.prefix}{name}", name, self._text(name))
 
     def of_drive(self, fault: float, cause: int | None = None, text: Words = "") -> Explained:
-        """What the drive tells: the number of its fault, or that of an event and the ``cause`` that came with
-        it. ``text`` is that of the emergency code, for numbers that have none."""
+        """Fault told by the drive: by its number, or by that of an event and the ``cause`` that came with it.
+        ``text`` is that of the emergency code, for numbers that have none."""
         name = self._name(fault)
         number = self._decimal(name) if "." in name else self._whole(int(fault))
         found = self._text(name) or text
@@ -88,7 +88,7 @@ class FaultWords:
         return bool(self._text(self._name(fault)))
 
     def of_code(self, code: int) -> Explained:
-        """An emergency message that has nothing but its code."""
+        """Fault by an emergency message that has nothing but its code."""
         name = f"{code:04X}h"
         return self._explained(name, name, self._text(name))
 
@@ -104,7 +104,7 @@ class FaultWords:
         return self._explained(number, name, self._text(name))
 
     def _name(self, fault: float) -> str:
-        """The name that the mapping file has for a number."""
+        """Name of a number in the mapping file."""
         decimal = f"{fault:.1f}"
         if decimal in self._faults.texts or fault != int(fault):
             return decimal
@@ -139,7 +139,7 @@ class FaultWords:
         return FORM_FIELD.sub(digits, self._faults.form)
 
     def _whole(self, number: int, mask: int | None = None) -> str:
-        """``mask``: bits beside it are not known, and shown as x."""
+        """Number in the maker's form. Bits beside ``mask`` are not known, and shown as x."""
         form = self._faults.form
         if not form or self._is_decimal:
             return str(number)
@@ -179,8 +179,8 @@ class FaultWords:
 
 
 def _from_exact_to_group(name: str) -> tuple[str, ...]:
-    """The names under which something may be said of a fault, the nearest first: a cause is of its event, a
-    code of its group and of its class (CiA 301 §7.2.7.1; from F000h on, groups are classes of their own)."""
+    """Names under which something may be said of a fault, the nearest first: a cause is of its event, a code
+    of its group and of its class (CiA 301 §7.2.7.1; from F000h on, groups are classes of their own)."""
     if not name.endswith("h"):
         return (name, name.partition(".")[0])
     group = (name, f"{name[:2]}xxh")
@@ -188,8 +188,8 @@ def _from_exact_to_group(name: str) -> tuple[str, ...]:
 
 
 def listed_faults(family: Family) -> list[str]:
-    """The names of all that is a fault: the drive's numbers and events, and the emergency codes that say more
-    than these or stand for them."""
+    """Names of all faults: the drive's numbers and events, and the emergency codes that say more than these
+    or stand for them."""
     emcy, faults = family.emcy, family.faults
     explained = [one.name for one in family.fault]
     own = {*explained, *faults.german}
@@ -201,12 +201,12 @@ def listed_faults(family: Family) -> list[str]:
 
 
 def emergency_codes(family: Family) -> list[str]:
-    """The names of all emergency codes that the mapping file lists one by one: ``4210h``."""
+    """Names of all emergency codes that the mapping file lists one by one: ``4210h``."""
     none = no_faults(family)
     return [f"{code}h" for code in family.emcy.codes if "xx" not in code and f"{code}h" not in none]
 
 
 def no_faults(family: Family) -> frozenset[str]:
-    """The names by which an emergency message says that there is no fault any more."""
+    """Names by which an emergency message says that there is no fault any more."""
     event = family.emcy.event
     return frozenset(("0000h", *([] if event is None or event.gone is None else [str(event.gone)])))

@@ -1,5 +1,5 @@
-"""What the words of one drive mean in each of its parameter sets: which value stands where, and by what
-scale. A meaning counts only where it has been read from the drive."""
+"""Meanings of one drive's words in each of its parameter sets: the place and the scale of each value. A
+meaning counts only where it has been read from the drive."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bridge.mapping.model import Family, Meaning, Parameter, ProcessValue, Slot
 from bridge.text import Said, Text
 
 Codes = Mapping[str, Sequence[int | None]]
-"""By the word's leaf, such as ``actual/value_1``, the code in each parameter set; None: it cannot be read."""
+"""Codes in each parameter set, by the word's leaf such as ``actual/value_1``; None: one cannot be read."""
 
 _FIRST: Final = 1
 
@@ -24,26 +24,26 @@ _UNREADABLE: Final = Text.of("meaning.cannot_be_read")
 
 
 class Meanings:
-    """Of one drive. Before the boot-up no meaning is known, and what has one waits."""
+    """Meanings of one drive's words. Before the boot-up none is known, and values that need one wait."""
 
     def __init__(self, family: Family, slot: Slot, given: Mapping[str, float]) -> None:
-        """``given`` are the scaling parameters of the site file: those of set 1, where no name tells another
-        (``P112.2``)."""
+        """Meanings with the scaling parameters that are ``given`` in the site file: those of set 1, where no
+        name tells another (``P112.2``)."""
         self._family = family
         self._slot = slot
         self.sets = range(_FIRST, family.sets + 1)
         self.conditions = Conditions(family)
         self._known: dict[int, dict[str, float]] = {number: {} for number in self.sets}
-        """The parameters that scale, as far as they are known, in each set."""
+        """Scaling parameters, as far as they are known, in each set."""
         for name, full in given.items():
             parameter, in_set = family.parameter_and_set(name)
             if in_set in self.sets:
                 self._known[in_set][parameter] = full
         self._scales = {number: scales_of(family, known) for number, known in self._known.items()}
         self.scales = self._scales[_FIRST]
-        """In set 1, by the value's leaf."""
+        """Scales in set 1, by the value's leaf."""
         self._no_scale: dict[Key, float] = {}
-        """What the drive has for parameters that scale, and that is no scale."""
+        """Values that the drive has for scaling parameters, and that are no scale."""
         self._codes: dict[str, tuple[int | None, ...]] = {}
         self._unread = Lack(Quality.WAITING, Text.of("meaning.not_read_yet"))
         self._found: dict[tuple[str, int], tuple[ValueCodec, Lack | None]] = {}
@@ -54,12 +54,12 @@ class Meanings:
 
     @property
     def codes(self) -> Codes:
-        """What has been read."""
+        """Codes that have been read."""
         return self._codes
 
     def on_scale(self, parameter: str, full: float, in_set: int = _FIRST) -> None:
-        """The drive's own value of a scaling parameter; it wins over the site file. Of one that is no scale
-        no value is made, with neither the site file's nor what was read before."""
+        """Take over the drive's own value of a scaling parameter; it wins over the site file. Where it is no
+        scale, no value is made: neither with the site file's nor with the one read before."""
         self._found.clear()
         scales, known = self._scales[in_set], self._known[in_set]
         self._no_scale.pop((parameter, in_set), None)
@@ -77,14 +77,14 @@ class Meanings:
                     scales[value.leaf] = scale
 
     def has_told(self, name: str, setting: float | None, in_set: int = _FIRST) -> bool:
-        """Whether the drive has said this already of a parameter that decides what values mean."""
+        """Whether the drive has told this setting already, of a parameter that decides what values mean."""
         key = self.conditions.key(name, in_set)
         # As texts: what is no number is no other one each time.
         is_same = repr(self.conditions.told(key)) == repr(self._setting(name, setting))
         return is_same and self.conditions.has_been_asked(key)
 
     def on_parameter(self, name: str, setting: float | None, in_set: int = _FIRST) -> None:
-        """What the drive says of such a parameter, None where it refuses to tell it."""
+        """Take over the setting of such a parameter, None where the drive refuses to tell it."""
         self._found.clear()
         value = self._setting(name, setting)
         self.conditions.tell(self.conditions.key(name, in_set), value)
@@ -93,11 +93,11 @@ class Meanings:
             self.on_scale(name, value, in_set)
 
     def _setting(self, name: str, told: float | None) -> float | None:
-        """What counts where the drive says this."""
+        """Setting that counts where the drive tells this one."""
         return self._family.parameter_named(name).absent if told is None else round(float(told), 9)
 
     def on_codes(self, codes: Codes, why_unread: Text = _UNREADABLE) -> bool:
-        """What the drive's parameters say that its words carry. True where a setpoint that was written before
+        """Take over the codes of what words carry. Returns True where a setpoint that was written before
         means something else now."""
         before = self._of_commands()
         self._found.clear()
@@ -106,25 +106,25 @@ class Meanings:
         return before not in ({}, self._of_commands())
 
     def take_defaults(self) -> None:
-        """What is taken where there is no drive to ask."""
+        """Take defaults where there is no drive to ask."""
         self.on_codes(default_codes(self._family))
         self.conditions.take_defaults()
 
     def on_overdue(self, overdue: frozenset[Key]) -> bool:
-        """What has not been read again in time, by its key. True where that is news."""
+        """Take over the keys of what has not been read again in time. Returns True where that is news."""
         is_news = overdue != self._overdue
         self._overdue = overdue
         return is_news
 
     def doubt(self, model: ProcessValue, in_set: int) -> Said:
-        """Why it is not certain that this value still means what it meant; empty where it is."""
+        """Reason why this value may no longer mean what it meant; empty where it does."""
         if not self._overdue:
             return ""
         late = [key[0] for key in self._deciding(model, in_set) if key in self._overdue]
         return Text.of("meaning.overdue", parameter=late[0]) if late else ""
 
     def _deciding(self, model: ProcessValue, in_set: int) -> list[Key]:
-        """What decides the meaning of a value in this set."""
+        """Keys of the settings that decide the meaning of a value in this set."""
         conditions = self.conditions
         runs = self._family.meanings_of(self._slot, model.group) if model.code else []
         keys: list[Key] = [(one.leaf, in_set) for run in runs for one in run]
@@ -137,7 +137,7 @@ class Meanings:
         return {leaf: codes for leaf, codes in self._codes.items() if leaf.startswith("command/")}
 
     def codec(self, codec: ValueCodec, in_set: int) -> tuple[ValueCodec, Lack | None]:
-        """The codec as it is in this set, and why it does not serve there."""
+        """Codec of this set, and its lack there, None where it serves."""
         key = codec.model.leaf, in_set
         found = self._found.get(key)
         if found is None:
@@ -145,8 +145,8 @@ class Meanings:
         return found
 
     def unknown_followed(self, words: Sequence[int]) -> frozenset[int]:
-        """The places of the actual words that no setpoint may follow: in the active parameter set one of the
-        two has another meaning, or none that has been read. ``words`` begin with the status word."""
+        """Places of the actual words that no setpoint may follow: in the active parameter set one of the two
+        has another meaning, or none that has been read. ``words`` begin with the status word."""
         if not self._followers:
             return frozenset()
         in_set = self._set.of(words[0])
@@ -173,7 +173,7 @@ class Meanings:
         return found, lack or self._lack_of_scale(found, number)
 
     def _lack_of_scale(self, codec: ValueCodec, number: int) -> Lack | None:
-        """``number`` is the set in which its parameters are looked up."""
+        """Lack of a known scale; ``number`` is the set in which the scaling parameters are looked up."""
         why = codec.why_unknown
         if why and number > _FIRST:
             name = str(codec.model.full)
@@ -184,7 +184,7 @@ class Meanings:
         return Lack(Quality.CONFIG_ERROR, why) if why else None
 
     def _places(self, model: ProcessValue, in_set: int) -> tuple[int, ...] | Lack:
-        """Where this value stands among the words of its group, without the first one for commands."""
+        """Places of this value's words in its group, without the first one for commands; or its lack."""
         runs = self._family.meanings_of(self._slot, model.group)
         asked = [meaning for run in runs for meaning in run]
         twice = self._named_twice(model, asked, in_set) if model.group == "command" else None
@@ -213,8 +213,8 @@ class Meanings:
         return Lack(Quality.DISABLED, otherwise_in(otherwise, which, found))
 
     def _named_twice(self, model: ProcessValue, asked: Sequence[Meaning], in_set: int) -> Text | None:
-        """Words that parameters of their own make the same setpoint: the drive adds them, and one of them
-        alone says nothing."""
+        """Text about words that parameters of their own make the same setpoint: the drive adds them, and one
+        of them alone says nothing."""
         for code in model.code:
             named = {one.parameter: one for one in asked if self._code(one, in_set) == code}
             if len(named) > 1:
@@ -243,7 +243,7 @@ class Meanings:
         return process.tpdo.index(meaning.word)
 
     def unknown(self) -> list[Text]:
-        """The words that carry something which the family does not know, in words."""
+        """Texts about words that carry something which the family does not know."""
         known = {(value.group, code) for value in self._family.value for code in value.code}
         told: list[Text] = []
         for group in ("command", "actual"):
@@ -257,7 +257,7 @@ class Meanings:
 
 
 def _followers(family: Family, slot: Slot) -> list[tuple[ValueCodec, ValueCodec]]:
-    """The commands that follow actual values, with these, where the drive says what their words mean."""
+    """Commands that follow actual values, each with its value, where the drive says what their words mean."""
     values = {value.leaf: value for value in family.values_of(slot)}
     return [
         (ValueCodec(value, family.process.rpdo[1:]), ValueCodec(actual, family.process.tpdo))
@@ -267,24 +267,24 @@ def _followers(family: Family, slot: Slot) -> list[tuple[ValueCodec, ValueCodec]
 
 
 def _words(family: Family, value: ProcessValue) -> Sequence[str]:
-    """Those that places of this value count."""
+    """Names of the words among which places of this value count."""
     return family.process.rpdo[1:] if value.group == "command" else family.process.tpdo
 
 
 def _scale(value: ProcessValue, known: Mapping[str, float]) -> LinearScale | None:
-    """Its scale, with these values of the parameters."""
+    """Scale of a value with these values of its parameters."""
     over = None if value.scale is None else value.scale.over
     return scale_of(value, known.get(value.full or ""), known.get(over) if over else 1.0)
 
 
 def _absent(family: Family) -> dict[str, float]:
-    """The settings that count where a drive has no such parameter."""
+    """Settings that count where a drive has no such parameter."""
     return {one.name: one.absent for one in family.parameter if one.absent is not None}
 
 
 def deciding(family: Family, slot: Slot, codes: Codes) -> list[Parameter]:
-    """The parameters that decide what the values mean that are in the words of a drive with these codes, in
-    one of its parameter sets."""
+    """Parameters that decide the meaning of the values in the words of a drive with these codes, in one of
+    its parameter sets."""
     groups = {
         group: [run for run in family.meanings_of(slot, group) if run] for group in ("command", "actual")
     }
@@ -306,15 +306,15 @@ def deciding(family: Family, slot: Slot, codes: Codes) -> list[Parameter]:
 
 
 def default_codes(family: Family) -> Codes:
-    """What is taken where there is no drive to ask."""
+    """Codes that are taken where there is no drive to ask."""
     return {meaning.leaf: (meaning.default,) * family.sets for meaning in family.meaning}
 
 
 def codecs(
     family: Family, slot: Slot, group: str, words: Sequence[str], given: Mapping[str, float]
 ) -> list[ValueCodec]:
-    """The commands or the actual values of a drive, scaled by the parameters that are ``given``. Those whose
-    place only the drive knows have none."""
+    """Codecs of the commands or the actual values of a drive, scaled by the parameters that are ``given``.
+    Those whose place only the drive knows have none."""
     return [
         ValueCodec(value, words, _scale(value, given))
         for value in family.values_of(slot)
@@ -325,7 +325,7 @@ def codecs(
 def default_codecs(
     family: Family, slot: Slot, group: str, words: Sequence[str], given: Mapping[str, float]
 ) -> list[ValueCodec]:
-    """Those that have a place without a drive to ask: by the defaults of the mapping file. ``words`` begin
+    """Codecs that have a place without a drive to ask: by the defaults of the mapping file. ``words`` begin
     with the control or the status word."""
     given = {**_absent(family), **given}
     meanings = Meanings(family, slot, given)

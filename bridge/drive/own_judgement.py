@@ -1,7 +1,7 @@
-"""What a drive does by itself when the bridge falls silent: judged from what its objects hold.
+"""Own reaction of a drive to a silent bridge, judged from the content of its objects.
 
-Which objects those are is in the mapping file (``own_supervision``). What they hold is given as numbers by
-index and sub-index; one that is missing is not known.
+The mapping file names the objects (``own_supervision``). Their content is given as numbers by index and
+sub-index; one that is missing is not known.
 """
 
 from __future__ import annotations
@@ -30,43 +30,43 @@ class DriveWatch:
     watches: str
     setting: str
     time_ms: float | None
-    """None where it is not known, 0 where nothing is watched."""
+    """Time-out of the drive; None where it is not known, 0 where nothing is watched."""
     reaction: str
     verdict: OwnVerdict | None
     because: Said = ""
-    """Why the drive would not stop by it."""
+    """Reason why the drive would not stop by it."""
     silent_ms: int = 0
-    """How long after a hang of the bridge its last frame may come."""
+    """Longest time from a hang of the bridge to its last frame."""
 
     @property
     def why(self) -> str:
-        """Why the drive would not stop by it, in English."""
+        """Reason why the drive would not stop by it, in English."""
         return render(self.because)
 
     @property
     def bridge_ms(self) -> float | None:
-        """Longest time from the bridge's hang to this reaction; None where there is none."""
+        """Longest time in ms from the bridge's hang to this reaction; None where there is none."""
         stops = self.verdict is OwnVerdict.STOPS and self.time_ms is not None
         return self.silent_ms + (self.time_ms or 0) if stops else None
 
 
 @dataclass(frozen=True, slots=True)
 class OwnJudgement:
-    """What one drive would do."""
+    """Judgement of one drive's own reaction to a silent bridge."""
 
     watches: tuple[DriveWatch, ...] = ()
     accepted: str = ""
-    """Why the site file accepts that it would run on."""
+    """Reason for which the site file accepts that it would run on."""
 
     @property
     def first(self) -> DriveWatch | None:
-        """The watch that stops it first."""
+        """Watch that stops it first; None where none does."""
         stops = [(one.bridge_ms, n) for n, one in enumerate(self.watches) if one.bridge_ms is not None]
         return self.watches[min(stops)[1]] if stops else None
 
     @property
     def process_data_ms(self) -> float:
-        """The time after which it stops without its process data, while everything else goes on; 0 where it
+        """Time in ms after which it stops without its process data, while everything else goes on; 0 where it
         does not."""
         times = [
             one.time_ms
@@ -85,12 +85,12 @@ class OwnJudgement:
 
     @property
     def own_ms(self) -> float:
-        """The drive's own time-out, 0 where it has none."""
+        """The drive's own time-out in ms, 0 where it has none."""
         return self.first.time_ms or 0 if self.first else 0
 
     @property
     def bridge_ms(self) -> int:
-        """Longest time from the bridge's hang to the drive's own reaction; 0 where there is none."""
+        """Longest time in ms from the bridge's hang to the drive's own reaction; 0 where there is none."""
         return round(self.first.bridge_ms or 0) if self.first else 0
 
     @property
@@ -106,7 +106,7 @@ class OwnJudgement:
 
     @property
     def because(self) -> Said:
-        """Why it would not stop, or why that is not known; empty where it would."""
+        """Reason why it would not stop, or why that is not known; empty where it would."""
         wanted = self.verdict
         if wanted is OwnVerdict.STOPS:
             return ""
@@ -116,18 +116,18 @@ class OwnJudgement:
 
     @property
     def reason(self) -> str:
-        """Why it would not stop, or why that is not known, in English; empty where it would."""
+        """Reason why it would not stop, or why that is not known, in English; empty where it would."""
         return render(self.because)
 
 
 def _together(reasons: Iterable[Said]) -> Said:
-    """Each of them once."""
+    """Text of all reasons, each of them once."""
     each = tuple(dict.fromkeys(reasons))
     return each[0] if len(each) == 1 else Text.of("own.several", reasons=each)
 
 
 def judge(family: Family, raw: Raw, bus: BusTable, node: NodeTable, accepted: str = "") -> OwnJudgement:
-    """What one drive of this node would do, with ``raw`` in its objects."""
+    """Judgement of one drive of this node, with ``raw`` in its objects."""
     watches = [
         _watch(family, entry, raw, bus, node)
         for entry in family.own_supervision
@@ -137,7 +137,7 @@ def judge(family: Family, raw: Raw, bus: BusTable, node: NodeTable, accepted: st
 
 
 def why_silence_does_not_stop(family: Family, own: OwnJudgement, node: NodeTable) -> Said:
-    """Why a drive of this node would run on if only its RPDOs ended, or an empty text.
+    """Reason why a drive of this node would run on if only its RPDOs ended, or an empty text.
 
     Heartbeat, guarding and SYNC go on then, and so do the RPDOs of the node's other drives.
     """
@@ -211,7 +211,7 @@ def _time(
 
 
 def _reaction(family: Family, one: OwnReaction | None, raw: Raw) -> tuple[str, OwnVerdict, Said]:
-    """The reaction in words, what the drive does then, and why that is not to stop."""
+    """Reaction in words, the drive's behaviour then, and the reason why that is no stop."""
     if one is None:
         return "stops", OwnVerdict.STOPS, ""
     place = place_of(family, one)

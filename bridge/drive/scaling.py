@@ -1,4 +1,4 @@
-"""Raw words to values with a unit and back."""
+"""Scaling of raw words to values with a unit, and back."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ from bridge.text import Text
 
 _WORD_BITS: Final = 32
 _EXACT: Final = 1 << 53
-"""Up to here every whole number is a float."""
+"""Magnitude up to which every whole number is exact as a float."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinearScale:
-    """value = word × full / at + offset; ``limit`` is the largest magnitude as a multiple of ``full``.
+    """Scale of a word: value = word × full / at + offset; ``limit`` is the largest magnitude as a multiple of
+    ``full``.
 
-    The word is a number of ``raw``, 16 or 32 bits. ``least`` and ``most`` are what the family allows
-    beside that, in the value's unit.
+    The word is a number of ``raw``, 16 or 32 bits. ``least`` and ``most`` are what the family allows beside
+    that, in the value's unit.
     """
 
     full: float
@@ -77,12 +78,12 @@ def _is_known(value: float | None) -> bool:
 
 
 def no_scale(parameter: str, value: float) -> Text:
-    """Why nothing is made of words that ``parameter`` scales, where that has a value that is no scale."""
+    """Text about ``parameter``, whose value is no scale: nothing is made of the words that it scales."""
     return Text.of("meaning.no_scale", parameter=parameter, value=value)
 
 
 def scale_of(value: ProcessValue, full: float | None = None, over: float | None = 1.0) -> LinearScale | None:
-    """The scale of a value, ``full`` and ``over`` being what its parameters hold; None where it has none, or
+    """Scale of a value, ``full`` and ``over`` being the values of its parameters; None where it has none, or
     where that is not known."""
     scale = value.scale
     if scale is None or (scale.full is not None and not (_is_known(full) and _is_known(over))):

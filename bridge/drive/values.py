@@ -72,7 +72,7 @@ class ValueCodec:
 
     @property
     def is_plain(self) -> bool:
-        """One signed word times a factor: what most values are."""
+        """One signed word times a factor, as most values are."""
         return (
             self.model.width == 1
             and self.model.raw_type is DataType.INT16
@@ -83,7 +83,7 @@ class ValueCodec:
 
     @property
     def range(self) -> tuple[float | None, float | None]:
-        """What may be written, in the unit of the value; None where that is not known or not of interest."""
+        """Range that may be written, in the value's unit; None where not known or not of interest."""
         if self.scale is not None:
             return self.scale.low, self.scale.high
         if self.is_unknown or (self.model.low is None and self.model.high is None):
@@ -91,8 +91,7 @@ class ValueCodec:
         return self._low, self._high
 
     def from_words(self, words: Sequence[int]) -> bool | int | float:
-        """The value that these words stand for; with an unknown scale the bare number, and without words
-        nothing but zero."""
+        """Value that these words stand for; with an unknown scale the bare number, and without words zero."""
         if not self.places:
             return False if self._bit is not None else 0.0 if self.model.point_type is DataType.FLOAT else 0
         word = words[self.places[0]]

@@ -40,7 +40,7 @@ FAULTED: Final = frozenset((DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE))
 
 
 class ControlWords:
-    """What a control word of this family means and how one is changed. Words are 16-bit integers."""
+    """Control words of one family: their meaning, and how one is changed. Words are 16-bit integers."""
 
     def __init__(self, model: ControlWord) -> None:
         self._enable_mask = model.enabling.mask
@@ -107,7 +107,7 @@ class ControlWords:
 
 
 class StatusWords:
-    """Decodes status words of this family."""
+    """Decoder of one family's status words."""
 
     def __init__(self, model: StatusWord) -> None:
         self._states = tuple(

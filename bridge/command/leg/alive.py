@@ -12,12 +12,12 @@ from bridge.image import Value
 from bridge.text import Text
 
 _PROVES: Final = frozenset((Action.KEEP_ALIVE, Action.RESET_FAULT, Action.START))
-"""Commands that have no place for a token, and count as telegrams."""
+"""Commands without a place for a token, which count as telegrams."""
 
 
 def read(draft: Draft, who: Identity, token: Value | None) -> float | None:
-    """Until when telegrams count with this token, or with the one that ``who`` has brought back before; None
-    where there is none. Raises ``Refusal``."""
+    """Time until which telegrams count with this token, or with the one that ``who`` has brought back before;
+    None where there is none. Raises ``Refusal``."""
     life = draft.settings.life
     if life is None:
         if token is not None:
@@ -36,7 +36,7 @@ def read(draft: Draft, who: Identity, token: Value | None) -> float | None:
 
 
 def is_missing(draft: Draft, until: float | None) -> bool:
-    """Whether a telegram that counts until then, as ``read`` says, does not count at all."""
+    """Whether a telegram does not count at all, ``until`` being the time that ``read`` has given."""
     return draft.settings.life is not None and (until is None or draft.now >= until)
 
 
@@ -45,18 +45,18 @@ def refusal() -> Refusal:
 
 
 def is_there(draft: Draft, who: Identity) -> bool:
-    """Whether what ``who`` does without a token proves that its program lives."""
+    """Whether a command of ``who`` without a token proves that its program lives."""
     until = draft.owner.alive_until if who.goes_on_as(draft.owner.identity) else None
     return not is_missing(draft, until)
 
 
 def check(draft: Draft, request: Request) -> None:
-    """Raises ``Refusal`` for a command that would be a telegram of a program that may be dead."""
+    """Check a command: raises ``Refusal`` for one that would be a telegram of a program that may be dead."""
     if request.action in _PROVES and not is_there(draft, request.identity):
         raise refusal()
 
 
 def note(draft: Draft, until: float | None) -> None:
-    """The owner's telegrams count until then."""
+    """Have the owner's telegrams count until then."""
     if until is not None and until != draft.owner.alive_until:
         draft.owner = draft.owner._replace(alive_until=until)

@@ -18,7 +18,7 @@ from bridge.command.messages.telegram import Refusal
 from bridge.drive import DriveState
 
 BELIEVED_S: Final = 1.0
-"""Without a report from a drive that sends only changes, its last one is accepted after this time."""
+"""Time in seconds after which the last report of a drive that sends only changes is accepted."""
 _PULSE_S: Final = 0.1
 """Length of an acknowledge edge of the bridge's own: longer than any cycle we send with."""
 _BURST_S: Final = 0.1
@@ -90,9 +90,9 @@ def _refuse(draft: Draft, about: About) -> None:
 
 
 def _stop_as_asked(draft: Draft, about: About) -> None:
-    """A stop by a command, made from the word that is sent. A reaction of the watchdog goes on from it, too:
-    after a ramp was begun, somebody may still disable the voltage. Silence is broken for it, once for each
-    stop: whoever asks for the same again and again must not keep the drive's own supervision from
+    """Stop by a command, with a word made from the one that is sent. A reaction of the watchdog goes on from
+    it, too: after a ramp was begun, somebody may still disable the voltage. Silence is broken for it, once
+    for each stop: whoever asks for the same again and again must not keep the drive's own supervision from
     tripping."""
     assert isinstance(about.asked, StopRule)
     word = about.asked.of(draft.sent.words[0])
@@ -129,7 +129,7 @@ def _stop(draft: Draft, about: About) -> None:
 
 
 def _block(draft: Draft, about: About) -> None:
-    """The owner's word stays; a position that was ordered is not gone to any more."""
+    """Keep the owner's word; a position that was ordered is not gone to any more."""
     draft.order = order.dropped(draft.order)
 
 

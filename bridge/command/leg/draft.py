@@ -1,4 +1,4 @@
-"""The working copy of a leg's state for one step, with what the step has brought about so far."""
+"""Working copy of a leg's state for one step, with the effects of the step so far."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _values = attrgetter(*LegState._fields)
 
 
 class Draft:
-    """Made from a state, changed, and made a state again. The attributes are those of ``LegState``."""
+    """Working copy of a state: changed, and made a state again. The attributes are those of ``LegState``."""
 
     __slots__ = ("_before", "asked", "effects", "now", "settings", *LegState._fields)
 
@@ -71,12 +71,12 @@ class Draft:
 
     @property
     def is_enabled(self) -> bool:
-        """The drive has said so. What it said before its node restarted does not count."""
+        """The drive reports *operation enabled*. A report from before its node restarted does not count."""
         return self.drive is DriveState.OPERATION_ENABLED and self.way.is_heard
 
     @property
     def is_commanded(self) -> bool:
-        """The drive is enabled, and what it gets does not stop it."""
+        """The drive is enabled, and the words that are sent do not stop it."""
         return self.is_enabled and self.is_enabling
 
     @property
@@ -105,7 +105,7 @@ class Draft:
         self.effects.append(Answer(outcome))
 
     def keep_at_rest(self) -> None:
-        """Setpoints written for a drive that is not enabled yet must not make it jump when it is."""
+        """Keep setpoints at rest that must not make a drive jump when it is enabled, as long as it is not."""
         follows = self.settings.follows
         if follows and not self.is_commanded:
             setpoints = list(self.setpoints)
@@ -114,8 +114,7 @@ class Draft:
             self.setpoints = tuple(setpoints)
 
     def lead(self, word: int) -> None:
-        """The next word of a start, in the parameter set that was commanded; what the owner has ordered
-        stays."""
+        """Take the next word of a start, in the parameter set that was commanded; the owner's orders stay."""
         self.word = self.settings.words.in_set_of(self.word, word)
         self.is_ours = False
         self.keep_at_rest()
@@ -134,8 +133,8 @@ class Draft:
         self.order = order.dropped(self.order)
 
     def hear(self, at: float, names: tuple[str, ...] = ()) -> None:
-        """A valid telegram, with these commands. ``at`` is when it came, which may be a while ago: its time
-        is up that much earlier. It takes none from a newer one."""
+        """Note a valid telegram with these commands. ``at`` is when it came, which may be a while ago: its
+        time is up that much earlier. It takes none from a newer one."""
         timeout_ms, heard_at, _, _ = self.timer
         heard_at = at if heard_at is None else max(at, heard_at)
         deadline = heard_at + timeout_ms / 1000 if timeout_ms else None

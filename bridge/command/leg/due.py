@@ -1,5 +1,5 @@
-"""Deadlines of the leg: the end of the owner's time-out or lease, of a ramp, of what comes before a
-silence, of a burst."""
+"""Deadlines of the leg: the ends of the owner's time-out or lease, of a ramp, of the time before a silence,
+of a burst."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def judge(draft: Draft) -> None:
 
 
 def run_out(draft: Draft) -> None:
-    """End what has its time only."""
+    """End a ramp, a burst or an edge whose time is up, and begin a silence that is due."""
     now = draft.now
     ramps_until, silent_from, burst_until, _ = draft.trip
     if ramps_until is not None and now >= ramps_until:

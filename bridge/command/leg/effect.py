@@ -11,7 +11,7 @@ from bridge.text import Text
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The outcome of the request that was the event."""
+    """Outcome of the request that was the event."""
 
     outcome: Outcome
     is_refused: bool = False
@@ -45,12 +45,12 @@ class Tripped:
 
 @dataclass(frozen=True, slots=True)
 class LetGo:
-    """Somebody has stopped it by a command: nothing is held any more."""
+    """A stop by a command: nothing is held any more."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ignored:
-    """The controller is silent, and the site file has that ignored."""
+    """A silent controller that the site file has ignored."""
 
 
 @dataclass(frozen=True, slots=True)

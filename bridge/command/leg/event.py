@@ -1,4 +1,4 @@
-"""Events of the leg: a request, something that the drive says, something about the way to it, time."""
+"""Events of the leg: requests, reports of the drive, changes of the way to it, time."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from bridge.text import Words
 
 @dataclass(frozen=True, slots=True)
 class StatusReport:
-    """The drive's status word says this. ``is_acknowledged``: with the bit "set-point acknowledge"; ``fault``
-    is empty but for a fault."""
+    """A report of the drive's status word. ``is_acknowledged``: with the bit "set-point acknowledge";
+    ``fault`` is empty but for a fault."""
 
     state: DriveState
     is_acknowledged: bool
@@ -29,7 +29,7 @@ class ActualWords:
 
 @dataclass(frozen=True, slots=True)
 class Time:
-    """The bus has been drained: let everything happen that is due. ``way`` is how it is then."""
+    """The bus has been drained: all that is due is to happen. ``way`` is the way to the drive then."""
 
     way: Way | None = None
 

@@ -39,7 +39,7 @@ Asked = Words | StopRule | Edge
 
 
 def why_not(settings: LegSettings, asked: Asked, way: Way, sent: RpdoWords) -> Said:
-    """The reason why the bus does not say what is asked, where ``sent`` goes this ``way``; empty where it
+    """Reason why the bus does not say what is asked, where ``sent`` goes this ``way``; empty where it
     does."""
     if way.why_unsent:
         return way.why_unsent

@@ -21,19 +21,19 @@ _LOW_S: Final = 0.1
 
 
 def dropped(order: Order) -> Order:
-    """The drive is stopped: pending orders are dropped."""
+    """Order of a stopped drive: what is pending is dropped."""
     return order._replace(is_waiting=False, is_raised=False, taken=None, deadline=None)
 
 
 def ordered(order: Order, words: tuple[int, ...]) -> Order:
-    """The position was written. One that was written in between does not count any more."""
+    """Order after a position was written; one that was written in between does not count any more."""
     return order._replace(is_waiting=words != order.taken)
 
 
 def went_on(
     order: Order, words: tuple[int, ...], now: float, *, is_acknowledged: bool, commanded: bool
 ) -> tuple[Order, bool]:
-    """The order after what the drive says, and whether the drive has failed to take it."""
+    """Order after a report of the drive, and whether the drive has failed to take it."""
     if order.rises_at is not None and now >= order.rises_at:
         order = order._replace(rises_at=None)
     if not commanded:

@@ -1,4 +1,4 @@
-"""The view of a leg from outside: its watchdog, and what it will send by itself, and when."""
+"""View of a leg from outside: its watchdog, and the words that it will send by itself, and when."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def watchdog_state(settings: LegSettings, state: LegState) -> WatchdogState:
 
 
 def trips_at(settings: LegSettings, state: LegState) -> float | None:
-    """The time at which the drive is stopped unless its owner is heard; None where no time does that."""
+    """Time at which the drive is stopped unless its owner is heard; None for never."""
     return None if state.stage.is_tripped or settings.ignores_errors else state.timer.deadline
 
 
 def until(settings: LegSettings, state: LegState) -> float | None:
-    """Until when what enables the drive may be on the bus, unless its owner is heard; None where no time ends
-    it, or where nothing enables it."""
+    """Time until which words that enable the drive may be on the bus, unless its owner is heard; None without
+    end, and where none enables it."""
     if not settings.words.enables(state.sent.words[0]):
         return None
     trip = None if settings.reaction.holds else trips_at(settings, state)
@@ -46,7 +46,7 @@ def output_then(settings: LegSettings, state: LegState) -> RpdoWords:
 
 
 def next_deadline(state: LegState) -> float | None:
-    """The time at which ``Time`` is to happen; None for never."""
+    """Time at which ``Time`` is to happen; None for never."""
     times = (
         state.timer.deadline,
         state.owner.lease_until,

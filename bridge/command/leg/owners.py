@@ -26,13 +26,13 @@ from bridge.text import Text
 
 _LEASE_MS: Final = (100, 600_000)
 GONE_S: Final = 10.0
-"""Without a watchdog: after this an owner that gives no sign holds nobody up any more. Long enough for one
-that connects anew for each telegram, and for a person who was stopped."""
+"""Time in seconds after which an owner without a watchdog that gives no sign holds nobody up any more. Long
+enough for one that connects anew for each telegram, and for a person who was stopped."""
 _NO_TIMES: Final = [None, None, None]
 
 
 def refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> Text | None:
-    """The reason why ``identity`` may not command the drive now; None where it may."""
+    """Reason why ``identity`` may not command the drive now; None where it may."""
     if identity.role < Role.OPERATOR:
         return Text.of("request.may_only_read", who=str(identity))
     if control == "none":
@@ -55,7 +55,7 @@ def _taken(owner: Identity, identity: Identity) -> Text:
 
 
 def _take_refusal(control: str, owner: Owner, identity: Identity, *, is_replaceable: bool) -> Text | None:
-    """The reason why ``identity`` may not take control now, None where it may. An engineer always may."""
+    """Reason why ``identity`` may not take control now, None where it may. An engineer always may."""
     if control != "lease":
         may_break = identity.role >= Role.ENGINEER and identity.source.label == control
         return None if may_break else refusal(control, owner, identity, is_replaceable=is_replaceable)
@@ -105,7 +105,7 @@ def _owner_is_gone(draft: Draft) -> bool:
 
 
 def own(draft: Draft, request: Request) -> None:
-    """A valid telegram: who sent it owns the drive from now on."""
+    """Take a valid telegram: its sender owns the drive from now on."""
     identity, owner = request.identity, draft.owner.identity
     if request.pressed is False and identity.goes_on_as(draft.edges.pressed_by):
         draft.edges = draft.edges._replace(pressed_by=None)
@@ -117,13 +117,13 @@ def own(draft: Draft, request: Request) -> None:
 
 
 def hear(draft: Draft, request: Request) -> None:
-    """A valid telegram that says no more than that its sender is there."""
+    """Take a valid telegram that says no more than that its sender is there."""
     own(draft, request)
     draft.hear(arrival_of(request, draft.now))
 
 
 def _renew(draft: Draft, at: float) -> None:
-    """The owner has shown that it is there: its lease runs anew."""
+    """Renew the lease of an owner that has shown that it is there."""
     identity, lease_s, lease_until, *times, alive_until = draft.owner
     if draft.settings.control == "lease":
         lease_until = at + lease_s
@@ -142,7 +142,7 @@ def _quiet_until(draft: Draft, heard_at: float) -> float | None:
 
 
 def _hand_over(draft: Draft, identity: Identity, lease_s: float | None = None) -> None:
-    """Another owner, or a lease taken anew; the drive is stopped where the owner changes."""
+    """Take another owner, or a lease taken anew; the drive is stopped where the owner changes."""
     before = draft.owner.identity
     changes = not identity.goes_on_as(before)
     if changes and before is not None:
@@ -156,7 +156,7 @@ def _hand_over(draft: Draft, identity: Identity, lease_s: float | None = None) -
 
 
 def leave(draft: Draft) -> None:
-    """The owner goes; the drive is stopped first."""
+    """Let the owner go; the drive is stopped first."""
     site_ms = draft.settings.timeout_ms
     if draft.timer.timeout_ms != site_ms:
         draft.tell(EventKind.CONFIGURATION, 400, Text.of("owner.timeout_of_site", timeout_ms=site_ms))
@@ -186,8 +186,8 @@ def release(draft: Draft, identity: Identity) -> Outcome:
 
 
 def set_timeout(draft: Draft, identity: Identity, timeout_ms: int) -> None:
-    """Another time for as long as the owner owns the drive, counted from its last telegram: setting it is
-    none. A trip stays a trip."""
+    """Take another time-out for as long as the owner owns the drive, counted from its last telegram: setting
+    it is none. A trip stays a trip."""
     settings, timer = draft.settings, draft.timer
     if not settings.timeout_writable:
         raise Refusal(Code.NOT_ALLOWED, Text.of("request.timeout_fixed"))

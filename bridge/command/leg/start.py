@@ -20,11 +20,11 @@ from bridge.text import Text
 
 _LIMIT_S: Final = 3.0
 _BRAKING_S: Final = 1.0
-"""Time that a quick stop may still take. A drive that stays in it afterwards (605Ah = 5 … 8) leaves it with
-disable voltage only; at once, that would let a motor coast that is still being stopped."""
+"""Time in seconds that a quick stop may still take. A drive that stays in it afterwards (605Ah = 5 … 8)
+leaves it with disable voltage only; at once, that would let a motor coast that is still being stopped."""
 _SETTLES_S: Final = 0.2
-"""For this long after a stop, reports may still describe the time before it. A drive that says "enabled"
-later than that is on its ramp, or is held."""
+"""Time in seconds after a stop in which reports may still describe the time before it. A drive that says
+"enabled" later than that is on its ramp, or is held."""
 _CAN_FOLLOW_LATE: Final = (DriveState.READY, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED)
 """States in which a drive may still follow an enabling word that was sent before the stop."""
 

@@ -131,7 +131,7 @@ class Owner(NamedTuple):
     stopped_until: float | None = None
     quiet_until: float | None = None
     alive_until: float | None = None
-    """Until then its telegrams count, where the drive asks for a life sign."""
+    """Time until which its telegrams count, where the drive asks for a life sign."""
 
 
 class Edges(NamedTuple):
@@ -164,7 +164,7 @@ class Trip(NamedTuple):
     silent_from: float | None = None
     burst_until: float | None = None
     burst: int | None = None
-    """Control word that the silence was broken by."""
+    """Control word by which the silence was broken."""
 
 
 class Order(NamedTuple):
@@ -218,7 +218,7 @@ class LegState(NamedTuple):
     trip: Trip = Trip()
     order: Order = Order()
     pulse_until: float | None = None
-    """Until when an acknowledge bit of the bridge's own is sent."""
+    """Time until which an acknowledge bit of the bridge's own is sent."""
     silence_stops: bool = True
     """The drive stops by itself without its RPDOs. Where it does not, or nobody knows, it gets disable
     voltage in place of silence."""

@@ -156,7 +156,7 @@ def _is_stale(draft: Draft, request: Request) -> bool:
 
 
 def _stale(draft: Draft, request: Request) -> Refusal:
-    """The refusal of a request that may have waited too long."""
+    """Refusal of a request that may have waited too long."""
     limit_ms = limit_ms_of(request, draft.timer.timeout_ms)
     return Refusal(Code.STALE, Text.of("request.may_be_old", limit_ms=limit_ms))
 

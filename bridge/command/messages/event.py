@@ -22,14 +22,14 @@ class EventKind(StrEnum):
     FRONT = "front"
     INTRUDER = "intruder"
     CAUSE = "cause"
-    """What several others have in common."""
+    """Common cause of several other events."""
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """``source`` is a drive, a node or a bus by its name in the site; ``severity`` is that of OPC UA
-    (1 … 1000, Part 5 §6.4.2); ``time`` is monotonic. ``because`` is what has brought it about, as a phrase;
-    empty where nothing known has."""
+    """One event. ``source`` is a drive, a node or a bus by its name in the site; ``severity`` is that of OPC
+    UA (1 … 1000, Part 5 §6.4.2); ``time`` is monotonic seconds. ``because`` is the cause, as a phrase; empty
+    where none is known."""
 
     time: float
     kind: EventKind
@@ -55,8 +55,8 @@ class Event:
 
 
 class EventQueue:
-    """Events of nodes and buses, in order, until the plant is told to pass them on: nobody who listens to
-    them runs while frames are taken in or words are decided on."""
+    """Events of nodes and buses, in order, until the plant passes them on: no listener runs while frames are
+    taken in or words are decided on."""
 
     def __init__(self) -> None:
         self.waiting: list[Event] = []
@@ -78,8 +78,8 @@ _MOST_A_SECOND: Final = 10
 
 
 class EventGate:
-    """Keeps a client that is refused again and again, or a babbling node, from flooding the listeners. What
-    is left out is still counted where it happens."""
+    """Limit that keeps a client which is refused again and again, or a babbling node, from flooding the
+    listeners. Events left out are still counted where they happen."""
 
     def __init__(self) -> None:
         self._limits: dict[tuple[str, EventKind], PerSecond] = {}

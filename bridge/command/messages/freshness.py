@@ -1,9 +1,8 @@
-"""How old a telegram can be: fresh means recent, not just read.
+"""Age of telegrams: fresh means recent, not just read.
 
-What a controller has sent may wait in the network's buffers, its own and ours, and be read long after the
-controller has hung. So each telegram carries the earliest time at which it can have arrived. Its drive's
-timer runs from that time, and a telegram that can have waited for longer than ``BOUND_MS`` does not count at
-all.
+A telegram may wait in buffers, the network's, its sender's and ours, and be read long after the controller
+has hung. So each carries the earliest time at which it can have arrived. Its drive's timer runs from that
+time, and a telegram that can have waited for longer than ``BOUND_MS`` does not count at all.
 
 The rule for one connection:
 
@@ -22,14 +21,14 @@ from typing import Final, NamedTuple
 from bridge.command.messages.request import STOP_ACTIONS, Action, Request
 
 GRAIN_MS: Final = 25
-"""A shorter wait cannot be told from none. A telegram can be this much older than assumed: it is the way
-through the bridge's buffers in ``worst_case_stop_ms``."""
+"""Shortest wait in ms that can be told from none. A telegram can be this much older than assumed: it is the
+way through the bridge's buffers in ``worst_case_stop_ms``."""
 
 NOW_S: Final = 0.001
-"""What is handled this soon after it was read counts as handled at once; part of the grain."""
+"""Time in seconds from reading to handling that counts as none; part of the grain."""
 
 BOUND_MS: Final = 500
-"""What can have waited for longer does not count. A busy machine delays a request, and an OPC UA server may
+"""Longest wait in ms with which a telegram counts. A busy machine delays a request, and an OPC UA server may
 take half a second over a large subscription. The owner gains no time by the wait: its drive's timer runs from
 when the request can have arrived."""
 
@@ -37,40 +36,41 @@ _GRAIN_S: Final = GRAIN_MS / 1000 - NOW_S
 
 CALM_S: Final = 0.1
 _CALM_MOST: Final = 32
-"""This few arrivals in ``CALM_S`` are no backlog: that would drain at more than a thousand a second."""
+"""Arrivals in ``CALM_S`` below which there is no backlog: one drains at more than a thousand a second."""
 
 
 HANG_MS: Final = 100
-"""An event loop without a turn for this long has hung. Where the connections cannot be seen, a shorter hang
-is not noticed."""
+"""Shortest hang of the event loop in ms, a time without a turn. Where the connections cannot be seen, a
+shorter one is not noticed."""
 _SEEN: Final = frozenset(("opcua", "modbus"))
 """Protocols whose connections are seen; with a lease it may be any."""
 
 
 def way_ms(control: str) -> int:
-    """How much older than assumed a telegram of the drive's controller can be at most."""
+    """Longest time in ms by which a telegram of the drive's controller may be older than assumed."""
     if control == "none":
         return 0
     return GRAIN_MS if control in _SEEN else GRAIN_MS + HANG_MS
 
 
 NEVER: Final = float("-inf")
-"""The time of a telegram that may have waited for any time."""
+"""Time of a telegram that may have waited for any time."""
 TAKEN_LATE: Final = STOP_ACTIONS | {Action.WRITE, Action.RELEASE_CONTROL}
-"""Nothing is too old to stop a drive; whether a write does so is seen when it has been decoded."""
+"""Actions that are taken however late: nothing is too old to stop a drive. Whether a write stops one is seen
+when it has been decoded."""
 
 
 _AFTER_HANG_S: Final = 1.0
-"""For this long after a hang, a first request may have been sent before it."""
+"""Time in seconds after a hang in which a first request may have been sent before it."""
 
 
 def arrival_of(request: Request, now: float) -> float:
-    """When ``request`` can have arrived at the earliest; one that was made in this process arrives now."""
+    """Earliest time at which ``request`` can have arrived; one that was made in this process arrives now."""
     return now if request.received_at is None else min(request.received_at, now)
 
 
 def limit_ms_of(request: Request, timeout_ms: int) -> int:
-    """How long it may have waited to count for a drive with this time-out (0: none)."""
+    """Longest wait in ms with which it counts for a drive with this time-out (0: none)."""
     return min(BOUND_MS, timeout_ms) if timeout_ms else BOUND_MS
 
 
@@ -92,7 +92,7 @@ class LoopPulse(NamedTuple):
 
 
 class Inflow:
-    """The age of what arrives through one connection.
+    """Age of what arrives through one connection.
 
     ``is_hidden``: the connections cannot be seen, and this is everything from one asker. What arrives after a
     hang may have waited somewhere, and cannot be told from what has not.
@@ -113,7 +113,7 @@ class Inflow:
             self._crowd(now)
 
     def shut(self, now: float) -> None:
-        """Nothing more is read for now, so buffers on the way may fill."""
+        """Note that nothing more is read for now, so that buffers on the way may fill."""
         if self.is_open:
             self.is_open = False
             self._crowd(now)
@@ -130,7 +130,7 @@ class Inflow:
         self._came = 0
 
     def arrive(self, now: float, look: LoopPulse, *, crowded: bool = False) -> float:
-        """Something was read ``now``: when it can have arrived at the earliest, or ``NEVER``.
+        """Note that something was read; gives the earliest time at which it can have arrived, or ``NEVER``.
 
         ``crowded``: more may be left, or more is under way than there should be.
         """
@@ -148,7 +148,7 @@ class Inflow:
         return now if now - since <= _GRAIN_S else since
 
     def _has_calmed(self, look: LoopPulse) -> bool:
-        """Judged over one span of ``CALM_S`` after the other, in which the loop has hung at no time."""
+        """Judge one span of ``CALM_S`` after the other, in which the loop has hung at no time."""
         begin = max(self._calm_since, look.steady_since)
         if look.at - begin < CALM_S:
             self._came = self._came + 1 if begin == self._calm_since else 1

@@ -18,7 +18,7 @@ from bridge.config import LIFE_SIGN_MS
 
 _OFFERED_S: Final = LIFE_SIGN_MS / 1000
 _TOKENS: Final = 65_535
-"""From 1 on; none comes again before the others have had their turn, which takes 18 hours. 0 is none."""
+"""Number of tokens, from 1 on; 0 is none. None comes again before all others, which takes 18 hours."""
 _LEAST_STEP: Final = 1_000
 
 
@@ -32,7 +32,7 @@ class LifeSign:
 
     @classmethod
     def at_random(cls) -> LifeSign:
-        """Other tokens at each start, and for each drive: no one is fresh by chance elsewhere."""
+        """Random tokens, others at each start and for each drive: none is fresh by chance elsewhere."""
         step = 0
         while math.gcd(step, _TOKENS) != 1:
             step = _LEAST_STEP + secrets.randbelow(_TOKENS - 2 * _LEAST_STEP)
@@ -43,7 +43,7 @@ class LifeSign:
         return (self.start + _number(now) * self.step) % _TOKENS + 1
 
     def issued_at(self, token: int, now: float) -> float | None:
-        """When ``token`` was offered last, for the first time; None for a number that is no token."""
+        """Start of the last period in which ``token`` was offered; None for a number that is no token."""
         if not 1 <= token <= _TOKENS:
             return None
         number = _number(now)
@@ -52,5 +52,5 @@ class LifeSign:
 
 
 def _number(now: float) -> int:
-    """Of the token that is offered now."""
+    """Number of the token that is offered now."""
     return math.floor(now / _OFFERED_S)

@@ -13,7 +13,7 @@ from bridge.text import Said, Text, render
 
 
 class Role(IntEnum):
-    """What an identity may do; a higher role may all that a lower one may."""
+    """Rights of an identity; a higher role has those of all lower ones."""
 
     OBSERVER = 0
     OPERATOR = 1
@@ -22,11 +22,11 @@ class Role(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Who asks, and over which connection.
+    """Sender of a request, and the connection that it came over.
 
-    ``user`` is the session's user on OPC UA, the client's IP address on Modbus, the controller's name
-    on zenoh. ``address`` is for the log only. ``sets_parameters``: may write parameters of drives without
-    being an engineer, where a protocol knows no roles. ``connection`` is the name of the client's connection
+    ``user`` is the session's user on OPC UA, the client's IP address on Modbus, the controller's name on
+    zenoh. ``address`` is for the log only. ``sets_parameters``: may write parameters of drives without being
+    an engineer, where a protocol knows no roles. ``connection`` is the name of the client's connection
     (``port 51234`` on Modbus, ``session 1f3a9c02`` on OPC UA and zenoh), empty where the protocol knows none
     and of an owner whose connection has ended.
     """
@@ -111,7 +111,7 @@ STOP_ACTIONS = frozenset((Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE
 
 
 class Code(StrEnum):
-    """How a request ended."""
+    """Code of a request's outcome."""
 
     OK = "ok"
     UNKNOWN_TARGET = "unknown_target"
@@ -163,7 +163,7 @@ DONE = Outcome(Code.OK)
 
 
 def refused(action: Action, who: str, why: Said) -> Text:
-    """The event about a request that is refused."""
+    """Text of the event about a refused request."""
     return Text.of("request.refused", action=Text.word("action", action), who=who, why=why)
 
 
@@ -178,7 +178,7 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """``direction`` is 1 forward, -1 reverse, 0 as the drive's own setting."""
+    """Start of a drive; ``direction`` is 1 forward, -1 reverse, 0 as the drive's own setting."""
 
     action: ClassVar[Action] = Action.START
     direction: int = 0
@@ -186,7 +186,7 @@ class Start:
 
 @dataclass(frozen=True, slots=True)
 class TakeControl:
-    """``ttl_ms`` is the lease's length."""
+    """Claim of control; ``ttl_ms`` is the lease's length."""
 
     action: ClassVar[Action] = Action.TAKE_CONTROL
     ttl_ms: int = 0
@@ -200,8 +200,8 @@ class SetTimeout:
 
 @dataclass(frozen=True, slots=True)
 class ReadParameter:
-    """``parameter`` is a vendor's name, an object or the name of a point; ``max_age_ms`` is how old a value
-    read earlier may be. ``raw``: the outcome's value is the bytes of the object, in hexadecimal."""
+    """Reading of a parameter, by a vendor's name, an object or the name of a point; ``max_age_ms`` is how old
+    a value read earlier may be. ``raw``: the outcome's value is the bytes of the object, in hexadecimal."""
 
     action: ClassVar[Action] = Action.READ_PARAMETER
     parameter: str
@@ -211,7 +211,7 @@ class ReadParameter:
 
 @dataclass(frozen=True, slots=True)
 class WriteParameter:
-    """``parameter`` and ``raw`` as in ``ReadParameter``: of a raw write ``value`` is the bytes."""
+    """Writing of a parameter, named as in ``ReadParameter``; of a raw write ``value`` is the bytes."""
 
     action: ClassVar[Action] = Action.WRITE_PARAMETER
     parameter: str
@@ -221,7 +221,7 @@ class WriteParameter:
 
 @dataclass(frozen=True, slots=True)
 class Do:
-    """An action that needs no more words."""
+    """An action without fields."""
 
     action: Action
 

@@ -17,7 +17,7 @@ _WORD_MASK = 0xFFFF
 
 
 class Refusal(Exception):
-    """A request is not carried out and changes nothing; ``code`` and ``said`` are its outcome."""
+    """Refusal of a request, which changes nothing; ``code`` and ``said`` are its outcome."""
 
     def __init__(self, code: Code, said: Said) -> None:
         super().__init__(said)
@@ -30,21 +30,21 @@ class Refusal(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Telegram:
-    """``control_word`` is None where none was written. Words are 16-bit integers."""
+    """Words of one write, as 16-bit integers; ``control_word`` is None where none was written."""
 
     control_word: int | None
     setpoints: tuple[int, ...]
 
 
 class _Setpoints:
-    """What a write has set so far, by the word's place: which bits, and to what."""
+    """Bits that a write has set so far, and their masks, by the word's place."""
 
     def __init__(self) -> None:
         self._masks: dict[int, int] = {}
         self._bits: dict[int, int] = {}
 
     def put(self, leaf: str, written: tuple[MaskedBits, ...]) -> None:
-        """All of it or, where the same bits have been written otherwise, nothing: that raises ``Refusal``."""
+        """Set all of ``written``, or nothing where bits contradict: then it raises ``Refusal``."""
         for one in written:
             mask, bits = self._masks.get(one.place, 0), self._bits.get(one.place, 0)
             if (bits ^ one.bits) & mask & one.mask:
@@ -55,11 +55,11 @@ class _Setpoints:
 
     @property
     def places(self) -> frozenset[int]:
-        """Those of the words that have been written."""
+        """Places of the words that have been written."""
         return frozenset(self._masks)
 
     def over(self, before: tuple[int, ...]) -> tuple[int, ...]:
-        """``before`` with what was written."""
+        """Words ``before`` with those bits set."""
         after = list(before)
         for place, mask in self._masks.items():
             after[place] = after[place] & ~mask | self._bits[place]
@@ -67,7 +67,7 @@ class _Setpoints:
 
 
 class TelegramDecoder:
-    """Knows the command group of one drive. ``meanings`` and ``unserved``, which has the reason for each word
+    """Decoder of one drive's command group. ``meanings`` and ``unserved``, which has the reason for each word
     or value that the node cannot take, are read at each write: they fill at boot-up. ``reported`` gives the
     drive's status word, None while the drive is not heard."""
 
@@ -157,9 +157,9 @@ class TelegramDecoder:
     def _as_reported(
         self, leaf: str, value: Value, word: int, written: tuple[MaskedBits, ...]
     ) -> tuple[MaskedBits, ...]:
-        """A scaled value is taken as the parameter set that the control word asks for has it. Where the drive
-        is in another one, it would take the same words for something else: a word that enables is refused,
-        and with any other, which may be a stop, it gets zero. Raises ``Refusal``."""
+        """Bits of a scaled value as the parameter set has it that the control word asks for. A drive in
+        another set would take the same words for something else: a word that enables is refused, and with any
+        other, which may be a stop, it gets zero. Raises ``Refusal``."""
         in_set, status = self._set.of(word), self._reported()
         reported = in_set if status is None else self._reported_set.of(status)
         if reported == in_set:
@@ -178,9 +178,9 @@ class TelegramDecoder:
     def _in_other_set(
         self, before: tuple[int, ...], after: tuple[int, ...], written: frozenset[int], was: int, word: int
     ) -> tuple[int, ...]:
-        """The setpoints with this control word, which changes the parameter set: what is not written keeps
-        its value in its unit. Where that is not known, a drive that is to run is not switched, and one that
-        is not gets zero. Raises ``Refusal``."""
+        """Setpoints under a control word that changes the parameter set: what is not written keeps its value
+        in its unit. Where that is not known, a drive that is to run is not switched, and one that is not gets
+        zero. Raises ``Refusal``."""
         in_set = self._set.of(word)
         kept = list(after)
         left = {place for place in self._of_set if before[place] and place not in written}

@@ -1,4 +1,4 @@
-"""Stop check of one drive: what the judge is told of the drive's words, telegrams and node."""
+"""Stop check of one drive: feeds the judge with the drive's words, telegrams and node states."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from bridge.drive import MOVING, DriveState, OwnJudgement, OwnVerdict, StatusWor
 
 _DEADLINES: Final = 3
 _ON_CHANGE_S: Final = 0.5
-"""Replaces the deadline if the drive sends its TPDO on change only."""
+"""Deadline in seconds where the drive sends its TPDO on change only."""
 _CYCLE_S: Final = 0.1
-"""From a word in the node to a telegram with another speed: through a bus interface, there and back."""
+"""Time in seconds from a word in the node to a telegram with another speed: by a bus interface and back."""
 
 
 class DriveStopCheck:
-    """To be called on every change of the channel's output, of the drive's status word and of its node."""
+    """Stop check of one drive, called on every change of its channel's output, status word and node."""
 
     def __init__(self, channel: DriveChannel) -> None:
         self._channel = channel
@@ -54,7 +54,7 @@ class DriveStopCheck:
         return self._state.is_judged
 
     def sent_for_s(self, now: float) -> float:
-        """For how long the stop has been on the bus; 0 if there is none, or that is not known."""
+        """Time in seconds for which the stop has been on the bus; 0 if there is none, or not known."""
         return self._state.sent_for_s(now)
 
     @property
@@ -64,7 +64,7 @@ class DriveStopCheck:
     # what we do
 
     def on_settled(self) -> None:
-        """The channel has settled: another output, another state of the node."""
+        """Take over the output of the settled channel, and the state of its node."""
         channel = self._channel
         self._tell(NodeOperational(channel.link.node is NodeState.OPERATIONAL))
         words, silent = channel.output
@@ -82,23 +82,23 @@ class DriveStopCheck:
         return Sent.OFF if words.takes_voltage(word) else Sent.RAMP
 
     def on_handed_over(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
-        """What was to be sent has been handed to the bus. ``rpdo_period_ms`` is how long it may take to the
-        drive, ``own`` what the drive does when we fall silent."""
+        """Begin the bound: the stop has been handed to the bus. ``rpdo_period_ms`` is its longest time to the
+        drive, ``own`` the drive's own reaction to a silent bridge."""
         self._tell(HandedOver(now, self._bounds(rpdo_period_ms, own)))
         self._channel.plan_anew()
 
     def on_cut_off(self, now: float, rpdo_period_ms: int, own: OwnJudgement | None) -> None:
-        """The bridge takes the node out of operation: the drive will not be heard any more."""
+        """Judge by the last report: the bridge cuts off the node, and the drive will not be heard again."""
         self._tell(CutOff(now, self._bounds(rpdo_period_ms, own)))
         self._channel.plan_anew()
 
     def on_node_stopped(self, now: float) -> None:
-        """The node has said that it is in a state in which its drives do not run."""
+        """Note that the node reports a state in which its drives do not run."""
         self._tell(NodeStopped(now))
         self._channel.plan_anew()
 
     def on_restart(self) -> None:
-        """The node has started: what it was told before is over."""
+        """Note that the node has started: what it was told before is over."""
         self._tell(NodeRestarted())
 
     def _bounds(self, rpdo_period_ms: int, own: OwnJudgement | None) -> Bounds:
@@ -121,7 +121,7 @@ class DriveStopCheck:
     # what the drive does
 
     def before_pdo(self, now: float) -> None:
-        """The TPDO with the status word has arrived; the link does not know of it yet."""
+        """Take note of a TPDO with the status word, before the link knows of it."""
         link = self._channel.link
         last, deadline_s = link.last_pdo, link.pdo_deadline_s
         if last is not None and deadline_s is not None and now - last > deadline_s:
@@ -129,7 +129,7 @@ class DriveStopCheck:
             self._channel.plan_anew()
 
     def after_pdo(self, now: float) -> None:
-        """The channel has the status word of the TPDO."""
+        """Take over the status word of the TPDO, which the channel has."""
         word = self._channel.drive_status_word
         if word != self._status_word or not self._state.is_informed:
             self._status_word = word
@@ -137,7 +137,7 @@ class DriveStopCheck:
             self._channel.plan_anew()
 
     def on_telegram(self, now: float, speed: float | None) -> None:
-        """The TPDO that ``after_pdo`` knows, changed or not. ``speed`` is the actual speed or
+        """Take note of the TPDO that ``after_pdo`` knows, changed or not. ``speed`` is the actual speed or
         frequency in any unit, None where it is not known."""
         if self._state.says is not Says.ENABLED:
             return
@@ -157,7 +157,7 @@ class DriveStopCheck:
     # time
 
     def on_time(self, now: float) -> tuple[StopVerdict, ...]:
-        """What has ended by ``now``; call it when the bus has been drained."""
+        """Verdicts on the stops that have ended by ``now``; call it when the bus has been drained."""
         link = self._channel.link
         heard_at = link.last_pdo if link.is_heard else None
         self._state, verdicts = step(self._state, TimePassed(now, heard_at, link.pdo_deadline_s))
@@ -167,5 +167,5 @@ class DriveStopCheck:
         return next_deadline(self._state)
 
     def _tell(self, event: Event) -> None:
-        """No verdict comes of it: those are told when the bus has been drained."""
+        """Tell the judge of an event. It gives no verdict: those are told when the bus has been drained."""
         self._state, _ = step(self._state, event)

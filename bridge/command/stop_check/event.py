@@ -8,7 +8,7 @@ from bridge.command.stop_check.state import Bounds, Says, Sent
 
 
 class Sends(NamedTuple):
-    """The word that is to be on the bus from now on has this meaning."""
+    """Another meaning of the word that is to be on the bus from now on."""
 
     sent: Sent
 

@@ -9,14 +9,14 @@ from bridge.text import Text
 
 
 def drive_says(channel: DriveChannel) -> Text:
-    """The drive's own status word, and the state that it tells."""
+    """Text of the drive's own status word, and of the state that it tells."""
     word, state = _status(channel)
     return Text.of("stop.drive_says", word=word, state=state)
 
 
 def ignored_by_drive(channel: DriveChannel, node: str, verdict: StopVerdict, took_s: float) -> Text:
-    """Word that the drive was sent, and what it says after ``took_s``. If the bridge has stopped its node:
-    that it may run on, and why."""
+    """Text of the word that the drive was sent, and of its status after ``took_s``. If the bridge has stopped
+    its node: that it may run on, and why."""
     if verdict.is_cut_off:
         return _cut_off(channel, node, took_s)
     summed, says = verdict.summed, drive_says(channel)
@@ -28,7 +28,7 @@ def ignored_by_drive(channel: DriveChannel, node: str, verdict: StopVerdict, too
 
 
 def ignored_by_outputs(check: OutputStopCheck, verdict: StopVerdict, took_s: float) -> Text:
-    """Difference of the outputs from what they were sent, after ``took_s``."""
+    """Text of how the outputs differ from what they were sent, after ``took_s``."""
     differ = verdict.before is LastStop.FOLLOWED
     return Text.of("stop.outputs_differ" if differ else "stop.outputs_ignored", took_s=took_s, why=check.why)
 

@@ -1,4 +1,4 @@
-"""Do the outputs of a node have what its last stop gives them? The judgement, without a node.
+"""Judge of a node's outputs: whether they have the values that its last stop gives them. Sans-IO.
 
 docs/explanation/dead-man-chain.md, "Outputs". Nothing comes back of an output by itself, so it is read: by an
 SDO upload of its object, or by a TPDO of the node that carries it. Nothing is called ignored that may be
@@ -10,8 +10,8 @@ something else, and nothing followed that has not been seen:
 - An output that has another value is read again after the bound. Only a question asked then, or a telegram
   received then, makes an ignored stop of it; never mere time.
 - A node that was silent may not have heard us: its bound begins anew with its next sign.
-- What cannot be read leaves the stop forwarded, with the reason.
-- Where a TPDO brings an output regularly, that counts, and it is not asked for. What a TPDO brings on change
+- An output that cannot be read leaves the stop forwarded, with the reason.
+- Where a TPDO brings an output regularly, that counts, and it is not asked for. One that comes on change
   counts beside the answers.
 """
 
@@ -34,8 +34,8 @@ _AWAY: Final = Text.of("outputs.away")
 
 @dataclass(frozen=True, slots=True)
 class StoppedOutput:
-    """An output called ``name``, and what a stop gives it: ``raw``, an integer without sign of ``size`` bits.
-    ``told_by`` is the TPDO that brings it regularly, empty where it has to be read."""
+    """Output called ``name``, and the value that a stop gives it: ``raw``, an integer without sign of
+    ``size`` bits. ``told_by`` is the TPDO that brings it regularly, empty where it has to be read."""
 
     name: str
     object: ObjectRef
@@ -81,10 +81,11 @@ class _Seen:
 
 
 class OutputStopCheck:
-    """The outputs of one node, which have one owner and are stopped together. Times are monotonic seconds.
+    """Judge of the outputs of one node, which have one owner and stop together. Times are monotonic seconds.
 
     ``follows`` is kept while the node is not in operation. ``why`` says why the stop is not followed, or not
-    known to be."""
+    known to be.
+    """
 
     def __init__(self) -> None:
         self.last_stop = LastStop.NONE
@@ -93,15 +94,15 @@ class OutputStopCheck:
         self.awaits_sending = False
         """Another stop is to be sent, and has not been handed to the bus yet."""
         self.is_owed = False
-        """A stop is on the bus that is not known to be followed: what the node tells is of interest."""
+        """A stop is on the bus that is not known to be followed: reports of the node are of interest."""
         self._sent: tuple[int, ...] | None = None
         self._is_there = False
         self._stop = 0
-        """Counts what has been judged: an answer that comes late is about another stop."""
+        """Count of the stops that were judged: an answer that comes late is about another one."""
         self._since: float | None = None
-        """When the stop was handed to the bus; None where there is none, or the node is not there."""
+        """Time at which the stop was handed to the bus; None without one, and where the node is not there."""
         self._counts_from = inf
-        """Answers and telegrams from before may be older than the stop."""
+        """Time before which answers and telegrams may be older than the stop."""
         self._until = inf
         self._bound_s = 0.0
         self._outputs: Sequence[StoppedOutput] = ()
@@ -112,7 +113,7 @@ class OutputStopCheck:
         self._is_asking = False
         self._was_silent = False
         self._began_at = inf
-        """When the first of them was asked for in this turn."""
+        """Time at which the first of them was asked for in this turn."""
         self._read_at = inf
         self._disobeyed_at = -inf
         self._verdicts: list[StopVerdict] = []
@@ -131,13 +132,13 @@ class OutputStopCheck:
         return self.last_stop is LastStop.FORWARDED and self.is_judged and not awaits
 
     def sent_for_s(self, now: float) -> float:
-        """For how long the stop has been on the bus; 0 where it is not, or not judged."""
+        """Time in seconds for which the stop has been on the bus; 0 where it is not, or not judged."""
         return 0.0 if self._since is None or self.awaits_sending else max(0.0, now - self._since)
 
     # what we do
 
     def on_settled(self, sent: tuple[int, ...] | None, *, is_there: bool) -> None:
-        """``sent`` are the words by which a stop is sent from now on, None while an owner's values are;
+        """Take over the words ``sent`` for a stop from now on, None while an owner's values are sent;
         ``is_there``: the node is in operation."""
         if is_there is not self._is_there:
             self._is_there = is_there
@@ -158,8 +159,8 @@ class OutputStopCheck:
     def on_handed_over(
         self, now: float, outputs: Sequence[StoppedOutput], *, way_s: float, bound_s: float
     ) -> None:
-        """The stop has been handed to the bus by ``now``. ``outputs`` are those that it gives a value, which
-        may take ``way_s`` to the node; after ``bound_s`` they have it."""
+        """Begin the bound: the stop has been handed to the bus by ``now``. ``outputs`` are those that it
+        gives a value, which may take ``way_s`` to the node; after ``bound_s`` they have it."""
         if not self.awaits_sending:
             return
         self._forget()
@@ -192,12 +193,11 @@ class OutputStopCheck:
     # what the node says
 
     def next_reading(self) -> float | None:
-        """When ``question`` is to be called; None where nothing is to be read, or an answer is awaited."""
+        """Time of the next ``question``; None where nothing is to be read, or an answer is awaited."""
         return None if self._is_asking or self._read_at == inf else self._read_at
 
     def question(self, now: float) -> Question | None:
-        """The output that is to be read now. ``on_answer`` gets what comes of it, and then the next one may
-        be asked for."""
+        """Output that is to be read now. ``on_answer`` gets the answer; then the next may be asked for."""
         if self._is_asking or now < self._read_at:
             return None
         if not self._turn:
@@ -223,7 +223,7 @@ class OutputStopCheck:
             self._read_at = self._next_turn(now)
 
     def _next_turn(self, now: float) -> float:
-        """When the outputs are read again, as far as has been seen."""
+        """Time at which the outputs are read again, as far as has been seen; infinite for never."""
         if not self.is_owed:
             return inf
         if self.last_stop is LastStop.IGNORED or self._was_silent:
@@ -234,11 +234,11 @@ class OutputStopCheck:
         return inf
 
     def on_pause(self, at: float) -> None:
-        """A TPDO that brings outputs regularly has come later than it may, ``at`` that time."""
+        """Put off the end of the bound: a TPDO that brings outputs regularly came late, ``at`` that time."""
         self._until = max(self._until, at + self._bound_s)
 
     def on_told(self, values: Sequence[tuple[ObjectRef, int]], at: float) -> None:
-        """A TPDO received ``at`` holds these objects, as integers without sign."""
+        """Take over these objects of a TPDO received ``at``, as integers without sign."""
         if at < self._counts_from:
             return
         for place, one in enumerate(self._outputs):
@@ -251,7 +251,7 @@ class OutputStopCheck:
             self._read_at = min(self._read_at, self._until)
 
     def _judge(self, at: float) -> None:
-        """By what is known of each output."""
+        """Judge the stop by what is known of each output."""
         pairs = list(zip(self._outputs, self._seen, strict=True))
         wrong = [(one, seen) for one, seen in pairs if seen.raw not in (None, one.raw)]
         if wrong:
@@ -297,12 +297,12 @@ class OutputStopCheck:
     # time
 
     def take_verdicts(self) -> list[StopVerdict]:
-        """Ends of stops since the last call."""
+        """Verdicts on stops that have ended since the last call."""
         verdicts, self._verdicts = self._verdicts, []
         return verdicts
 
     def next_deadline(self) -> float | None:
-        """A time that is over where something waits to be told."""
+        """Time, already over, of the first verdict that waits to be told; None where none does."""
         return self._verdicts[0].at if self._verdicts else None
 
 

@@ -77,8 +77,8 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class StopVerdict:
-    """The last stop has ended in ``outcome``, after ``before``. ``since`` is when it was handed to the bus,
-    ``at`` when the drive said what this is about; ``again``: since it ignored a stop it has followed none."""
+    """End of a stop in ``outcome``, after ``before``. ``since`` is when it was handed to the bus, ``at`` when
+    the drive's report decided it; ``again``: since it ignored a stop it has followed none."""
 
     outcome: LastStop
     before: LastStop
@@ -92,7 +92,7 @@ class StopVerdict:
 
 
 class StopState(NamedTuple):
-    """One drive. Times are monotonic seconds. Defaults are those of a bridge that starts."""
+    """State of one drive's judge. Times are monotonic seconds. Defaults are those of a bridge that starts."""
 
     place: StopPlace = StopPlace.AWAY
     last_stop: LastStop = LastStop.NONE
@@ -105,7 +105,7 @@ class StopState(NamedTuple):
     sent: Sent = Sent.OFF
     """Meaning of the word that is to be on the bus."""
     on_bus: Sent = Sent.OFF
-    """The last stop that was handed over."""
+    """Meaning of the last stop that was handed over."""
     bounds: Bounds = Bounds(inf, inf)
     says: Says = Says.NOTHING
     is_doubted: bool = False
@@ -116,20 +116,20 @@ class StopState(NamedTuple):
     has_risen: bool = False
     """The drive has reported since that word that it is enabled, or on a ramp."""
     since: float = inf
-    """When the stop was handed to the bus; infinite where it was not."""
+    """Time at which the stop was handed to the bus; infinite where it was not."""
     until: float = inf
-    """A telegram from then on that says *enabled* is an ignored stop."""
+    """Time from which a telegram that says *enabled* is an ignored stop."""
     off_since: float = inf
-    """When a word that takes the voltage was handed over; infinite where the last one does not."""
+    """Time at which a word that takes the voltage was handed over; infinite where the last one does not."""
     stopping_since: float = -inf
     has_rested: bool = False
     """The drive has reported since the stop that it is not enabled."""
     is_graced: bool = False
     """It was enabled again after that, under a word that leaves the voltage on: that is granted once."""
     follows_since: float = inf
-    """When a drive that ignored its stop has begun to do what it is told; infinite while it does not."""
+    """Time at which a drive that ignored its stop has begun to obey; infinite while it does not."""
     look_at: float = -inf
-    """Before that a look would find nothing new."""
+    """Time before which a look would find nothing new."""
     sums: Unfollowed = Unfollowed()
     untold: tuple[StopVerdict, ...] = ()
     """Verdicts that the next ``TimePassed`` gives, unless the stop is over by then."""
@@ -165,7 +165,7 @@ class StopState(NamedTuple):
 
     @property
     def stopping_limit(self) -> float:
-        """Until when the drive may be on a ramp, though the voltage is to be taken."""
+        """Time until which the drive may be on a ramp, though the voltage is to be taken."""
         return max(self.off_since, self.stopping_since) + self.bounds.ramp_s
 
     def obeys(self, at: float) -> bool:
@@ -181,5 +181,5 @@ class StopState(NamedTuple):
                 return not self.is_doubted
 
     def sent_for_s(self, now: float) -> float:
-        """For how long the stop in force has been on the bus; 0 where it is not."""
+        """Time in seconds for which the stop in force has been on the bus; 0 where it is not."""
         return max(0.0, now - self.since) if self.place is StopPlace.ON_BUS else 0.0

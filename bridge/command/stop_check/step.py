@@ -1,8 +1,8 @@
-"""Does a drive do what its last stop asked? The judgement's one verb, without a drive:
-``step(state, event)`` gives the next state and the verdicts that are to be told now.
+"""Judge of one drive's stops: whether it does what the last one asked. ``step(state, event)`` gives the next
+state and the verdicts that are to be told now.
 
 Pure: times come with the events. The rules are those of docs/explanation/dead-man-chain.md, "A stop that is
-not followed". What follows an ignored stop may halt a plant, so nothing is called ignored that may be
+not followed". The reaction to an ignored stop may halt a plant, so nothing is called ignored that may be
 something else.
 """
 
@@ -30,7 +30,7 @@ from bridge.command.stop_check.sums import IgnoredTime, Unfollowed
 from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, Evidence, News, OutcomeDeed, PlaceDeed
 
 _LOOK_AGAIN_S: Final = 1.0
-"""How often a drive that is no longer heard is looked at."""
+"""Interval in seconds at which a drive that is no longer heard is looked at."""
 _SOON_S: Final = 0.001
 
 
@@ -64,7 +64,7 @@ def step(state: StopState, event: Event) -> tuple[StopState, tuple[StopVerdict, 
 
 
 def next_deadline(state: StopState) -> float | None:
-    """When a ``TimePassed`` is due; a time that is over where something waits to be told."""
+    """Time of the next ``TimePassed``, already over where a verdict waits to be told; None for never."""
     at = state.untold[0].at if state.untold else _next_look(state)
     return None if at == inf else at
 
@@ -121,7 +121,7 @@ def _nothing(state: StopState, now: float, bounds: Bounds) -> StopState:
 
 
 def _forgotten(state: StopState) -> StopState:
-    """Of a stop, and of what the drive did about it, nothing is left but what has been summed."""
+    """State in which a stop and what the drive did about it are forgotten, but for what has been summed."""
     return state._replace(
         since=inf,
         until=inf,
@@ -250,7 +250,7 @@ def _report(state: StopState, event: StatusChange) -> StopState:
 
 
 def _judged(state: StopState, at: float) -> StopState:
-    """By a telegram received ``at``, which says what is known of the drive."""
+    """Judge by a telegram received ``at``, which says what is known of the drive."""
     if state.obeys(at):
         return _found(state, Evidence.FOLLOWS, at)
     return _found(state, Evidence.RUNS_ON_LATE if at >= state.until else Evidence.RUNS_ON, at)
@@ -272,7 +272,7 @@ def _count_no_more(state: StopState, at: float, outcome: LastStop, summed: Ignor
 
 
 def _rest(state: StopState, at: float, outcome: LastStop, summed: IgnoredTime | None) -> StopState:
-    """A drive that is not enabled has ended its ramp: enabled again, it has until the short bound."""
+    """Note that the ramp of a drive at rest has ended: enabled again, it has until the short bound."""
     if state.says is not Says.AT_REST or state.has_rested or state.may_rise:
         return state
     return state._replace(has_rested=True, until=min(state.until, state.since + state.bounds.off_s))
@@ -329,7 +329,7 @@ def _time(state: StopState, event: TimePassed) -> StopState:
 
 
 def _next_telegram(state: StopState, event: TimePassed) -> float:
-    """When more will be known: nothing that the drive has said so far decides it."""
+    """Time at which more will be known: nothing that the drive has said so far decides it."""
     now, heard_at, pause_s = event
     if pause_s is None:
         return max(state.since + state.bounds.off_s, now + _SOON_S)
@@ -339,7 +339,7 @@ def _next_telegram(state: StopState, event: TimePassed) -> float:
 
 
 def _next_look(state: StopState) -> float:
-    """When another outcome is due if the drive says nothing else."""
+    """Time at which another outcome is due if the drive says nothing else."""
     if not state.is_on_bus or not state.is_informed:
         return inf
     return max(_due(state), state.look_at)

@@ -21,24 +21,24 @@ from math import inf
 from typing import Final
 
 _PART: Final = 4
-"""The judgement comes after this part of the slowest ramp, for this part of what it has lost then."""
+"""Divisor: judged after this part of the slowest ramp, against this part of what that has lost then."""
 _STEADY: Final = 1 / 64
-"""A speed that differs by no more than this part is the same."""
+"""Relative difference up to which two speeds are the same."""
 
 
 @dataclass(frozen=True, slots=True)
 class IgnoredTime:
-    """Of ``stops`` stops since the drive last obeyed, ``time_s`` in which it was enabled and has ``lost`` so
-    much of its speed (1 is all of it; 0 where no speed is known). Times are monotonic seconds."""
+    """Sum over the ``stops`` since the drive last obeyed: ``time_s`` in which it was enabled, and the part
+    ``lost`` of its speed (1 is all of it; 0 where no speed is known). Times are monotonic seconds."""
 
     time_s: float = 0.0
     lost: float = 0.0
     stops: int = 0
     begins_at: float = inf
-    """Telegrams from then on tell of the stop in force; infinite where there is none."""
+    """Time from which telegrams tell of the stop in force; infinite where there is none."""
     seen_at: float | None = None
     speed: float = 0.0
-    """Of the telegram received at ``seen_at``, the last one in this stop or in the run before it."""
+    """Speed in the telegram received at ``seen_at``, the last one in this stop or in the run before it."""
     is_steady: bool = False
     """The telegram before it, in the same run, had the same speed."""
     has_counted: bool = False
@@ -52,8 +52,8 @@ class IgnoredTime:
         return IgnoredTime(begins_at=self.begins_at)
 
     def seen(self, at: float, speed: float | None) -> IgnoredTime:
-        """A telegram that says *enabled*; ``speed`` in any unit, None where it is of no interest. One that
-        stands, or turns round, obeys."""
+        """Add a telegram that says *enabled*; ``speed`` is in any unit, None where it is of no interest. A
+        drive that stands, or turns round, obeys."""
         now = speed or 0.0
         if speed is not None and (not now or (self.seen_at is not None and now * self.speed < 0)):
             return self.obeyed()
@@ -82,12 +82,12 @@ class Unfollowed:
     fast: IgnoredTime = IgnoredTime()
 
     def begin(self, on_from: float, fast_from: float) -> Unfollowed:
-        """A stop, another word of it, or a drive that was not heard for a while. ``on_from`` is infinite
-        where the word leaves the voltage on."""
+        """Begin with a stop, another word of it, or a drive that was not heard for a while. ``on_from`` is
+        infinite where the word leaves the voltage on."""
         return Unfollowed(self.on.begin(on_from), self.fast.begin(fast_from))
 
     def end(self) -> Unfollowed:
-        """A word that enables: what has been summed stays."""
+        """End with a word that enables: the sums stay."""
         return self.begin(inf, inf)
 
     def obeyed(self) -> Unfollowed:
@@ -96,8 +96,8 @@ class Unfollowed:
     def seen(
         self, at: float, speed: float | None, *, off_s: float, ramp_s: float
     ) -> tuple[Unfollowed, IgnoredTime | None]:
-        """A telegram that says *enabled*; and the time that makes the stop in force an ignored one.
-        ``off_s`` and ``ramp_s`` are the bounds of a single stop, ``speed`` is None where none is known."""
+        """Add a telegram that says *enabled*; gives the time, too, that makes the stop an ignored one, or
+        None. ``off_s`` and ``ramp_s`` are the bounds of a single stop; ``speed`` is None where unknown."""
         on = self.on.seen(at, None)
         fast = self.fast if speed is None else self.fast.seen(at, speed)
         if on.time_s >= off_s:

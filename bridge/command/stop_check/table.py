@@ -1,7 +1,7 @@
-"""The judgement as two tables: what becomes of a stop on its way to the drive, and what is said of it then.
+"""The judgement as two tables: the place of a stop on its way to the drive, and its outcome then.
 
-The code asks these tables for what is next and for what is done; ``docs/reference/decision-tables.md`` has
-them printed. What has to hold for a finding is decided in ``step``.
+The code asks these tables for the next place or outcome and for the deed;
+``docs/reference/decision-tables.md`` has them printed. The conditions of a finding are decided in ``step``.
 """
 
 from __future__ import annotations

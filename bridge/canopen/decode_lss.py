@@ -19,15 +19,13 @@ _CONFIGURE: Final = {
 }
 """Commands that are answered with an error code."""
 _NUMBERS: Final = (
-    {command: f"switch selective: {name}" for command, name in zip(lss.SELECT, lss.FIELDS, strict=True)}
+    {lss.SELECT[sub]: f"switch selective: {name}" for sub, name in enumerate(lss.FIELDS)}
     | {0x46: "identify: vendor id", 0x47: "identify: product code"}
     | {0x48: "identify: lowest revision number", 0x49: "identify: highest revision number"}
     | {0x4A: "identify: lowest serial number", 0x4B: "identify: highest serial number"}
 )
 """Commands with a 32-bit number."""
-_INQUIRIES: Final = {
-    command: f"inquire {name}" for command, name in zip(lss.INQUIRE, lss.FIELDS, strict=True)
-}
+_INQUIRIES: Final = {lss.INQUIRE[sub]: f"inquire {name}" for sub, name in enumerate(lss.FIELDS)}
 _BARE: Final = {
     lss.SELECTED: "switch selective: selected",
     0x4C: "identify: whoever has no node id",

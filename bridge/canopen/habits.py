@@ -96,9 +96,10 @@ class HabitCount:
 
 @dataclass(slots=True)
 class _HabitCounter:
+    """``last`` are the numbers of the last frame: what it has, and what is right."""
+
+    last: tuple[int, int]
     count: int = 0
-    has: int = 0
-    due: int = 0
     news_from: int = _NAMED_FROM
 
 
@@ -112,9 +113,9 @@ class HabitCounter:
 
     def note(self, odd: Odd, has: int, due: int) -> None:
         """A frame that ``has`` so many bytes, or came after so many milliseconds, where ``due`` are right."""
-        counted = self._counts.setdefault(odd, _HabitCounter())
+        counted = self._counts.setdefault(odd, _HabitCounter((has, due)))
         counted.count += 1
-        counted.has, counted.due = has, due
+        counted.last = has, due
         self.has_news |= counted.count >= counted.news_from
 
     def said(self, least: int = 1) -> list[HabitCount]:
@@ -138,4 +139,4 @@ class HabitCounter:
 
 
 def _shown(odd: Odd, counted: _HabitCounter) -> HabitCount:
-    return HabitCount(odd, counted.count, counted.has, counted.due)
+    return HabitCount(odd, counted.count, *counted.last)

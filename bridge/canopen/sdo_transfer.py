@@ -136,10 +136,10 @@ def announced_bytes(index: int, sub: int, reply: bytes) -> int:
 
 def check_length(index: int, sub: int, length: int, announced: int | None) -> None:
     """Raises SdoError if the server has sent more or fewer bytes than it announced."""
-    if announced is None or length == announced:
-        return
-    code = abort.LENGTH_TOO_HIGH if length > announced else abort.LENGTH_TOO_LOW
-    raise SdoError(index, sub, code, by_server=False)
+    if announced is not None and length > announced:
+        raise SdoError(index, sub, abort.LENGTH_TOO_HIGH, by_server=False)
+    if announced is not None and length < announced:
+        raise SdoError(index, sub, abort.LENGTH_TOO_LOW, by_server=False)
 
 
 def expedited(data: bytes) -> bytes:

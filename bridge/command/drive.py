@@ -55,8 +55,10 @@ class Identification:
 
 
 class _Command(NamedTuple):
-    """A scaled command in one parameter set; ``lack`` is None where it is served there."""
+    """A scaled command in one parameter set, at ``point`` of the image; ``lack`` is None where it is served
+    there."""
 
+    point: int
     codec: ValueCodec
     lack: Lack | None
 
@@ -98,16 +100,15 @@ class Drive(WordTiming):
     def _find_points(self) -> None:
         """Look up its points in the image."""
         family, words = self.family, self.family.process.rpdo[1:]
-        carried = family.carried(self.slot)[0][1:]
-        self._setpoints = [(words.index(word), f"command/{word}") for word in carried]
-        self._commands = codecs(family, self.slot, "command", words, self.table.parameters)
-        self._commands_in = self._compiled_commands()
 
         def places(group: str, leaves: Sequence[str]) -> list[int]:
-            return [self._image.index[f"{self.name}/{group}/{leaf}"] for leaf in leaves]
+            return [self._place(f"{group}/{leaf}") for leaf in leaves]
 
-        self._control_word, *self._setpoint_indices = places("command", ["control_word", *carried])
-        self._value_indices = places("command", [codec.model.name for codec in self._commands])
+        carried = [(word, f"command/{word}") for word in family.carried(self.slot)[0][1:]]
+        self._setpoints = [(self._place(leaf), words.index(word), leaf) for word, leaf in carried]
+        self._commands = codecs(family, self.slot, "command", words, self.table.parameters)
+        self._commands_in = self._compiled_commands()
+        (self._control_word,) = places("command", ("control_word",))
         self._faults = places("status", ("fault_text",)) + places("supervision", ("last_fault_text",))
         self._supervision = places("status", _FAULT) + places("supervision", _SUPERVISION)
         self._ages = places("supervision", ("watchdog_left_ms", "pdo_age_ms", "telegrams"))
@@ -117,6 +118,9 @@ class Drive(WordTiming):
         self._follows = places("supervision", ("follows", "last_stop"))
         self._stop_ms, self._bridge_ms = places("supervision", ("worst_case_stop_ms", "worst_case_bridge_ms"))
         self._identity = places("identity", _IDENTITY)
+
+    def _place(self, leaf: str) -> int:
+        return self._image.index[f"{self.name}/{leaf}"]
 
     @property
     def quality(self) -> Quality:
@@ -210,7 +214,8 @@ class Drive(WordTiming):
             found, lack = meanings.codec(codec, in_set)
             carried = [codec.model.leaf, *(f"command/{words[place]}" for place in found.places)]
             why = next((why for leaf in carried if (why := self.channel.unserved.get(leaf))), None)
-            return _Command(found, Lack(Quality.CONFIG_ERROR, why) if why else lack)
+            lack = Lack(Quality.CONFIG_ERROR, why) if why else lack
+            return _Command(self._place(codec.model.leaf), found, lack)
 
         return {in_set: [compiled(codec, in_set) for codec in self._commands] for in_set in meanings.sets}
 
@@ -343,17 +348,17 @@ class Drive(WordTiming):
         channel, image = self.channel, self._image
         setpoints, unserved = channel.setpoints, channel.unserved
         image.set(self._control_word, channel.control_word, now)
-        for index, (place, leaf) in zip(self._setpoint_indices, self._setpoints, strict=True):
+        for index, place, leaf in self._setpoints:
             why = unserved.get(leaf)
             quality = Quality.CONFIG_ERROR if why else Quality.GOOD
             image.set(index, setpoints[place], now, quality, why or "")
         in_set = self._set.of(channel.control_word)
-        for index, codec in zip(self._value_indices, self._commands_in[in_set], strict=True):
-            value = codec.codec.from_words(setpoints)
-            why = channel.doubts.why(codec.codec.model.name, setpoints)
-            why = why or channel.meanings.doubt(codec.codec.model, in_set)
-            quality, why = codec.lack or (Quality.STALE if why else Quality.GOOD, why)
-            image.set(index, value, now, quality, why)
+        for point, codec, lack in self._commands_in[in_set]:
+            value = codec.from_words(setpoints)
+            why = channel.doubts.why(codec.model.name, setpoints)
+            why = why or channel.meanings.doubt(codec.model, in_set)
+            quality, why = lack or (Quality.STALE if why else Quality.GOOD, why)
+            image.set(point, value, now, quality, why)
         if self._brought:
             image.set(self._brought[0], channel.life_sign(now), now)
 

@@ -170,7 +170,7 @@ class Plant:
         if not self._gate.admits(event):
             return
         with self._guard:
-            event = replace(event, because=event.because or self.because(event))
+            event = replace(event, because=self.because(event))
         for listener in tuple(self._listeners):
             with self._guard:
                 listener(event)

@@ -70,6 +70,14 @@ def test_what_one_frame_says(line: str, text: str, values: dict[str, int | str])
     assert bool(facts) is bool(values)
 
 
+@pytest.mark.parametrize("index", ["00 20", "01 20"])
+def test_of_a_long_write_the_length_is_told_where_the_client_announces_it(index: str) -> None:
+    [sized] = heard(f"> 21 {index} 00 09 01 00 00")
+    assert (sized.act, sized.number) == ("write_long", 265)
+    [unsized] = heard(f"> 20 {index} 00 09 01 00 00")
+    assert (unsized.act, unsized.number) == ("write_long", None)
+
+
 def test_a_string_is_written_in_segments_and_then_another_one_is_read() -> None:
     """The segments do not name their object, and no value begins with what is left of the one before."""
     listener = SdoListener()

@@ -72,6 +72,18 @@ def test_the_node_is_asked_at_once_and_in_its_guard_time() -> None:
     assert asked == pytest.approx([10.0, 10.5, 11.0])
 
 
+def test_who_asks_a_little_late_keeps_the_rhythm() -> None:
+    """The node's own life guarding counts on it (CiA 301 §7.2.8.3.2.1)."""
+    one = guard()
+    for late in (0.125, 0.25, 0.0):
+        due = one.next_deadline()
+        assert due is not None
+        one.on_frame(says(5, due))
+        one.on_time(due + late)
+        assert one.next_deadline() == due + 0.5
+    assert one.take_frames() == [REQUEST] * 3
+
+
 def test_who_is_late_asks_once() -> None:
     one = guard()
     one.on_frame(says(5, 12.0))

@@ -48,7 +48,7 @@ def test_four_words_little_endian() -> None:
 
 @pytest.mark.parametrize("bits", [0, 65, 128])
 def test_a_length_that_cannot_be_packed_is_named(bits: int) -> None:
-    with pytest.raises(MappingError, match=f"3001:01/{bits}"):
+    with pytest.raises(MappingError, match=rf"^3001:01/{bits}: "):
         PdoCodec((PdoEntry(0x3001, 1, bits),))
 
 

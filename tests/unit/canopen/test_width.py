@@ -124,6 +124,22 @@ def test_a_longer_object_is_not_taken_for_a_shorter_number() -> None:
     assert "the node sent 4" in sdo_surplus("uint16", answer)
 
 
+def test_a_number_of_64_bits_is_compared_and_written_in_other_widths_as_any() -> None:
+    long, short = (5).to_bytes(8, "little"), (5).to_bytes(4, "little")
+    assert width.holds(long, short)
+    assert width.holds(short, long)
+    assert list(width.forms(long, short)) == [short, long]
+    assert list(width.forms(short, long)) == [long, short]
+
+
+def test_more_than_64_bits_are_no_number() -> None:
+    long, short = (5).to_bytes(9, "little"), (5).to_bytes(4, "little")
+    assert not width.holds(long, short)
+    assert not width.holds(short, long)
+    assert list(width.forms(long, short)) == [long]
+    assert list(width.forms(short, long)) == [short]
+
+
 def test_a_text_is_written_as_it_is_first() -> None:
     assert list(width.forms(b"ab", b"wxyz", is_number=False)) == [b"ab", b"ab\0\0"]
 

@@ -210,6 +210,17 @@ def test_a_drive_is_sent_the_position_at_which_it_stands(spread: Spread) -> None
     assert spread.sent[1:] == (8, 2)
 
 
+@pytest.mark.parametrize(("word", "mode"), [(0xFFFF, -1), (0xFF80, -128), (0x0001, 1)])
+def test_a_mode_that_the_drive_tells_has_its_sign(spread: Spread, word: int, mode: int) -> None:
+    """IEC 61800-7-201: 6061h is an INTEGER8, negative in the maker's own modes of operation."""
+    drive, events = spread.drive, spread.plant.events
+    drive.on_process_data((READY, 0, 0, 8), spread.now)
+    events.take()
+    drive.on_process_data((READY, 0, 0, word), spread.now)
+    (event,) = events.take()
+    assert event.message.startswith(f"6061 of parameter set 1 is {mode}, it was 8: ")
+
+
 def test_a_position_that_comes_with_the_status_word_is_followed_as_well() -> None:
     plant = sites.plant_of(SITE, CSP)
     drive = plant.drives["axis/drive"]

@@ -9,8 +9,10 @@ import pytest
 from bridge.base.errors import FileFaults
 from bridge.canopen.frame import Frame
 from bridge.command import (
+    Action,
     Code,
     Command,
+    Do,
     Identity,
     Outcome,
     ReadParameter,
@@ -20,9 +22,16 @@ from bridge.command import (
     Write,
     WriteParameter,
 )
+from bridge.command.device import InputPdo
+from bridge.command.drive_link import REASONS, NodeState
 from bridge.image import Quality, Reading
+from bridge.mapping.entry_types import ObjectRef
 from tests.support.bench import Bench
-from tests.support.devices import ENCODER, device_bench, encoder
+from tests.support.devices import ENCODER, IO_BLOCK, OUTPUTS, device_bench, encoder
+from tests.support.node_states import node_goes
+from tests.support.nodes import device_plant
+from tests.support.rig import PLC
+from tests.support.views import view_of
 
 ENGINEER = Identity(Source.OPCUA, "eve", Role.ENGINEER)
 
@@ -75,6 +84,32 @@ def test_a_node_that_is_gone_is_lost_and_then_dead(bench: Bench) -> None:
     bench.cut = False
     bench.run(5.0)
     assert point(bench, "input/position").quality is Quality.GOOD
+
+
+def test_its_inputs_are_lost_with_their_node_at_once(tmp_path: Path) -> None:
+    """Before anybody looks, and before a TPDO is late."""
+    plant = device_plant(tmp_path, ENCODER)
+    node = plant.nodes["shaft"]
+    (device,) = node.devices
+    node_goes(plant, node, NodeState.OPERATIONAL, 10.0)
+    device.on_pdos([InputPdo("TPDO1", (ObjectRef(0x6004, 0),), 0.25)], {}, 10.0)
+    device.on_data(0, [2500], 10.125)
+    node_goes(plant, node, NodeState.LOST, 10.25)
+    position = plant.image.read("shaft/input/position")
+    assert position == Reading(2.5, Quality.LOST, 10.25, REASONS[NodeState.LOST])
+
+
+def test_who_looks_sees_the_times_of_its_outputs_at_that_moment(tmp_path: Path) -> None:
+    plant = device_plant(tmp_path, IO_BLOCK, OUTPUTS)
+    now = 10.0
+    view = view_of(plant, lambda: now)
+    node_goes(plant, plant.nodes["shaft"], NodeState.OPERATIONAL, now)
+    for command in (Write({"valves": 0}), Write({"valves": 1}), Do(Action.KEEP_ALIVE)):
+        view.submit(Request(PLC, "shaft", command), lambda outcome: None)
+    now += 0.125
+    view.look("shaft")
+    leaves = ("telegrams", "watchdog_left_ms")
+    assert [plant.image.read(f"shaft/supervision/{leaf}").value for leaf in leaves] == [3, 75]
 
 
 def test_before_anything_was_heard_it_waits(tmp_path: Path) -> None:

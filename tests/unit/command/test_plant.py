@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from bridge.command import (
@@ -24,7 +26,9 @@ from bridge.command.drive_link import REASONS, NodeState
 from bridge.command.worst_case import Wire
 from bridge.image import Quality, Reading, Value
 from tests.support import sites
+from tests.support.devices import ENCODER
 from tests.support.node_states import node_goes, run_timers
+from tests.support.nodes import device_plant
 from tests.support.rig import (
     ACKNOWLEDGE,
     ENABLE,
@@ -451,11 +455,35 @@ def test_who_looks_sees_what_no_timer_has_told_yet(running: Hall):
     assert "pdo_age_ms" in {running.plant.image.points[index].leaf for index in feed.take(10_000)}
 
 
+def test_before_it_is_heard_a_node_is_absent_and_has_no_fault(hall: Hall, tmp_path: Path):
+    """Whether something of it is commanded or not."""
+    for plant, node in ((hall.plant, "conveyor"), (device_plant(tmp_path, ENCODER), "shaft")):
+        for leaf in ("state", "current_fault", "last_fault"):
+            assert plant.image.read(f"{node}/node/{leaf}")[:2] == (0, Quality.GOOD)
+
+
+def test_an_event_is_told_with_what_has_caused_it(hall: Hall):
+    hall.plant.because = lambda event: "can0 is silent" if event.kind is EventKind.NODE_LOST else ""
+    for state in (NodeState.OPERATIONAL, NodeState.LOST):
+        node_goes(hall.plant, hall.node, state, hall.now)
+    causes = {event.kind: event.cause for event in hall.events if event.source == "conveyor"}
+    assert causes == {EventKind.NODE_BACK: "", EventKind.NODE_LOST: "can0 is silent"}
+
+
 def test_a_node_has_the_state_that_the_bridge_gives_it(hall: Hall):
     codes = {NodeState.LOST: 3, NodeState.DISABLED: 5, NodeState.OPERATIONAL: 2}
-    assert hall.plant.image.read("conveyor/node/state").value == 0
     for state, code in codes.items():
         node_goes(hall.plant, hall.node, state, hall.now)
+        assert hall.plant.image.read("conveyor/node/state").value == code
+
+
+def test_a_node_whose_first_drive_has_no_process_data_is_not_as_configured(hall: Hall):
+    """The boot-up leaves out a drive whose PDOs cannot be used; the node itself is in operation."""
+    node_goes(hall.plant, hall.node, NodeState.OPERATIONAL, hall.now)
+    first, second = hall.node.drives
+    for drive, code in ((second, 2), (first, 6)):
+        drive.channel.on_node(NodeState.CONFIG_ERROR, hall.now)
+        hall.plant.settle()
         assert hall.plant.image.read("conveyor/node/state").value == code
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 
 class Source(IntEnum):
-    """Where a command comes from, numbered as Modbus serves the owner (input register 20)."""
+    """Origin of a command, numbered as Modbus serves the owner (input register 20)."""
 
     NONE = 0
     OPCUA = 1
@@ -47,7 +47,7 @@ class LastStop(IntEnum):
 
 
 class NodeState(Enum):
-    """What the master knows of the node behind a drive."""
+    """State of the node behind a drive, as far as the master knows it."""
 
     ABSENT = "not seen yet"
     BOOTING = "booting"
@@ -81,4 +81,4 @@ NMT_STATES: Final = (
 )
 CONTROLLER_STATES: Final = ((0, "ok"), (1, "warning"), (2, "passive"), (3, "bus_off"), (4, "down"))
 CONDITIONS: Final = ((0, "ok"), (1, "warning"), (2, "alarm"), (3, "danger"))
-"""How bad it is at a place."""
+"""Severities of the troubles at a place."""

@@ -130,7 +130,7 @@ _OF_OUTPUTS: Final = (
 
 
 def _output_supervision(name: str) -> list[Point]:
-    """What outputs have of a drive's supervision, by the same names."""
+    """Points of the supervision of outputs: some of a drive's, by the same names, and ``follows``."""
     points = {point.name.rpartition("/")[2]: point for point in _supervision_points(name, False)}
     follows = "false while an output has not what its last stop gives it, after the bound"
     shared = [points[leaf] for leaf in _OF_OUTPUTS]

@@ -51,7 +51,7 @@ class Rights:
 
 
 def rights_of(catalogue: Catalogue, source: Source) -> Rights:
-    """Those of a protocol of the site; where it is not served, as with the settings that it would have."""
+    """Rights of a protocol of the site; of one that is not served, those that its defaults would give."""
     site = catalogue.site
     if source is Source.OPCUA:
         users = site.opcua.user if site.opcua else []

@@ -115,7 +115,7 @@ class DeviceSpec:
 
 
 MemberSpec = DriveSpec | DeviceSpec
-"""Whatever a node has that parameters, inputs or commands are of."""
+"""Member of a node: it has parameters, inputs or commands."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -90,7 +90,7 @@ def render(said: Words, language: str = "en") -> str:
 
 @lru_cache(maxsize=1024)
 def in_english(said: Words) -> str:
-    """As ``render``, and remembered: for what many points have in common and is shown again and again."""
+    """English text by ``render``, remembered: for what many points share and is shown over and over."""
     return render(said)
 
 

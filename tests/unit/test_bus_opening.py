@@ -79,6 +79,7 @@ def two_buses(folder: Path) -> Path:
     )
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("command", ["simulate", "audit"])
 def test_a_command_for_all_buses_names_all_that_are_missing(tmp_path: Path, command: str) -> None:
     done = CliRunner().invoke(make_app(command), [command, str(two_buses(tmp_path))])
@@ -135,6 +136,7 @@ ON_ONE = {
 }
 
 
+@pytest.mark.landing(17)
 @pytest.mark.parametrize("name", ON_ONE)
 def test_a_command_for_one_bus_names_it_and_ends_with_3(tmp_path: Path, name: str) -> None:
     site = str(two_buses(tmp_path))

@@ -44,6 +44,7 @@ def test_a_good_site_is_checked_and_its_decisions_repeated(tmp_path: Path) -> No
     assert "drive[0].fieldbus_timeout_ms: is 0: a silent controller" in done.stderr
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("command", ["check", "run"])
 def test_a_bad_site_is_refused_with_all_its_faults(tmp_path: Path, command: str) -> None:
     path = write_site(tmp_path)
@@ -57,6 +58,7 @@ def test_a_bad_site_is_refused_with_all_its_faults(tmp_path: Path, command: str)
     assert any(f":{control}: bus[0].node[0].drive[0].control" in fault for fault in faults), faults
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize(
     ("timeout_ms", "level", "words"),
     [
@@ -90,6 +92,7 @@ def test_faults_of_site_and_mapping_are_readable_by_scripts(tmp_path: Path) -> N
     assert "fu1" in fault["hint"]
 
 
+@pytest.mark.landing
 def test_what_cannot_work_together_is_bad_usage_too(tmp_path: Path) -> None:
     path = write_site(tmp_path)
     path.write_text(path.read_text("utf-8").replace("timeout_ms = 0", "timeout_ms = 15"), "utf-8")

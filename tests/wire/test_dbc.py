@@ -118,6 +118,7 @@ def test_a_log_says_what_the_bridge_says(recording: Recording, options: tuple[st
     assert told.keys() == image.keys()
 
 
+@pytest.mark.landing
 def test_every_word_and_value_of_a_drive_is_in_the_file(recording: Recording) -> None:
     told = points(recording) | points(recording, "--words")
     carried = {

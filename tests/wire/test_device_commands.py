@@ -118,6 +118,7 @@ def test_parameters_are_read_written_backed_up_and_restored(hall: Hall, tmp_path
     hall.said("parameters", "compare", "SITE", "shaft_25", file)
 
 
+@pytest.mark.landing
 def test_they_are_looked_at_like_any_node(hall: Hall) -> None:
     assert "IO 16" in hall.said("sdo", "read", "SITE", "io_16", "1008")
     hall.said("nmt", "SITE", "start", "io_16")

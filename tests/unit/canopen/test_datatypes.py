@@ -45,6 +45,7 @@ def test_each_type_is_tested() -> None:
     assert set(CODES) == set(NUMBERS)
 
 
+@pytest.mark.landing(13)
 @pytest.mark.parametrize("kind", get_args(TypeName))
 @given(data=st.data())
 def test_a_value_comes_back_as_it_was(kind: str, data: st.DataObject) -> None:

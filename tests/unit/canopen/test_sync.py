@@ -28,6 +28,7 @@ def test_sync_without_a_counter_has_no_data() -> None:
     assert sync_frames(0) == (Frame(SYNC),)
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("period_ms", [1, 250, 1000])
 def test_sync_comes_with_its_period(tmp_path: Path, period_ms: int) -> None:
     bench = Bench(write_site(tmp_path, bus=f"sync_period_ms = {period_ms}\nrpdo_period_ms = 20"))

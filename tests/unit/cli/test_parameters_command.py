@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from bridge.cli.app import make_app
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize("name", ["P509", "P513", "P151", "P120", "P515", "P546", "2201:00", "6040:00"])
 def test_what_supervises_a_drive_takes_force_on_the_command_line(site: Path, name: str) -> None:
     """Said before a bus is opened."""

@@ -18,6 +18,7 @@ ENDS = {
 }
 
 
+@pytest.mark.landing(12)
 @pytest.mark.parametrize("thread", ["pass", HELD], ids=["alone", "with a thread left behind"])
 @pytest.mark.parametrize("end", ENDS)
 def test_a_process_ends_with_its_status_and_all_that_it_has_said(end: str, thread: str) -> None:

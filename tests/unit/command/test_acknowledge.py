@@ -133,7 +133,7 @@ def test_a_constant_bit_acknowledges_nothing(
         assert not watch.happens(partial(_write, word)), f"{word:04X}h after: {step}"
 
 
-@pytest.mark.landing(6)
+@pytest.mark.landing(81)
 @pytest.mark.parametrize(("first", "second"), list(product(IN_BETWEEN, repeat=2)))
 def test_after_a_trip_a_constant_bit_leaves_it_and_an_edge_does_not(first: str, second: str):
     rig = Rig()

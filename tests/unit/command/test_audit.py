@@ -270,6 +270,7 @@ class TestBusyControllers:
         hall.plant.audit.sum_up(hall.now)
         assert hall.told() == [("write", "not_allowed", 980)]
 
+    @pytest.mark.landing
     def test_somebody_who_invents_names_fills_no_memory(self, hall: Hall) -> None:
         for number in range(5000):
             stranger = Identity(Source.ZENOH, f"nobody{number}")

@@ -22,6 +22,7 @@ def plant_of(nodes: int) -> Plant:
     return sites.plant_of(sites.site(sites.bus(*all_of_them), sites.modbus()))
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("nodes", [1, 30])
 def test_a_drive_that_was_heard_again_is_stale_at_its_next_deadline(nodes: int) -> None:
     plant = plant_of(nodes)

@@ -170,6 +170,7 @@ def test_what_a_first_break_left_is_not_of_the_second(plant: Watched) -> None:
     assert below(plant) == {("drive_fault", DRIVES[0])}
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("is_over", [False, True])
 def test_what_each_of_two_standstills_left_stands_below_its_own(plant: Watched, *, is_over: bool) -> None:
     for place, drive in enumerate(DRIVES[:2]):

@@ -50,6 +50,7 @@ def signals_of(folder: Path, file: str) -> dict[str, dict[str, tuple[int, bool, 
     }
 
 
+@pytest.mark.landing(14)
 @pytest.mark.parametrize("kind", TYPES)
 @pytest.mark.parametrize("receives", [True, False])
 def test_a_type_is_the_same_in_both_directions(tmp_path: Path, kind: str, receives: bool) -> None:

@@ -53,6 +53,7 @@ def profile(number: int, *more: Mapping[str, Section]) -> dict[str, Section]:
     return sections
 
 
+@pytest.mark.landing(10)
 @pytest.mark.parametrize(
     ("sections", "outputs", "reason"),
     [

@@ -12,7 +12,7 @@ from bridge.parameter import Names
 NORD = "nord/sk-tu4-cao"
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("name", family_names())
 def test_every_parameter_of_a_family_is_found_by_its_name(name: str) -> None:
     dictionary = load_dictionary(name, 5)

@@ -98,6 +98,7 @@ def test_without_a_node_id_they_are_as_the_file_has_them(file: Path) -> None:
     assert content["pdos"][0]["cob_id"] is None
 
 
+@pytest.mark.landing(9)
 @pytest.mark.parametrize("path", sorted(mappings_dir().rglob("*.eds")), ids=lambda path: path.stem)
 def test_nothing_of_our_own_files_is_left_unresolved(path: Path) -> None:
     assert "NODEID" not in json.dumps(shown(path, "--node-id", "9"))

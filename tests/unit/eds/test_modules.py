@@ -159,6 +159,7 @@ def test_a_count_that_is_none_is_told_and_left_out(count: str) -> None:
     assert [one.text for one in description.findings if "its elements are left out" in one.text]
 
 
+@pytest.mark.landing
 def test_no_more_elements_than_any_device_has_are_made() -> None:
     one = module(1, "Inputs", "IN", extension("6000", INPUTS, "254", more="ObjExtend=254"))
     description = with_modules(*["IN"] * 60, content=coupler(modules=(one,)))

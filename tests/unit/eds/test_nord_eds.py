@@ -84,6 +84,7 @@ def test_the_defaults_of_pdos_and_sdos_are_those_of_a_fresh_node(name: str, desc
     assert compare_defaults(listed, NODES[name].slave._dictionary.find, NODE) > 20
 
 
+@pytest.mark.landing(11)
 @pytest.mark.parametrize("mapping", MAPPINGS)
 def test_the_mapping_file_and_the_eds_agree_on_the_pdos(mapping: str):
     """The EDS has the second of two layouts in the mapping file, that of §6.7.5."""

@@ -62,6 +62,7 @@ def test_with_one_repeater_the_example_reaches_690_m(tmp_path: Path) -> None:
     assert "330 m at most" in said
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize(
     ("bitrate", "length_m"),
     [(1_000_000, 25), (800_000, 50), (500_000, 80), (250_000, 230), (125_000, 480), (50_000, 1000)],

@@ -27,6 +27,7 @@ def judge(path: Path) -> tuple[WorstCase, list[str]]:
     return case, [str(one) for one in verdict.of(Severity.ERROR)]
 
 
+@pytest.mark.landing(11)
 @pytest.mark.parametrize(
     ("mapping", "node", "shown"),
     [

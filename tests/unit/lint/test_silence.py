@@ -172,6 +172,7 @@ def test_the_published_time_has_the_drives_own_in_it(tmp_path: Path, mapping: st
     assert worst_ms(SILENT[1]) == worst_ms("")
 
 
+@pytest.mark.landing(37)
 @pytest.mark.parametrize(("mapping", "slot"), SLOTS)
 def test_silence_after_hold_is_refused_since_it_never_comes(tmp_path: Path, mapping: str, slot: str):
     held = 'on_expiry = "hold"\nthen_silence_ms = 100'

@@ -100,6 +100,7 @@ def test_a_torque_limit_that_is_sent_as_0_is_a_warning(tmp_path: Path) -> None:
     assert warning.startswith("RPDO1 of conveyor/drive sends 6072h:00 as 0, until somebody commands it")
 
 
+@pytest.mark.landing(22)
 @pytest.mark.parametrize("name", [one for one in family_names() if load_family(one).slot])
 def test_our_own_mappings_carry_every_word_and_send_no_setting_as_0(tmp_path: Path, name: str) -> None:
     slot = load_family(name).slot[0].name

@@ -41,6 +41,7 @@ def test_one_table_stands_for_a_list_of_one(tmp_path: Path) -> None:
     assert [pdo.number for pdo in slot.rpdo] == [2]
 
 
+@pytest.mark.landing(41)
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [

@@ -29,6 +29,7 @@ def faults(folder: Path, text: str) -> str:
     return "\n".join(f"{one.line} {one.key}: {one.message} ({one.hint})" for one in caught.value.faults)
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize(
     ("more", "fault"),
     [

@@ -191,6 +191,7 @@ def test_a_sync_period_that_60c2h_cannot_hold_is_a_fault(tmp_path: Path, period_
         load_site_and_families(path)
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("kind", ["bool", "real32"])
 def test_the_sync_period_needs_an_integer(tmp_path: Path, kind: str):
     head = 'extends = "cia402/cyclic-velocity"\n[[slot]]\nname = "drive"\n'

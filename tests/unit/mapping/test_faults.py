@@ -96,6 +96,7 @@ def changed(folder: Path, more: str) -> Family:
     return read_family(path, (folder, mappings_dir()))
 
 
+@pytest.mark.landing(11)
 @pytest.mark.parametrize(
     ("more", "message"),
     [

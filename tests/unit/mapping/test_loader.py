@@ -20,6 +20,7 @@ def test_the_sample_is_a_family(tmp_path: Path):
     assert read_family(path).family.name == "Test"
 
 
+@pytest.mark.landing(37)
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [

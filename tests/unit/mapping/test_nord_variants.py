@@ -21,6 +21,7 @@ def test_all_are_delivered_and_no_template_is():
     assert {name for name in family_names() if name.startswith("nord/")} == set(ALL)
 
 
+@pytest.mark.landing(12)
 @pytest.mark.parametrize("name", ALL)
 def test_each_can_be_simulated(name: str):
     slot = FAMILIES[name].slot[0].name

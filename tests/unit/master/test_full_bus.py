@@ -76,6 +76,7 @@ def test_where_the_others_frames_are_less_urgent_everything_goes_on(bench: BusyB
     assert isinstance(results[0], bytes)
 
 
+@pytest.mark.landing
 def test_a_stop_waits_for_one_frame_and_for_no_more(bench: BusyBench) -> None:
     bench.babble = LAST
     keep_running(bench, 1.0)

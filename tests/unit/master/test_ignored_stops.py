@@ -122,6 +122,7 @@ def test_the_node_stays_stopped_until_somebody_asks(bench: DeafBench) -> None:
     assert len(worst(bench)) == 1
 
 
+@pytest.mark.landing
 def test_a_drive_that_is_still_deaf_is_named_again(bench: DeafBench) -> None:
     bench.node_is_deaf_to = frozenset({RPDO1})
     bench.ask(Action.DISABLE_VOLTAGE)
@@ -157,6 +158,7 @@ def test_somebody_else_enables_it(tmp_path: Path) -> None:
     assert commands(bench)[-1] == NMT_STOP
 
 
+@pytest.mark.landing
 def test_report_only(tmp_path: Path) -> None:
     bench = enabled(a_bench(tmp_path, drive='on_ignored_stop = "report"'))
     bench.node_is_deaf_to = frozenset({RPDO1})
@@ -206,6 +208,7 @@ def test_a_node_that_is_lost_is_not_judged(bench: DeafBench) -> None:
     assert len(worst(bench)) == 1, "back, and still enabled"
 
 
+@pytest.mark.landing
 def test_a_bridge_that_hung_accuses_nobody(bench: DeafBench) -> None:
     for seconds in (0.05, 0.15, 0.4, 3.0):
         bench.hang(seconds)

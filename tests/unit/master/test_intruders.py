@@ -275,6 +275,7 @@ def test_a_foreign_time_is_told(tmp_path: Path) -> None:
 # SDO
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize("data", [READ, ABORT, b"", bytes(3), b"\xff" * 8])
 def test_who_only_reads_is_told_and_stops_nobody(tmp_path: Path, data: bytes) -> None:
     quick = crowd(tmp_path)

@@ -221,6 +221,7 @@ def test_a_drive_that_answers_do_not_stop_is_reset_and_stays_stopped(
     assert bool(told) == is_reset and len(told) <= 3
 
 
+@pytest.mark.landing
 def test_a_node_that_was_reset_so_is_started_by_command(tmp_path: Path) -> None:
     bench = moving(tmp_path, "lenze/8400-motec", 255)
     bench.run(0.5)

@@ -301,6 +301,7 @@ def test_a_process_stopped_on_the_way_to_the_kernel_hands_nothing_over(
     assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]
 
 
+@pytest.mark.landing
 def test_the_bus_going_down_loses_all_and_brings_back_stopped_drives(bench: Bench) -> None:
     running(bench)
     bench.bus.status.state = ControllerState.DOWN
@@ -355,6 +356,7 @@ def test_a_reset_of_the_node_is_refused_to_who_does_not_control_its_drives(bench
     assert bench.plant.drives["conveyor/fu1"].quality is Quality.GOOD
 
 
+@pytest.mark.landing
 def test_a_disabled_node_is_stopped_and_stays_disabled_until_enabled(bench: Bench) -> None:
     running(bench)
     assert bench.ask(Action.DISABLE, "conveyor").ok
@@ -405,6 +407,7 @@ def test_after_an_outage_of_the_bus_the_first_rpdos_are_stopped_ones(tmp_path: P
     assert all(frame.data[0] & 0x0F != 0x0F for frame in bench.sent(RPDO1))
 
 
+@pytest.mark.landing
 def test_an_outage_between_two_rounds_is_no_secret(bench: Bench) -> None:
     running(bench)
     bench.bus.status.outages += 1
@@ -463,6 +466,7 @@ def test_errors_ignored_or_not_what_is_written_while_the_bus_is_gone_does_not_go
     assert not moves(bench)
 
 
+@pytest.mark.landing
 def test_errors_ignored_or_not_a_node_that_restarts_again_and_again_is_not_enabled(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path, drive=IGNORE))
     bench.run(1.0)
@@ -510,6 +514,7 @@ def test_after_a_tpdo_that_is_too_long_the_next_right_one_counts(bench: Bench) -
         assert bench.number("conveyor/fu1/status/drive_status_word") & 0xFF == low
 
 
+@pytest.mark.landing
 def test_bursts_that_the_kernel_no_longer_takes_are_told_once_and_so_is_their_return(bench: Bench) -> None:
     for refusal in ("Cannot allocate memory", "Cannot allocate memory", "", ""):
         bench.bus.status.bursts_refused = refusal

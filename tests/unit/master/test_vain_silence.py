@@ -123,6 +123,7 @@ def plain_ms(bench: Silent) -> int:
     return stop_time(plain, drive.bus, round(1000 * TIMEOUT_S), drive.rpdo_type, drive.wire).ms
 
 
+@pytest.mark.landing
 def test_a_drive_that_is_set_otherwise_stops_in_the_published_time(tmp_path: Path) -> None:
     bench = Silent(tmp_path, TU4, "fu1", SILENCE, P151=0.0)
     bench.run_the_drive()
@@ -136,6 +137,7 @@ def test_a_drive_that_is_set_otherwise_stops_in_the_published_time(tmp_path: Pat
     assert "200 ms: disable voltage" in trip.message
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("drive", [SILENCE, THEN_SILENCE])
 def test_a_watch_that_is_changed_while_the_bridge_runs_counts_no_more(tmp_path: Path, drive: str) -> None:
     bench = Silent(tmp_path, TU4, "fu1", drive, P151=300.0)

@@ -73,6 +73,7 @@ def test_being_heard_again_does_not_shorten_the_pause(tmp_path: Path) -> None:
     assert len(starts(quick, quick.now - 300)) <= 31
 
 
+@pytest.mark.landing
 def test_after_half_a_minute_in_operation_all_is_forgotten(tmp_path: Path) -> None:
     quick = flapping(tmp_path)
     quick.run(60.0)

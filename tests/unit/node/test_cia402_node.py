@@ -431,6 +431,7 @@ def test_the_mode_can_be_another_for_a_while(booted) -> None:
     assert bench.value("axis/drive/actual/position") == -7
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("option", [2, 6])
 def test_a_start_after_a_quick_stop_enables_again(booted, option: int) -> None:
     """605Ah = 6 stays in *quick stop active* at standstill."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -35,6 +36,7 @@ def test_the_last_eight_emergencies_can_be_read(tmp_path: Path) -> None:
     assert history[0]["text"]
 
 
+@pytest.mark.landing
 def test_a_babbling_node_is_told_ten_times_a_second_and_its_last_word_arrives(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path))
     bench.run(1.0)

@@ -56,6 +56,7 @@ def test_a_scale_that_is_changed_in_any_set_is_found(tmp_path: Path) -> None:
     assert point(bench, "actual/frequency")[:2] == (25.0, Quality.GOOD)
 
 
+@pytest.mark.landing
 def test_a_scale_that_is_none_makes_no_value_with_what_was_read_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -113,6 +114,7 @@ def test_a_stop_is_taken_with_a_setpoint_that_has_lost_its_word(tmp_path: Path) 
     assert bench.sent(0x205)[-1].data.hex()[:4] == "7e04"
 
 
+@pytest.mark.landing
 def test_a_setpoint_keeps_its_word_when_its_scale_is_changed_and_says_so(tmp_path: Path) -> None:
     """P105 from 50 to 100 Hz: the drive runs twice as fast by the same word."""
     bench = made(tmp_path)
@@ -148,6 +150,7 @@ def test_a_setpoint_of_another_scale_is_not_sent_with_the_next_enable(tmp_path: 
     assert bench.sent(0x205)[-1].data.hex() == "7f04" + "00" * 6
 
 
+@pytest.mark.landing
 def test_a_current_that_the_site_file_scales_is_unknown_once_the_drive_is_changed(tmp_path: Path) -> None:
     """P112 is given in A, and the drive holds it in another form: §6.5.4 has no formula between them."""
     bench = made(tmp_path)

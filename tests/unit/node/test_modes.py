@@ -68,6 +68,7 @@ def change(bench: Bench, mode: Cia402Mode) -> None:
     bench.node.axis.set_mode()
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize("mapping", OF_MODE)
 def test_in_its_own_mode_everything_is_served(tmp_path: Path, mapping: str) -> None:
     bench = booted(tmp_path, mapping)

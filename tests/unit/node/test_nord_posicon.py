@@ -113,7 +113,7 @@ def test_it_goes_to_the_position_that_is_written(bench: Bench) -> None:
     assert position(bench) == pytest.approx(-4.321)
 
 
-@pytest.mark.landing(3)
+@pytest.mark.landing
 @pytest.mark.parametrize("action", [Action.STOP, Action.QUICK_STOP, Action.DISABLE_VOLTAGE])
 def test_after_a_stop_it_stays_until_a_position_is_written(bench: Bench, action: Action) -> None:
     enable(bench)
@@ -137,6 +137,7 @@ def test_a_silent_controller_stops_it(bench: Bench) -> None:
     assert bench.node.drives[0].output_hz == 0
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("number", [SETPOINT, ACTUAL])
 def test_words_that_are_no_position_follow_nothing(tmp_path: Path, number: int) -> None:
     """P546[2] or P543[2] = 4: what the drive would then be told is no position."""
@@ -162,6 +163,7 @@ def test_in_a_set_without_positions_nothing_is_followed(tmp_path: Path) -> None:
     assert sent(bench) == (ENABLE | SET_2, 0, 0)
 
 
+@pytest.mark.landing
 def test_a_drive_without_step_5_has_no_position(tmp_path: Path) -> None:
     """Factory settings: P543 and P546 have no positions."""
 
@@ -175,6 +177,7 @@ def test_a_drive_without_step_5_has_no_position(tmp_path: Path) -> None:
     assert "P543[2] is 0" in reading.reason
 
 
+@pytest.mark.landing
 def test_a_position_of_32_bits_in_one_pdo_follows_too(tmp_path: Path) -> None:
     """§6.5.7, the third view of a SK TU3-CAO; here the drive takes its speed from P105 (P600 = 1)."""
     mapping = "nord/sk-tu3-cao-pdo3"
@@ -204,6 +207,7 @@ FOUND_S = 10.0
 """Within this a change at the keypad is found."""
 
 
+@pytest.mark.landing
 def test_with_position_control_off_no_target_is_reached_and_none_is_taken(tmp_path: Path) -> None:
     """§6.5.2: without POSICON bit 8 says that the actual value is the setpoint, and so says a drive that runs
     at its set frequency without end."""
@@ -240,6 +244,7 @@ def test_what_is_changed_on_the_way_leaves_no_target_reached(
     assert [event.message for event in bench.events if "has another meaning" in event.message]
 
 
+@pytest.mark.landing
 def test_a_gear_or_another_encoder_leaves_no_position(bench: Bench) -> None:
     """§6.5.4: P607 and P608 stretch what is transferred."""
     bench.node.drives[0].parameters.at_keypad(607, 5, element=3)

@@ -223,6 +223,7 @@ enable = false
 """
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("mapping", ["nord/sk-5xxe-rj45", "nord/sk-54xe-rj45"])
 def test_nobody_tells_the_drive_a_position_unasked(make_single, mapping: str):
     bench = make_single(mapping)
@@ -315,6 +316,7 @@ def test_the_profile_of_a_node_that_has_it_is_not_written_again(make_profile):
     assert downloads(bench, before) <= {"1710"}
 
 
+@pytest.mark.landing
 def test_every_drive_has_its_own_objects_of_the_profile(make_profile):
     bench = make_profile(slot="fu3")
     start(bench, velocity=600.0)

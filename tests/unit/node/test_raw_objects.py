@@ -22,6 +22,7 @@ def test_bytes_of_a_parameter_are_read_as_the_drive_sends_them(parameters: Param
     assert (plain.value, raw.code, raw.value) == (50.0, Code.OK, "F4 01")
 
 
+@pytest.mark.landing
 def test_bytes_of_an_object_that_no_file_lists_keep_their_length(parameters: Parameters) -> None:
     assert parameters.ask(READ, OBSERVER, parameter="1018:00", raw=True).value == "04"
 
@@ -61,6 +62,7 @@ def test_rights_are_those_of_a_parameter(parameters: Parameters) -> None:
     assert parameters.write("P102", "67 00", raw=True, identity=OPERATOR).code is Code.NOT_ALLOWED
 
 
+@pytest.mark.landing
 def test_a_node_that_is_held_in_pre_operational_is_asked_and_not_written(parameters: Parameters) -> None:
     assert parameters.ask(Action.ENTER_PRE_OPERATIONAL, target="conveyor").ok
     assert parameters.ask(READ, OBSERVER, parameter="1018:00", raw=True).value == "04"

@@ -200,6 +200,7 @@ def test_the_site_file_gives_the_bound(tmp_path: Path) -> None:
     assert last_stop(bench) is IGNORED
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("more", ["", "sync_period_ms = 10"])
 def test_the_simulated_block_of_an_eds_follows(tmp_path: Path, more: str) -> None:
     shutil.copy(DEVICES / "io16.eds", tmp_path)

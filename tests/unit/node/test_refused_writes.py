@@ -85,6 +85,7 @@ def test_it_counts_once_and_is_one_event(bench: Bench, what: str) -> None:
         assert bench.number(f"{target}/supervision/refused_writes") == 1
 
 
+@pytest.mark.landing
 def test_so_does_what_a_protocol_refuses_by_itself(bench: Bench) -> None:
     before = bench.number("bridge/refused_writes")
     bench.plant.rejected(

@@ -202,6 +202,7 @@ def test_a_drive_without_an_application_says_what_is_missing(make):
 FOUR = ("axis1", "axis2", "axis3", "axis4")
 
 
+@pytest.mark.landing
 def test_four_axes_one_at_a_time(make):
     bench = make("stoeber/5000-four-axes", FOUR, "sdo_channels = [2, 3, 4]", axes=4)
     start(bench, 900.0, "lift/axis3")

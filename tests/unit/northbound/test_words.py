@@ -97,6 +97,7 @@ def check(plant: Plant, drive: str, leaf: str, outcome: Outcome | None, value: o
         assert after[LEAVES.index(leaf)] == value
 
 
+@pytest.mark.landing
 @given(written=st.one_of(_INTEGERS, _OTHERS), leaf=st.sampled_from(LEAVES))
 def test_opc_ua(written: ua.Variant, leaf: str):
     made, drive = plant(), "conveyor/fu2"
@@ -109,6 +110,7 @@ def test_opc_ua(written: ua.Variant, leaf: str):
     check(made, drive, leaf, write(made, drive, Identity(Source.OPCUA, "ann"), leaf, value), written.Value)
 
 
+@pytest.mark.landing
 @given(written=_JSON, leaf=st.sampled_from(LEAVES), shape=st.sampled_from(("bare", "object", "telegram")))
 def test_zenoh(written: object, leaf: str, shape: str):
     made, drive = plant(), "conveyor/fu3"
@@ -141,6 +143,7 @@ def test_zenoh_bare(payload: str):
     assert outcomes[0].code is Code.OUT_OF_RANGE
 
 
+@pytest.mark.landing
 @given(word=st.integers(0, 0xFFFF), leaf=st.sampled_from(LEAVES))
 def test_modbus_whose_registers_are_words(word: int, leaf: str):
     made, drive = plant(), "conveyor/fu1"

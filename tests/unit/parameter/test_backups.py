@@ -278,6 +278,7 @@ def test_nothing_is_written_of_a_set_with_one_wrong_entry(workshop: Workshop) ->
     assert "commands the drive" in _refusal(workshop, {"P102.1": 1.0, "6040:00": 1})
 
 
+@pytest.mark.landing
 def test_all_that_is_wrong_in_a_set_is_named_at_once(workshop: Workshop) -> None:
     values: dict[str, Value] = {"P102.1": 1.0, "P103.1": 999.0, "P700[1]": 1, "6040:00": 1}
     said = _refusal(workshop, values)

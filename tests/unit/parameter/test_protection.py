@@ -112,7 +112,7 @@ MANUALS: Final = [
 ]
 
 
-@pytest.mark.landing(4)
+@pytest.mark.landing(34)
 @pytest.mark.parametrize(("mapping", "name", "target"), MANUALS)
 def test_what_a_manual_calls_another_name_of_an_object_is_known_as_one(
     mapping: str, name: str, target: str
@@ -139,6 +139,7 @@ ENGINEERS: Final = [
 ]
 
 
+@pytest.mark.landing(38)
 @pytest.mark.parametrize(("mapping", "name"), ENGINEERS)
 def test_what_commands_watches_or_addresses_a_drive_is_an_engineers(mapping: str, name: str) -> None:
     names = Names(load_family(mapping))

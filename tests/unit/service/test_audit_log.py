@@ -287,6 +287,7 @@ def test_what_is_refused_pushes_nothing_out_that_was_done(tmp_path: Path) -> Non
     assert all(path.stat().st_size <= 10_000 for path in folder.iterdir())
 
 
+@pytest.mark.landing
 def test_a_flood_of_refusals_leaves_room_for_what_is_done(tmp_path: Path) -> None:
     """Lines wait for the disk in a queue of their own: it may be full of refusals."""
     plant, log, _ = logged(tmp_path, "[audit]\nevery_telegram = true\n")

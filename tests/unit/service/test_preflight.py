@@ -52,6 +52,7 @@ GOOD = certificate(-1, 1)
 PAIR = 'certificate = "c.pem"\nprivate_key = "k.pem"\n'
 
 
+@pytest.mark.landing(9)
 @pytest.mark.parametrize(
     ("contents", "keys", "expected"),
     [

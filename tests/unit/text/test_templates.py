@@ -173,6 +173,7 @@ def test_a_list_has_each_of_its_texts_once(leaves: list[str]) -> None:
     assert shown.partition("read: ")[2] == "; ".join(leaves)
 
 
+@pytest.mark.landing
 def test_templates_are_read_before_the_first_event() -> None:
     """A trip is told in the round that stops the drive: it must not wait for a disk."""
     script = (

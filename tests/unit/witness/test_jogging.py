@@ -60,6 +60,7 @@ def test_noise_does_not_hide_it(noise: int) -> None:
     assert drive.told
 
 
+@pytest.mark.landing(48)
 @pytest.mark.parametrize(("run_s", "stop_s"), [*JOGS, (0.1, 0.1), (0.3, 0.3), (0.2, 0.3), (0.3, 0.05)])
 @pytest.mark.parametrize("ramp_s", [0.2, 5.0, 10.0])
 @pytest.mark.parametrize("tpdo_s", [0.01, 0.25])

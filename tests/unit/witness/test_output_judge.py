@@ -583,6 +583,7 @@ def test_a_short_tpdo_shows_nothing() -> None:
     assert not plant.alarms
 
 
+@pytest.mark.landing
 @given(st.lists(st.sampled_from(("write", "pause", "safe", "die", "boot", "stop")), max_size=12))
 def test_an_honest_node_is_left_alone(events: list[str]) -> None:
     plant = Plant()

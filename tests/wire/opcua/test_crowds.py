@@ -95,6 +95,7 @@ async def test_a_channel_without_a_session_is_closed(tmp_path: Path, monkeypatch
         break_off(client)
 
 
+@pytest.mark.landing
 async def test_a_connection_whose_session_has_ended_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -154,6 +155,7 @@ async def test_wrong_passwords_hold_up_no_right_one(tmp_path: Path) -> None:
 
 
 class TestSubscriptions:
+    @pytest.mark.landing
     async def test_one_session_and_one_address_have_their_share(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:

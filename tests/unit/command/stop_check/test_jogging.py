@@ -247,6 +247,7 @@ motors = st.builds(
 )
 
 
+@pytest.mark.landing
 @settings(max_examples=examples(60), deadline=None)
 @given(
     motors,

@@ -281,6 +281,7 @@ def test_a_node_that_starts_anew_is_not_named() -> None:
     assert not drive.verdicts
 
 
+@pytest.mark.landing
 def test_holding_is_obeying_where_the_voltage_may_stay() -> None:
     drive = judged()
     drive.send(Sent.RAMP)
@@ -523,6 +524,7 @@ def played(bus: Bus, plan: list[tuple[tuple[str, Sent | float], float]]) -> None
         bus.run(seconds)
 
 
+@pytest.mark.landing
 @settings(max_examples=examples(300))
 @given(drives, st.floats(0, WAY_S), plans)
 def test_a_drive_that_follows_in_time_is_never_named(

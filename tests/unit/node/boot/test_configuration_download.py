@@ -49,6 +49,7 @@ value = 500
 P151_IS_500 = bytes.fromhex("2B972001F4010000")
 
 
+@pytest.mark.landing
 def test_the_configuration_is_written_once_and_read_back(tmp_path: Path) -> None:
     """BU 2500 §7.1.1: P151 is 2097h:1."""
     bench = booted(tmp_path, node=P151)

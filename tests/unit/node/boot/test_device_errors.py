@@ -130,6 +130,7 @@ def test_an_error_that_comes_again_after_the_node_was_in_operation_is_another_on
         assert bench.nmt(RESET_COMMUNICATION) == [RESET_COMMUNICATION] * times
 
 
+@pytest.mark.landing
 def test_an_operators_reset_begins_anew(tmp_path: Path) -> None:
     bench = LatchingBench(tmp_path, FAN, 0x8240, 0x8240, 0x8240)
     begin(bench)

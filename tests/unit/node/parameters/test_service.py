@@ -73,6 +73,7 @@ def test_a_parameter_is_read_by_its_name(parameters: Parameters) -> None:
     assert outcome.time < parameters.bench.now
 
 
+@pytest.mark.landing
 def test_an_object_that_no_file_lists_is_read_by_its_index(parameters: Parameters) -> None:
     # 1018h:0, number of entries: one byte
     assert parameters.ask(READ, OBSERVER, parameter="1018:00").value == 4
@@ -112,6 +113,7 @@ def test_a_value_read_a_moment_ago_is_given_without_asking(parameters: Parameter
     assert len([f for f in parameters.bench.sent(0x605) if f.data[1:3] == b"\xaa\x21"]) == before
 
 
+@pytest.mark.landing
 def test_who_accepts_no_old_value_has_the_drive_asked_each_time(parameters: Parameters) -> None:
     for count in (1, 2, 3):
         outcomes = parameters.begin(READ, parameter="P426")
@@ -300,12 +302,14 @@ def test_a_warning_comes_with_each_tenth(parameters: Parameters) -> None:
 # points
 
 
+@pytest.mark.landing
 def test_points_are_read_when_the_node_is_there(parameters: Parameters) -> None:
     assert parameters.point("p102") == (2.0, Quality.GOOD)
     assert parameters.point("p560") == (1, Quality.GOOD)
     assert parameters.point("p102", "conveyor/fu2") == (2.0, Quality.GOOD)
 
 
+@pytest.mark.landing
 def test_a_polled_point_is_as_old_as_its_period(parameters: Parameters) -> None:
     parameters.bench.run(20.0)
     reading = parameters.bench.plant.image.read("conveyor/fu1/parameter/p700_1")

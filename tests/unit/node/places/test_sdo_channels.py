@@ -45,6 +45,7 @@ def test_the_second_drives_own_maximum_frequency_is_read_over_its_own_channel(tm
     assert "fu2: P105 is 87 Hz in the drive, 50 in the site file; the drive's counts" in status
 
 
+@pytest.mark.landing
 def test_without_the_channel_the_site_file_counts(tmp_path: Path) -> None:
     bench = bench_with(tmp_path, 'supervision = "none"')
     assert full_of(bench, "conveyor/fu2") == 50.0
@@ -110,6 +111,7 @@ def same_as_first() -> Family:
     return family.model_copy(update={"sdo": servers})
 
 
+@pytest.mark.landing
 def test_polls_take_a_channel_of_their_own_where_one_reaches_the_same(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path, node=OPENED), family=same_as_first())
     bench.run(2.0)

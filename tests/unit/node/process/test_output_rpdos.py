@@ -102,6 +102,7 @@ def test_nobody_else_writes_them_and_anybody_stops_them(bench: Bench) -> None:
     assert bench.value("shaft/supervision/refused_writes") == 1
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("action", sorted(STOP_ACTIONS))
 def test_a_stop_by_anybody_ends_what_a_dead_owner_left_on(bench: Bench, action: Action) -> None:
     """``hold`` speaks of silence, never of somebody's Stop (shared design, watchdog, third edition)."""
@@ -152,6 +153,7 @@ def test_a_bridge_that_hangs_leaves_nothing_active(bench: Bench) -> None:
     assert held(bench)["valves"] == 0
 
 
+@pytest.mark.landing(4)
 @pytest.mark.parametrize(
     ("values", "message"),
     [
@@ -171,6 +173,7 @@ def test_what_the_node_does_by_itself_is_read(bench: Bench) -> None:
     assert bench.number("shaft/supervision/worst_case_stop_ms") > 200
 
 
+@pytest.mark.landing(5)
 @pytest.mark.parametrize(
     ("name", "size", "value", "why"),
     [

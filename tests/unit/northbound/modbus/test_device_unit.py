@@ -65,6 +65,7 @@ class TestModbus:
         assert words[1] == 7, "config_error: no TPDO carries the speed"
         assert words[13] == 0b10, "of the values the second"
 
+    @pytest.mark.landing(6)
     @pytest.mark.parametrize(("start", "count"), [(33, 1), (32, 1), (36, 1), (0, 1), (9, 2), (38, 1)])
     def test_what_is_not_there_or_split(self, unit: DeviceUnit, start: int, count: int) -> None:
         with pytest.raises(ModbusException) as told:

@@ -346,6 +346,7 @@ def test_mask_write(rig: Rig):
 WORD = st.integers(0, 0xFFFF)
 
 
+@pytest.mark.landing
 @given(WORD, WORD, WORD)
 def test_a_mask_write_keeps_the_bits_of_one_mask_and_takes_the_others_of_the_other(
     held: int, and_mask: int, or_mask: int
@@ -426,6 +427,7 @@ def test_coils_are_bits_of_the_control_word(rig: Rig):
     assert rig.fu1.channel.control_word == 0x0C7F
 
 
+@pytest.mark.landing
 def test_a_late_outcome_is_answered_when_it_comes(rig: Rig, monkeypatch: pytest.MonkeyPatch):
     waiting: list[Reply] = []
 

@@ -91,6 +91,7 @@ def test_who_may_not_set_parameters_is_exception_01(station: Station) -> None:
     assert station.refused(station.write("p102", 1.0, reader)) == ExceptionCode.ILLEGAL_FUNCTION
 
 
+@pytest.mark.landing
 def test_a_value_that_was_never_read_is_not_served(tmp_path: Path) -> None:
     bench = Bench(write_site(tmp_path), present=False)
     bench.run(1.0)

@@ -99,6 +99,7 @@ def test_a_point_that_was_added_later_moves_no_register(mapping: str) -> None:
     assert set(before.rows) <= set(after.rows)
 
 
+@pytest.mark.landing(22)
 @pytest.mark.parametrize("mapping", family_names())
 def test_every_run_of_every_familys_export_is_read(mapping: str) -> None:
     plant = family_plant(mapping)
@@ -128,6 +129,7 @@ def absent_of(plant: Plant, drive: str, run: Run) -> list[Row]:
     return [row for row, name in named if name in index and not plant.image.read(name).quality.has_value]
 
 
+@pytest.mark.landing(22)
 @pytest.mark.parametrize("mapping", family_names())
 def test_every_value_that_is_not_good_says_so(mapping: str) -> None:
     """Registers 22 and 23 for the first 32, the discrete inputs from 4096 on for all."""
@@ -237,6 +239,7 @@ class TestMirror:
         assert rig.ask(request) == b"\x97\x0b"
         assert rig.read(3, 0, 1) != [0x047F]
 
+    @pytest.mark.landing(22)
     @pytest.mark.parametrize("mapping", family_names())
     def test_it_is_behind_all_other_registers(self, mapping: str) -> None:
         assert PARAMETERS + 2 * MOST_PARAMETERS <= MIRROR

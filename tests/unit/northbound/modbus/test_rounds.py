@@ -118,6 +118,7 @@ def test_a_good_client_waits_for_no_crowd(rig: Rig, count: int, pipelined: int, 
     assert max(found[1:]) <= 2 * SLICE, found
 
 
+@pytest.mark.landing
 def test_beside_others_of_its_own_address_a_client_has_its_turn_as_a_connection(rig: Rig) -> None:
     loop = Loop()
     crowd = [Client(loop, rig, "10.0.0.2", floods=True, pipelined=64) for _ in range(50)]

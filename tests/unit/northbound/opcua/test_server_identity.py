@@ -123,6 +123,7 @@ def test_a_uri_that_is_not_the_certificates_is_a_fault_of_the_site_file(tmp_path
     assert files(tmp_path) == before
 
 
+@pytest.mark.landing(2)
 @pytest.mark.parametrize("damaged", [CERTIFICATE, KEY])
 def test_what_is_damaged_is_named_and_stays(tmp_path: Path, damaged: str) -> None:
     server_identity(opcua(), tmp_path)

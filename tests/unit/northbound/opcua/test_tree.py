@@ -94,6 +94,7 @@ def test_a_property_has_the_time_at_which_the_server_started(tree: Tree, space: 
     assert first.SourceTimestamp == first.ServerTimestamp == second.SourceTimestamp is not None
 
 
+@pytest.mark.landing(6)
 @pytest.mark.parametrize(
     "where",
     [
@@ -119,6 +120,7 @@ def test_two_nodes_of_one_id_are_an_error(space: AddressSpace) -> None:
 
 
 class TestWatching:
+    @pytest.mark.landing(6)
     @pytest.mark.parametrize(
         ("name", "attribute"),
         [

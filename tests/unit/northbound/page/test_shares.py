@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -141,6 +142,7 @@ def test_beside_idle_connections_of_its_own_address_a_browser_is_served() -> Non
         front.connections.closed(number)
 
 
+@pytest.mark.landing
 def test_a_crowd_of_addresses_takes_no_connection_on_which_something_is_asked() -> None:
     front = Front()
     front.opens(-1, doing=Doing.BUSY)

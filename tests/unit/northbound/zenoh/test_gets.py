@@ -6,6 +6,8 @@ import asyncio
 import json
 from typing import Any, cast
 
+import pytest
+
 from bridge.config import ZenohTable
 from bridge.northbound.zenoh import ZenohServer
 from tests.support.views import view_of
@@ -68,6 +70,7 @@ class Hall:
         return get
 
 
+@pytest.mark.landing
 async def test_a_get_that_is_read_slowly_makes_room_and_says_so() -> None:
     hall = Hall()
     slow = [await hall.ask() for _ in range(PLACES)]

@@ -66,6 +66,7 @@ def system(folder: Path, *parts: str) -> SystemOf:
     return SystemOf(load_project(path))
 
 
+@pytest.mark.landing
 def test_the_site_file_is_checked_as_it_is_now(tmp_path: Path) -> None:
     facts = system(tmp_path)
     assert "changed" not in facts.site_file()

@@ -94,6 +94,7 @@ def test_with_a_heartbeat_guard_requests_are_not_answered(bench):
     assert bench.guard() == []
 
 
+@pytest.mark.landing
 def test_life_guarding_begins_with_the_first_request_and_leads_to_pre_operational(live):
     live.write(0x100C, 0, 100, 2)
     live.write(0x100D, 0, 3, 1)

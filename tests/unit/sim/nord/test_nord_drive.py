@@ -221,6 +221,7 @@ def test_a_fault_whose_cause_lasts_is_not_acknowledged(driver):
     assert driver.drive.state is NordState.SWITCH_ON_INHIBITED
 
 
+@pytest.mark.landing(8)
 @pytest.mark.parametrize(
     ("direction", "setpoint", "hertz"),
     [

@@ -91,6 +91,7 @@ def test_6_5_8_another_mapping_and_identifier_for_tpdo1(tu4):
     assert PdoCodec((control, setpoint_3)).unpack(frame.data) == (0x047E, 0x0333)
 
 
+@pytest.mark.landing
 def test_6_5_5_bit_30_of_an_identifier_reads_1(tu4):
     client = Client(tu4)
     assert client.write(0x1800, 1, (0x4000_0201).to_bytes(4, "little"))[1].startswith("60")

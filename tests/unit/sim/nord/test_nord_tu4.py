@@ -32,6 +32,7 @@ def test_a_mapping_of_less_than_four_words_is_not_evaluated(live):
     assert live.node.slave.rpdos_ignored == 1
 
 
+@pytest.mark.landing
 def test_dummy_words_fill_a_telegram(live):
     live.nmt(0x80)
     live.write(0x1600, 0, 0, 1)

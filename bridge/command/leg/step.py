@@ -330,16 +330,17 @@ def _has_been_sent(draft: Draft, word: int) -> bool:
 
 def _start(draft: Draft, request: Request, direction: int) -> None:
     words = draft.settings.words
-    bits = {0: 0, 1: words.forward, -1: words.reverse}.get(direction)
-    if bits is None:
+    runs = {0: words.run, 1: words.run | words.forward, -1: words.run | words.reverse}
+    word = runs.get(direction)
+    if word is None:
         raise Refusal(Code.OUT_OF_RANGE, Text.of("request.direction_range", direction=direction))
-    if direction < 0 and not bits:
+    if direction < 0 and not words.reverse:
         # Forward is what such a drive does with a positive setpoint: that needs no bit.
         raise Refusal(Code.OUT_OF_RANGE, Text.of("request.direction_by_sign"))
     look_at_way(draft)
     refusal = _why_not_started(draft)
     owners.hear(draft, request)
-    start.begin(draft, words.run | bits, refusal)
+    start.begin(draft, word, refusal)
 
 
 def _why_not_started(draft: Draft) -> Refusal:

@@ -315,6 +315,13 @@ class TestTrip:
         assert running.value("supervision/watchdog_state") == 2
         assert running.value("status/status_word") == ENABLED
 
+    def test_is_known_at_once_where_a_deadline_is_brought_forward(self, running: Hall):
+        running.drive.channel.link.pdo_deadline_s = None
+        assert running.plant.next_deadline(100.0) == pytest.approx(100.2)
+        running.drive.channel.link.pdo_deadline_s = 0.1
+        running.drive.channel.plan_anew()
+        assert running.plant.next_deadline(100.0) == pytest.approx(100.1)
+
     def test_comes_at_the_time_the_plant_asked_for(self, running: Hall):
         running.drive.channel.link.pdo_deadline_s = None
         assert running.plant.next_deadline(100.0) == pytest.approx(100.2)

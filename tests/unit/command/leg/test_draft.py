@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from bridge.command.leg.effect import Heard
@@ -31,6 +33,18 @@ def test_a_stop_is_the_bridges_and_drops_the_setpoints() -> None:
     assert not draft.is_asked
     draft.stop(SHUT_DOWN, is_asked=True)
     assert draft.is_asked
+
+
+@pytest.mark.parametrize("resumes", [True, False])
+def test_a_stop_of_the_bridge_leaves_it_asked_only_where_an_acknowledge_resumes(resumes: bool) -> None:
+    leg = running_nord()
+    draft = draft_of(leg)
+    draft.settings = replace(draft.settings, acknowledge_resumes=resumes)
+    draft.stop(SHUT_DOWN)
+    assert not draft.is_asked, "nobody has asked"
+    draft.stop(SHUT_DOWN, is_asked=True)
+    draft.stop(SHUT_DOWN)
+    assert draft.is_asked is resumes
 
 
 def test_a_telegram_counts_from_when_it_came_and_none_from_a_newer_one() -> None:

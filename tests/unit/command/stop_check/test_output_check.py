@@ -79,6 +79,7 @@ class Line:
 
 def test_a_stop_is_forwarded_when_it_is_decided_and_judged_when_it_is_handed_over() -> None:
     following = OutputStopCheck()
+    assert (following.last_stop, following.follows) == (NONE, True)
     following.on_settled(None, is_there=True)
     assert (following.last_stop, following.is_judged) == (NONE, False)
     following.on_settled((0,), is_there=True)

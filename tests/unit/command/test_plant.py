@@ -315,6 +315,12 @@ class TestTrip:
         assert running.value("supervision/watchdog_state") == 2
         assert running.value("status/status_word") == ENABLED
 
+    def test_a_gap_of_the_bridge_changes_what_its_bus_is_sent(self, running: Hall):
+        running.plant.take_changed("can0")
+        running.drive.channel.on_bridge_gap(100.0)
+        assert running.plant.take_changed("can0") == {"conveyor"}
+        assert running.plant.take_changed("can0") == set()
+
     def test_is_known_at_once_where_a_deadline_is_brought_forward(self, running: Hall):
         running.drive.channel.link.pdo_deadline_s = None
         assert running.plant.next_deadline(100.0) == pytest.approx(100.2)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from bridge.base.errors import Fault, FileFaults
+from bridge.text import Words
 from bridge.tomlfile import Key, TomlFile
 from bridge.tomlfile.file import Model, dotted, validated
 
@@ -176,9 +177,9 @@ class MergedFile:
         file, source = self.place(key)
         return file.line(source)
 
-    def fault(self, key: Sequence[int | str], message: str, hint: str = "") -> None:
+    def fault(self, key: Sequence[int | str], said: Words, hint: Words = "") -> None:
         file, source = self.place(key)
-        self.faults.append(Fault(str(file.path), file.line(source), dotted(source), message, hint))
+        self.faults.append(Fault(str(file.path), file.line(source), dotted(source), said, hint))
 
     def validate(self, model: type[Model]) -> Model | None:
         """Content as ``model``, or None with every fault noted."""

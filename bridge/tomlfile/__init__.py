@@ -4,3 +4,4 @@ from bridge.tomlfile.file import RawTable as RawTable
 from bridge.tomlfile.file import TomlFile as TomlFile
 from bridge.tomlfile.file import dotted as dotted
 from bridge.tomlfile.lines import Key as Key
+from bridge.tomlfile.unfit import Unfit as Unfit

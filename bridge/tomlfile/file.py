@@ -14,7 +14,7 @@ from typing import Any, Final, TypeVar, cast
 from pydantic import BaseModel, ValidationError
 
 from bridge.base.errors import Fault, FileFaults
-from bridge.text import Words
+from bridge.text import Said, Text, Words
 from bridge.tomlfile.lines import Key, key_lines
 from bridge.tomlfile.messages import explain
 
@@ -70,11 +70,11 @@ class TomlFile:
             place = _SYNTAX_PLACE.search(str(error))
             line = int(place[1]) if place and place[1] else text.rstrip("\n").count("\n") + 1
             message = _SYNTAX_PLACE.sub("", str(error))
-            raise self._unreadable(line, f"is not TOML: {message}", _hint(text, line)) from error
+            raise self._unreadable(line, Text.of("toml.syntax", why=message), _hint(text, line)) from error
         except RecursionError as error:
-            raise self._unreadable(0, "is nested too deeply") from error
+            raise self._unreadable(0, Text.of("toml.nested")) from error
         except ValueError as error:  # a number of more digits than Python reads
-            raise self._unreadable(0, f"cannot be read: {error}") from error
+            raise self._unreadable(0, Text.of("toml.unreadable", why=str(error))) from error
 
     @cached_property
     def _lines(self) -> dict[Key, int]:
@@ -85,15 +85,15 @@ class TomlFile:
         try:
             content = self.path.read_bytes()
         except OSError as error:
-            raise self._unreadable(0, f"cannot be read: {error.strerror}") from error
+            raise self._unreadable(0, Text.of("toml.unreadable", why=str(error.strerror))) from error
         try:
             content = content.removeprefix(codecs.BOM_UTF8)
             return content.decode().replace("\r\n", "\n")
         except UnicodeDecodeError as error:
             line = content[: error.start].count(b"\n") + 1
-            raise self._unreadable(line, "is not UTF-8", "save it as UTF-8") from error
+            raise self._unreadable(line, Text.of("toml.not_utf8"), Text.of("toml.save_as_utf8")) from error
 
-    def _unreadable(self, line: int, message: str, hint: str = "") -> FileFaults:
+    def _unreadable(self, line: int, message: Text, hint: Said = "") -> FileFaults:
         return FileFaults([Fault(str(self.path), line, "", message, hint)])
 
     @property
@@ -131,7 +131,7 @@ def dotted(key: Sequence[int | str]) -> str:
 
 
 def validated(
-    data: dict[str, Any], model: type[Model], fault: Callable[[Key, str, str], None]
+    data: dict[str, Any], model: type[Model], fault: Callable[[Key, Text, Said], None]
 ) -> Model | None:
     """``data`` as ``model``, or None with every ``fault`` noted."""
     try:
@@ -161,6 +161,6 @@ def _real_key(data: Any, location: Sequence[int | str]) -> Key:
     return tuple(key)
 
 
-def _hint(text: str, line: int) -> str:
+def _hint(text: str, line: int) -> Said:
     found = _DECIMAL_COMMA.search(next(iter(text.split("\n")[line - 1 : line]), ""))
-    return f"a number has a decimal point: {found[1]}.{found[2]}" if found else ""
+    return Text.of("toml.decimal_point", whole=found[1], rest=found[2]) if found else ""

@@ -12,77 +12,109 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from bridge.text import Said, Text
+from bridge.tomlfile.unfit import Unfit
+
 _LONGEST_SHOWN: Final = 40
 
-_SENTENCES: Final = {
-    "missing": "is missing",
-    "extra_forbidden": "is not a key that belongs here",
-    "string_type": "must be a text in quotes",
-    "int_type": "must be a whole number",
-    "float_type": "must be a number",
-    "bool_type": "must be true or false",
-    "list_type": "must be a list",
-    "dict_type": "must be a table",
-    "model_type": "must be a table",
-    "finite_number": "must be a finite number",
-    "literal_error": "must be {expected}",
-    "enum": "must be {expected}",
-    "greater_than_equal": "must be at least {ge}",
-    "less_than_equal": "must be at most {le}",
-    "greater_than": "must be more than {gt}",
-    "less_than": "must be less than {lt}",
-    "too_short": "must have {min_length} or more entries",
-    "too_long": "must have {max_length} entries or fewer",
-    "string_too_short": "must not be empty",
-    "string_too_long": "must have at most {max_length} characters",
+_WRONG_TYPE: Final = {
+    "string_type": Text.of("toml.type_text"),
+    "int_type": Text.of("toml.type_whole_number"),
+    "float_type": Text.of("toml.type_number"),
+    "bool_type": Text.of("toml.type_bool"),
+    "list_type": Text.of("toml.type_list"),
+    "dict_type": Text.of("toml.type_table"),
+    "model_type": Text.of("toml.type_table"),
+    "finite_number": Text.of("toml.finite"),
 }
 _SAYS_ALL: Final = ("missing", "extra_forbidden", "too_short", "too_long")
 """Kinds of fault for which the value itself would tell nothing."""
 
 
-def explain(model: type[BaseModel], detail: ErrorDetails) -> tuple[str, str]:
+def explain(model: type[BaseModel], detail: ErrorDetails) -> tuple[Text, Said]:
     """Message and hint for one fault that pydantic found in ``model``'s data."""
-    kind = detail["type"]
-    context = {name: _plain(value) for name, value in detail.get("ctx", {}).items()}
-    if kind in _SENTENCES:
-        message = _SENTENCES[kind].format(**context)
-    else:
-        text = detail["msg"].removeprefix("Value error, ")
-        message = f"{text[:1].lower()}{text[1:]}"
-    if kind not in _SAYS_ALL:
-        message += _shown(detail.get("input"))
-    return message, _hint(model, detail)
+    said = _said(detail)
+    shown = "" if detail["type"] in _SAYS_ALL else _shown(detail.get("input"))
+    if shown:
+        said = Text.of("toml.not", said=said, shown=shown)
+    return said, _hint(model, detail)
 
 
-def _plain(value: object) -> object:
-    return value.replace("'", '"') if isinstance(value, str) else value
+def _said(detail: ErrorDetails) -> Text:
+    facts: dict[str, Any] = detail.get("ctx", {})
+    match detail["type"]:
+        case "value_error" if isinstance(facts["error"], Unfit):
+            return facts["error"].said
+        case "missing":
+            return Text.of("toml.missing")
+        case "extra_forbidden":
+            return Text.of("toml.unknown_key")
+        case "literal_error" | "enum":
+            *others, last = (_in_quotes(one) for one in _choices(detail))
+            if others:
+                return Text.of("toml.one_of", choices=tuple(others), last=last)
+            return Text.of("toml.only", choice=last)
+        case "greater_than_equal":
+            return Text.of("toml.at_least", least=str(facts["ge"]))
+        case "less_than_equal":
+            return Text.of("toml.at_most", most=str(facts["le"]))
+        case "greater_than":
+            return Text.of("toml.more_than", limit=str(facts["gt"]))
+        case "less_than":
+            return Text.of("toml.less_than", limit=str(facts["lt"]))
+        case "too_short":
+            return Text.of("toml.too_few", least=str(facts["min_length"]))
+        case "too_long":
+            return Text.of("toml.too_many", most=str(facts["max_length"]))
+        case "string_too_short":
+            return Text.of("toml.empty")
+        case "string_too_long":
+            return Text.of("toml.too_long", most=str(facts["max_length"]))
+        case kind:
+            return _WRONG_TYPE.get(kind) or _of_pydantic(detail["msg"])
+
+
+def _of_pydantic(message: str) -> Text:
+    words = message.removeprefix("Value error, ")
+    words = f"{words[:1].lower()}{words[1:]}"
+    return Text.plain(words)
+
+
+def _choices(detail: ErrorDetails) -> list[str]:
+    """The values that a choice has, out of pydantic's sentence of them."""
+    return re.findall(r"'([^']*)'", str(detail.get("ctx", {}).get("expected")))
+
+
+def _in_quotes(text: str) -> str:
+    return f'"{text}"'
 
 
 def _shown(value: object) -> str:
-    """``, not …`` with the value as it is in the file; nothing for tables and lists."""
+    """The value as it is in the file; nothing for tables, lists and what is too long for a line."""
     if isinstance(value, bool | str):
         text = json.dumps(value, ensure_ascii=False)
     elif isinstance(value, float) or (isinstance(value, int) and abs(value) < 1 << 64):
         text = str(value)
     else:
         return ""
-    return f", not {text}" if len(text) <= _LONGEST_SHOWN else ""
+    return text if len(text) <= _LONGEST_SHOWN else ""
 
 
-def _hint(model: type[BaseModel], detail: ErrorDetails) -> str:
+def _hint(model: type[BaseModel], detail: ErrorDetails) -> Said:
     location = detail["loc"]
     fields = _fields(model, location)
     name = str(location[-1]) if location else ""
     if detail["type"] == "extra_forbidden":
         near = difflib.get_close_matches(name, fields, n=1)
-        return f"did you mean {near[0]}?" if near else f"known here: {', '.join(sorted(fields))}"
-    if detail["type"] in ("literal_error", "enum"):
-        choices = re.findall(r"'([^']*)'", str(detail.get("ctx", {}).get("expected")))
-        near = difflib.get_close_matches(str(detail["input"]), choices, n=1)
         if near:
-            return f'did you mean "{near[0]}"?'
+            return Text.of("toml.did_you_mean", name=near[0])
+        return Text.of("toml.known_here", names=tuple(sorted(fields)))
+    if detail["type"] in ("literal_error", "enum"):
+        near = difflib.get_close_matches(str(detail["input"]), _choices(detail), n=1)
+        if near:
+            return Text.of("toml.did_you_mean", name=_in_quotes(near[0]))
     field = fields.get(name)
-    return (field.description or "") if field else ""
+    return Text.plain(field.description) if field and field.description else ""
 
 
 def _fields(model: type[BaseModel], location: Sequence[int | str]) -> dict[str, FieldInfo]:

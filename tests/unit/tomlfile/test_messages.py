@@ -7,6 +7,8 @@ from typing import Literal
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from bridge.text import Text, render
+from bridge.tomlfile import Unfit
 from bridge.tomlfile.messages import explain
 
 
@@ -16,6 +18,7 @@ class Table(BaseModel):
     kind: Literal["red", "green"] = "red"
     share: float = Field(0.5, allow_inf_nan=False)
     odd: int = 1
+    small: int = 1
 
     @field_validator("odd")
     @classmethod
@@ -24,12 +27,20 @@ class Table(BaseModel):
             raise ValueError("Must be odd")
         return value
 
+    @field_validator("small")
+    @classmethod
+    def _is_small(cls, value: int) -> int:
+        if value > 9:
+            raise Unfit(Text.of("toml.less_than", limit=10))
+        return value
+
 
 def told(**data: object) -> tuple[str, str]:
     with pytest.raises(ValidationError) as caught:
         Table.model_validate(data)
     (detail,) = caught.value.errors()
-    return explain(Table, detail)
+    message, hint = explain(Table, detail)
+    return render(message), render(hint)
 
 
 @pytest.mark.parametrize(
@@ -40,11 +51,12 @@ def told(**data: object) -> tuple[str, str]:
         ({"name": [1]}, "must be a text in quotes", "a short name"),
         ({"name": "x" * 51}, "must have at most 50 characters", "a short name"),
         ({"odd": 2}, "must be odd, not 2", ""),
+        ({"small": 12}, "must be less than 10, not 12", ""),
         ({"share": float("inf")}, "must be a finite number, not inf", ""),
         ({"kind": "gren"}, 'must be "red" or "green", not "gren"', 'did you mean "green"?'),
         ({"kind": "blue"}, 'must be "red" or "green", not "blue"', ""),
         ({"nmae": 5}, "is not a key that belongs here", "did you mean name?"),
-        ({"zzz": 5}, "is not a key that belongs here", "known here: kind, name, odd, share"),
+        ({"zzz": 5}, "is not a key that belongs here", "known here: kind, name, odd, share, small"),
     ],
 )
 def test_a_sentence_with_the_value_and_what_would_be_right(
@@ -55,3 +67,11 @@ def test_a_sentence_with_the_value_and_what_would_be_right(
 
 def test_a_number_that_no_line_could_show_is_left_out() -> None:
     assert told(name=1 << 64)[0] == "must be a text in quotes"
+
+
+def test_a_validators_text_keeps_its_code() -> None:
+    with pytest.raises(ValidationError) as caught:
+        Table.model_validate({"small": 12})
+    (detail,) = caught.value.errors()
+    message, _ = explain(Table, detail)
+    assert render(message, "de") == "muss weniger als 10 sein, nicht 12"

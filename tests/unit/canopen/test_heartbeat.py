@@ -140,6 +140,7 @@ def test_what_somebody_else_asked_for_counts_as_heard() -> None:
     one = NodeGuard(5, 0.5, 3)
     assert one.on_frame(says(0x05, 10.0))
     assert one.next_deadline() is None
+    assert not one.on_time(19.0), "nobody guards it"
     one.expect(20.0)
     one.reset()
     assert not one.on_time(99.0)

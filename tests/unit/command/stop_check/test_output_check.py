@@ -338,6 +338,15 @@ def test_an_output_that_changes_after_it_had_followed_is_named(output: StoppedOu
     assert line.ended == [(FOLLOWED, WAY_S), (IGNORED, BOUND_S)]
 
 
+def test_one_that_is_ignored_at_the_end_of_the_bound_is_not_read_at_once_to_say_the_same() -> None:
+    line = Line(VALVES)
+    line.tells(0, WAY_S)
+    line.tells(0x81, BOUND_S)
+    due = line.stop_check.next_reading()
+    assert due is not None
+    assert due > BOUND_S
+
+
 def test_one_that_changes_within_the_bound_is_read_or_heard_again_after_it() -> None:
     line = Line(VALVES)
     line.tells(0, WAY_S)

@@ -56,9 +56,10 @@ class NodeGuard:
         self.guard_time_s = guard_time_s
         self.life_time_s = guard_time_s * life_time_factor
         self.toggle_errors = 0
-        self._toggle: int | None = 0
+        self._toggle: int | None = None
         self._due: float | None = None
-        self._last: float | None = None
+        """Time of the next request; None while the node is not guarded."""
+        self._last = 0.0
         self._frames: list[Frame] = []
 
     def on_frame(self, frame: Frame) -> bool:
@@ -84,16 +85,16 @@ class NodeGuard:
         self._toggle = None
 
     def reset(self) -> None:
-        self._due = self._last = None
+        self._due = None
 
     def next_deadline(self) -> float | None:
-        if self._due is None or self._last is None:
+        if self._due is None:
             return None
         return min(self._due, self._last + self.life_time_s)
 
     def on_time(self, now: float) -> bool:
         """Send what is due; True once when the node has been silent for too long."""
-        if self._due is None or self._last is None:
+        if self._due is None:
             return False
         if now >= self._last + self.life_time_s:
             self.reset()

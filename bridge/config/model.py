@@ -62,7 +62,7 @@ class SiteTable(Table):
     name: Name = Field(description="a name for this site, lower_snake_case")
     state_dir: str = "/var/lib/drivebridge"
     runtime_dir: str = Field("/run/drivebridge", description="folder for the socket between our processes")
-    all_ports: bool = Field(False, description="whether to start only where each port can be opened")
+    all_ports: bool = Field(False, description="true: starts only where each port can be opened")
     front_memory_mb: int = Field(400, ge=200, le=1_000_000, description="200…1000000 MB")
 
 
@@ -108,7 +108,9 @@ def pdo_table(tables: Sequence[PdoTable], number: int, first: int) -> PdoTable |
 class AcceptsTable(Table):
     """Risks that a site accepts, each with its reason."""
 
-    runs_on: Reason | None = Field(None, description="why the drive may run on when the bridge falls silent")
+    runs_on: Reason | None = Field(
+        None, description="reason why the drive may run on when the bridge falls silent"
+    )
 
 
 class CommandedTable(Table):
@@ -239,7 +241,7 @@ class NodeTable(Table):
     mapping: str = Field(description="a file below mappings/ without .toml, such as nord/sk-tu4-cao")
     modules: list[Annotated[str, Field(min_length=1)]] = Field(
         default_factory=list[str],
-        description="what is plugged into a coupler, in its order: order codes, names or numbers of its EDS",
+        description="modules of a coupler, in their order: order codes, names or numbers of its EDS",
     )
     supervision: Literal["heartbeat", "guarding", "none"] = "heartbeat"
     supervision_ms: int = Field(200, ge=20, le=65535, description="20…65535 ms")
@@ -266,7 +268,7 @@ class NodeTable(Table):
     )
     outputs: OutputsTable = Field(
         default_factory=lambda: OutputsTable.model_validate({}),
-        description="who commands the outputs of a node without drives",
+        description="owner of the outputs of a node without drives",
     )
     drive: list[DriveTable] = Field(
         default_factory=list[DriveTable], description="a [[bus.node.drive]] table for each drive"

@@ -106,7 +106,8 @@ class Output(Signal):
     """One object of a PDO that the node receives: number sent = (value − offset) / factor."""
 
     on_expiry: OnExpiry = Field(
-        0, description='what it gets when its controller falls silent: a value, or "hold" for the last one'
+        0,
+        description='value when its controller falls silent: a number, or "hold" for the last one',
     )
     error_mode: Ref | None = Field(
         None, description="says whether it takes the error value when the node leaves Operational (CiA 401)"

@@ -77,7 +77,7 @@ class FaultEntry(Table):
     """Cause and remedy of a fault, in our own words."""
 
     name: FaultName = Field(description="a number of `texts`, an event, an event and its cause, or a code")
-    source: str = Field("", description="where the manual has it")
+    source: str = Field("", description="place in the manual")
     en: Explanation = Field(default_factory=lambda: Explanation.model_validate({}))
     de: Explanation = Field(default_factory=lambda: Explanation.model_validate({}))
 
@@ -85,8 +85,8 @@ class FaultEntry(Table):
 class Advised(Table):
     """General advice in one language, always with both sentences."""
 
-    cause: str = Field(min_length=1, description="what it often is, as the rest of a sentence")
-    remedy: str = Field(min_length=1, description="what to do, in whole sentences")
+    cause: str = Field(min_length=1, description="most frequent cause, as the rest of a sentence")
+    remedy: str = Field(min_length=1, description="remedy, in whole sentences")
 
 
 class Advice(Table):
@@ -113,14 +113,14 @@ class FaultNumbers(Table):
         default_factory=list[str], description="faults with which the drive itself answers a silent bus"
     )
     prefix: str = ""
-    form: FaultForm = Field("", description="how the maker writes a number that the drive tells")
+    form: FaultForm = Field("", description="form in which the maker writes a number that the drive tells")
     form_to: float | None = Field(None, description="numbers above it are written as they are")
     elsewhere: Wording | None = Field(
-        None, description="which manual knows more of a fault that has general advice alone"
+        None, description="manual that knows more of a fault that has general advice alone"
     )
     kinds: dict[FaultName, str] = Field(
         default_factory=dict[str, str],
-        description="what kind of fault it is, an entry of `advice`, by what a [[fault]] would be called",
+        description="kind of each fault, an entry of `advice`, by what a [[fault]] would be called",
     )
     other_kind: str | None = Field(None, description="the kind of every fault that `kinds` does not have")
     advice: dict[str, Advice] = Field(

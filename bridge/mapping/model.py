@@ -42,8 +42,8 @@ class FamilyTable(Table):
     )
     read_only: str = Field(
         "",
-        description="why the bridge writes nothing into such a device, neither outputs nor parameters: what "
-        "`check` says of it and a refused write is told. Left out: it is written like any other",
+        description="reason why the bridge writes neither outputs nor parameters into such a device, as "
+        "`check` says and a refused write is told. Left out: it is written like any other",
     )
     template: bool = Field(False, description="true: it can only be extended, no site can use it")
     preferred: bool = Field(
@@ -84,8 +84,8 @@ class Handshake(Table):
     """Handover of a position to the drive: the bridge does it when the value is written."""
 
     value: Name = Field(description="the command value that is handed over, such as position")
-    bit: Bit = Field(description="of the control word: its rising edge says that there is a new one")
-    acknowledge_bit: Bit = Field(description="of the status word: 1 when the drive has taken it")
+    bit: Bit = Field(description="bit of the control word: its rising edge says that there is a new one")
+    acknowledge_bit: Bit = Field(description="bit of the status word: 1 when the drive has taken it")
 
 
 class ControlWord(Table):
@@ -177,7 +177,7 @@ class Family(Table):
     extends: str | None = Field(None, description='another mapping, such as "nord/sk-tu4-cao"')
     without: list[str] = Field(
         default_factory=list[str],
-        description="what this file leaves out of the one it extends, such as `parameter:P150`",
+        description="parts that this file leaves out of the one it extends, such as `parameter:P150`",
     )
     family: FamilyTable
     identity: IdentityRule = Field(default_factory=lambda: IdentityRule.model_validate({}))
@@ -185,10 +185,10 @@ class Family(Table):
     sdo: list[SdoServer] = Field(default_factory=list[SdoServer])
     slot: list[Slot] = Field(default_factory=list[Slot], description="one for each drive of the node")
     input: list[Signal] = Field(
-        default_factory=list[Signal], description="what the PDOs of a node without drives tell"
+        default_factory=list[Signal], description="values that the PDOs of a node without drives tell"
     )
     output: list[Output] = Field(
-        default_factory=list[Output], description="what the PDOs of a node without drives command"
+        default_factory=list[Output], description="values that the PDOs of a node without drives command"
     )
     meaning: list[Meaning] = Field(default_factory=list[Meaning])
     value: list[ProcessValue] = Field(default_factory=list[ProcessValue])

@@ -17,17 +17,17 @@ class OwnObject(Table):
 
     parameter: str | None = Field(None, description="one of this file, which has object, type and texts")
     object: Ref | None = Field(None, description="instead of a parameter")
-    data_type: TypeName = Field("uint16", description="of an object; a parameter has its own")
+    data_type: TypeName = Field("uint16", description="type of an object; a parameter has its own")
     per_drive: bool = Field(False, description="true: each drive of the node has its own")
-    factory: int | None = Field(None, description="what it holds as delivered, where that is known")
-    absent: int | None = Field(None, description="what counts where a node does not have the object")
+    factory: int | None = Field(None, description="value as delivered, where that is known")
+    absent: int | None = Field(None, description="value that counts where a node does not have the object")
 
 
 class OwnReaction(OwnObject):
     """Reaction of the drive when the time has run out. Without one it stops."""
 
     nothing: list[int] = Field(default_factory=lambda: [0], description="with these values it runs on")
-    stop: int | None = Field(None, description="what `enforce` writes where it would run on")
+    stop: int | None = Field(None, description="value that `enforce` writes where it would run on")
 
 
 class OwnSupervision(OwnObject):
@@ -39,6 +39,6 @@ class OwnSupervision(OwnObject):
 
     name: str = Field(min_length=1)
     watches: Watches = Field(description="process_data, heartbeat, guarding or link")
-    unit_ms: float = Field(1.0, gt=0, description="what one step of the time is, in ms")
+    unit_ms: float = Field(1.0, gt=0, description="one step of the time in ms")
     off: list[int] = Field(default_factory=lambda: [0], description="with these values nothing is watched")
     reaction: OwnReaction | None = None

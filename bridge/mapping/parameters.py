@@ -58,7 +58,7 @@ class ParameterNames(Table):
         description="a regular expression with the groups number, letter, element, set"
     )
     hexadecimal: bool = Field(False, description="true: number and element are written in hexadecimal")
-    example: str = Field(description="how they are written, for messages")
+    example: str = Field(description="form in which they are written, for messages")
     index: int = Field(ge=0, le=0xFFFF)
     number_step: int = 1
     letter_step: int = 0
@@ -96,13 +96,13 @@ class Parameter(Table):
     high: float | None = Field(None, allow_inf_nan=False)
     access: Literal["rw", "ro", "wo"] = "rw"
     default: PlainValue | None = Field(
-        None, description="what is read from a drive as delivered, without `factor`: for the simulator"
+        None, description="raw value in a drive as delivered, without `factor`: for the simulator"
     )
-    sets: int = Field(0, ge=0, le=16, description="how many parameter sets it has; 0: it has one value")
-    elements: int = Field(0, ge=0, le=255, description="how many elements it has; 0: it is no array")
+    sets: int = Field(0, ge=0, le=16, description="number of parameter sets; 0: it has one value")
+    elements: int = Field(0, ge=0, le=255, description="number of elements; 0: it is no array")
     states: States = Field(default_factory=dict[int, str])
     point: bool = Field(False, description="true: shown as a point of the drive")
-    every_ms: int = Field(0, ge=0, le=3_600_000, description="how often a point is read; 0: on demand")
+    every_ms: int = Field(0, ge=0, le=3_600_000, description="period in which a point is read; 0: on demand")
     absent: float | None = Field(
         None, description="the value that counts where the drive refuses to tell it, as one without it"
     )

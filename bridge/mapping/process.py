@@ -54,7 +54,7 @@ class Pdo(Table):
     number: int = Field(ge=1, le=512)
     cob_id: int = Field(ge=0, le=0x7FF, description="without the node id, such as 0x200")
     words: list[Name] = Field(
-        default_factory=list[str], description="which words it carries; left out: all of them"
+        default_factory=list[str], description="words that it carries; left out: all of them"
     )
     objects: list[Annotated[list[Mapped], Field(min_length=1)]]
     signed: list[Ref] = Field(
@@ -134,7 +134,7 @@ class Slot(Table):
         1,
         ge=1,
         le=MOST_AXES,
-        description="which axis of the node it is, for CiA 402: its parameters and its own supervision are "
+        description="axis of the node that it is, for CiA 402: its parameters and its own supervision are "
         "800h × (axis − 1) behind those of 6000h … 67FFh that this file names; PDOs and `start` name objects "
         "as the node has them",
     )
@@ -185,7 +185,7 @@ class Meaning(Table):
     )
     otherwise: str | Wording | None = Field(
         None,
-        description="what is said of values that name another code than the drive's; left out: that they are "
+        description="text for values that name another code than the drive's; left out: that they are "
         "not in the telegram",
     )
 
@@ -233,7 +233,7 @@ class ProcessValue(Table):
     )
     when: dict[str, Annotated[list[float], Field(min_length=1)]] = Field(
         default_factory=dict[str, list[float]],
-        description="by parameter, the values of it with which this value means what it says",
+        description="values of each parameter with which this value means what it says",
     )
     needs: str | None = Field(
         None, description="another value, such as command/position, without which this one means nothing"
@@ -244,7 +244,7 @@ class ProcessValue(Table):
     )
     otherwise: str | Wording | None = Field(
         None,
-        description="what is said where a parameter in `when` has another value; left out: that it means "
+        description="text where a parameter in `when` has another value; left out: that it means "
         "something else",
     )
     description: str = ""

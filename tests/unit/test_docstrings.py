@@ -1,4 +1,5 @@
-"""Docstrings begin with the noun, or with the verb of what is done: not with "What", "How" or "Of"."""
+"""Docstrings, and descriptions of the keys of files, begin with the noun, or with the verb of what is done:
+not with "What", "How" or "Of"."""
 
 from __future__ import annotations
 
@@ -17,8 +18,13 @@ HEADLESS = frozenset(
 
 
 def docstrings(source: str) -> Iterator[str]:
-    """Docstrings of modules, classes and functions, and those below attributes."""
+    """Docstrings of modules, classes and functions, those below attributes, and descriptions of fields."""
     for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.keyword(arg="description", value=ast.Constant(value=str(text))):
+                yield text
+            case _:
+                pass
         body = getattr(node, "body", None)
         for statement in body if isinstance(body, list) else []:
             value = statement.value if isinstance(statement, ast.Expr) else None
@@ -32,7 +38,7 @@ def headless(folder: Path) -> list[str]:
         f"{file.relative_to(folder)}: {text}"
         for file in sorted(folder.rglob("*.py"))
         for text in docstrings(file.read_text(encoding="utf-8"))
-        if text.split(None, 1)[:1] and text.split(None, 1)[0] in HEADLESS
+        if text.split(None, 1)[:1] and text.split(None, 1)[0].capitalize() in HEADLESS
     ]
 
 
@@ -43,6 +49,11 @@ def test_docstrings_begin_with_the_noun(room: str) -> None:
 
 def test_every_room_is_looked_at() -> None:
     assert {"command", "text", "uaserver"} <= set(ROOMS)
+
+
+def test_a_headless_description_is_found(tmp_path: Path) -> None:
+    (tmp_path / "module.py").write_text('x = Field(1, description="how many of "\n    "them")\n')
+    assert headless(tmp_path) == ["module.py: how many of them"]
 
 
 def test_a_headless_docstring_is_found(tmp_path: Path) -> None:

@@ -33,17 +33,18 @@ class Rule(Table):
 
     frames: FrameKind = Field(description="the frames it is about")
     like: RegularExpression = Field(
-        "", description='what they begin with: a regular expression on bytes as "4B 17 10"; empty: all'
+        "",
+        description='beginning of each: a regular expression on bytes as "4B 17 10"; empty: all',
     )
     skip: int = Field(
-        0, ge=0, description="how many of them remain as they are before the first that does not"
+        0, ge=0, description="number of them that remain as they are before the first that does not"
     )
     data: str = Field("", description='bytes in place of its first ones; ".." leaves a byte as it is')
     size: int | None = Field(None, ge=0, le=_MOST_BYTES, description="bytes: the rest is cut off, or 0")
     abort: int | None = Field(
         None, ge=0, le=0xFFFF_FFFF, description="the transfer is aborted with this code"
     )
-    delay_ms: int = Field(0, ge=0, le=60_000, description="how much later it is sent")
+    delay_ms: int = Field(0, ge=0, le=60_000, description="delay with which it is sent")
     silent: bool = Field(False, description="it gets lost")
 
     @field_validator("data")
@@ -67,8 +68,8 @@ class Rule(Table):
 class Habit(Table):
     """One habit; ``says`` is what the bridge makes of it."""
 
-    title: str = Field(description="what the device does, in a sentence")
-    source: str = Field(description="where it was seen, or what the standard says instead")
+    title: str = Field(description="deed of the device, in a sentence")
+    source: str = Field(description="place where it was seen, or what the standard says instead")
     says: str = Field("", description="a part of what the bridge says of it; empty: nothing")
     boots: bool = Field(True, description="the bridge takes the node into operation all the same")
     rule: list[Rule] = Field(min_length=1, description="applied in this order")

@@ -18,6 +18,7 @@ from bridge.eds.modules import UnknownModule
 from bridge.eds.text_file import decode
 from bridge.eds.xdd import read_xdd
 from bridge.text import Text
+from bridge.tomlfile import Unfit
 
 CONCISE_SUFFIXES: Final = (".cdcf", ".concise", ".bin")
 _MOST_BYTES: Final = 16 << 20
@@ -92,8 +93,8 @@ def read_configuration(path: Path, node_id: int | None = None) -> tuple[Download
     if path.suffix.lower() in CONCISE_SUFFIXES:
         try:
             return parse_concise_dcf(content)
-        except ValueError as error:
-            raise FileFaults([Fault(str(path), 0, "", str(error))]) from error
+        except Unfit as error:
+            raise FileFaults([Fault(str(path), 0, "", error.said)]) from error
     report = Report()
     description = read_device(content, str(path))
     downloads = configuration(description, node_id, report)

@@ -117,7 +117,7 @@ def _lines(
     if downloads:
         lines.append(f"  configures {len(downloads)} objects:")
         lines += [f"    {one.name} = {one.data.hex(' ').upper()}" for one in downloads]
-    lines += [f"{file}:{one.line}: {one.severity}: {one.text}" for one in findings]
+    lines += [f"{file}:{one.line}: {one.severity}: {one.said}" for one in findings]
     return lines
 
 
@@ -152,7 +152,7 @@ def _as_json(
         "objects": [_entry_json(entry, node_id) for one in description.objects for entry in one.entries],
         "pdos": [_pdo_json(pdo) for pdo in pdos(description, node_id)],
         "downloads": [{"index": one.index, "sub": one.sub, "data": one.data.hex()} for one in downloads],
-        "findings": [asdict(one) for one in findings],
+        "findings": [{"line": one.line, "severity": one.severity, "text": str(one.said)} for one in findings],
     }
 
 

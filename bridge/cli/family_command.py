@@ -49,7 +49,7 @@ def new(
     if derived.read_only:
         print(printable(f"{file}: only read: {derived.read_only}"))
     for one in told:
-        print(printable(f"{file}:{one.line}: {one.text}"))
+        print(printable(f"{file}:{one.line}: {one.said}"))
 
 
 def _written(path: Path, text: str) -> Family:

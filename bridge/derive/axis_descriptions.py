@@ -16,6 +16,7 @@ from bridge.eds import Description, Entry, Value
 from bridge.eds.model import Object
 from bridge.eds.pdos import PdoSummary, pdos
 from bridge.mapping.axes import MOST_AXES, axis_of, on_axis, profile_of
+from bridge.text import Fact, Text, Words
 
 _DEVICE_TYPE: Final = 0x1000
 _DEVICE_TYPE_OF_AXIS: Final = 0x67FF
@@ -45,9 +46,23 @@ class AxisDescription:
         """An object of the view, such as ``6061:00/8``, as the node has it."""
         return f"{self.index(int(ref[:4], 16)):04X}{ref[4:]}"
 
-    def of_node(self, text: str) -> str:
-        """A sentence about the view, with the objects as the node has them."""
-        return _NAMED.sub(lambda found: self.reference(found[0]), text)
+    def of_node(self, said: Text) -> Text:
+        """A text about the view, with the objects among its facts as the node has them."""
+        return replace(said, facts=tuple((name, self._of_node(fact)) for name, fact in said.facts))
+
+    def _of_node(self, fact: Fact) -> Fact:
+        match fact:
+            case Text() | str():
+                return self._words_of_node(fact)
+            case tuple():
+                return tuple(map(self._words_of_node, fact))
+            case _:
+                return fact
+
+    def _words_of_node(self, words: Words) -> Words:
+        if isinstance(words, Text):
+            return self.of_node(words)
+        return _NAMED.sub(lambda found: self.reference(found[0]), words)
 
     def _is_own(self, index: int) -> bool:
         return index in profile_of(self.axis)

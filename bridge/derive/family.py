@@ -19,6 +19,7 @@ from bridge.eds import Description, read_whole_device_file
 from bridge.mapping import Family
 from bridge.mapping.loader import family_of
 from bridge.mapping.process import MOST_WORDS
+from bridge.text import Said, Text, render
 
 _HAVE_OWN_WORDS: Final = (408,)
 """Profiles with a control and a status word of their own at 6040h and 6041h."""
@@ -32,11 +33,19 @@ class Derived:
     name: str
     base: str
     text: str
-    read_only: str = ""
+    read_only: Said = ""
 
     @property
     def is_drive(self) -> bool:
         return self.base != GENERIC
+
+
+class NotDerived(OperationFailed):
+    """A drive of which no mapping can be made; ``said`` is why."""
+
+    def __init__(self, said: Text) -> None:
+        super().__init__(said)
+        self.said = said
 
 
 def derive_family(description: Description, source: str, mode: str | None = None) -> Derived:
@@ -44,32 +53,37 @@ def derive_family(description: Description, source: str, mode: str | None = None
     of the file. ``mode`` is the part of a drive's mapping behind ``cia402/``; left out, the first that the
     drive has.
 
-    Raises ``OperationFailed`` for a drive that has not that mode, or of which half is missing.
+    Raises ``NotDerived`` for a drive that has not that mode, or of which half is missing.
     """
     axes = axes_of(description)
     if not axes and mode is None and not _is_half_a_drive(description):
         read_only = _why_read_only(description)
-        text = "\n".join(device_lines(description, source, read_only))
+        text = "\n".join(device_lines(description, source, render(read_only)))
         return Derived(_name(description, source), GENERIC, text, read_only)
     if not axes:
-        raise OperationFailed(
-            f"{source} describes no drive that follows CiA 402 ({_why_not(description)}): its mapping has to "
-            "be written by hand"
-        )
+        raise NotDerived(Text.of("derive.half_a_drive", source=source, why=_why_not(description)))
     there = modes_of(view_of(description, axes[0], axes, ()).alone)
-    refused: list[str] = []
+    refused: list[Text] = []
     for one in there if mode is None else [one for one in there if one.name == mode]:
         try:
             drives = _drives(description, one, axes)
         except NoLayout as error:
-            refused.append(f"{one.name}: {error}")
+            refused.append(Text.of("derive.mode", mode=one.name, why=error.said))
             continue
         text = drive_text(description, source, one, drives, there)
         return Derived(_name(description, source), one.mapping, text)
     if refused:
-        raise OperationFailed(f"{source}: {'; '.join(refused)}")
-    what = ", ".join(one.name for one in there) or "none that a mapping of ours drives"
-    raise OperationFailed(f"{source}: the device has not the mode {mode or 'asked for'}; it has {what}")
+        raise NotDerived(Text.of("derive.refused", source=source, modes=tuple(refused)))
+    raise NotDerived(_without_mode(source, mode, tuple(one.name for one in there)))
+
+
+def _without_mode(source: str, mode: str | None, modes: tuple[str, ...]) -> Text:
+    """Text on a drive that has not ``mode``, or none at all that is known; it has ``modes``."""
+    if mode is None:
+        return Text.of("derive.no_mode", source=source)
+    if not modes:
+        return Text.of("derive.neither_mode", source=source, mode=mode)
+    return Text.of("derive.other_modes", source=source, mode=mode, modes=modes)
 
 
 def _drives(description: Description, mode: Mode, axes: Sequence[int]) -> list[Axis]:
@@ -83,18 +97,21 @@ def _drives(description: Description, mode: Mode, axes: Sequence[int]) -> list[A
         view = view_of(description, axis, axes, taken)
         try:
             if mode not in modes_of(view.alone):
-                raise NoLayout("it has not this mode, and all axes are driven in the same")
+                raise NoLayout(Text.of("derive.axis_without_mode"))
             layout = layout_of(view.alone, mode, common)
         except NoLayout as error:
-            shared = ", ".join(view.shared)
-            why = f" ({shared}: of several axes, and cannot be mapped otherwise)" if shared else ""
-            raise NoLayout(f"axis {axis}: {view.of_node(str(error))}{why}") from None
+            why = view.of_node(error.said)
+            if view.shared:
+                said = Text.of("derive.axis_shared", axis=axis, why=why, pdos=view.shared)
+            else:
+                said = Text.of("derive.axis", axis=axis, why=why)
+            raise NoLayout(said) from None
         taken |= {(True, pdo.number) for pdo in layout.rpdo} | {(False, pdo.number) for pdo in layout.tpdo}
         found.append(Axis(view, layout))
     words = words_of(found)
     for direction in words:
         if len(direction) > MOST_WORDS:
-            raise NoLayout(f"the PDOs of its axes have {len(direction)} words, a drive has {MOST_WORDS}")
+            raise NoLayout(Text.of("derive.words_of_axes", words=len(direction), most=MOST_WORDS))
     return found
 
 
@@ -104,7 +121,7 @@ def _is_half_a_drive(description: Description) -> bool:
     return _profile(description) in (0, PROFILE_402) and _has(description, CONTROL_WORD)
 
 
-def _why_read_only(description: Description) -> str:
+def _why_read_only(description: Description) -> Said:
     """Reason why nothing is written into a device that is no drive; empty where it is one of its own kind.
     What may be a drive moves by objects that nobody knows, without a control word that would stop it."""
     profile = _profile(description)
@@ -113,7 +130,7 @@ def _why_read_only(description: Description) -> str:
     else:
         words = bits_of(description, CONTROL_WORD), bits_of(description, STATUS_WORD)
         seems_drive = profile not in _HAVE_OWN_WORDS and words == (16, 16)
-    return f"it seems to be a drive, and does not follow CiA 402: {_why_not(description)}" * seems_drive
+    return Text.of("derive.read_only", why=_why_not(description)) if seems_drive else ""
 
 
 def _profile(description: Description) -> int:
@@ -125,37 +142,36 @@ def _has(description: Description, word: int) -> bool:
     return description.entry(word) is not None or bool(_carrier(description, word))
 
 
-def _why_not(description: Description) -> str:
+def _why_not(description: Description) -> Text:
     """Reason why the device is no drive, with the object and line that tell."""
     device_type = description.entry(0x1000)
     profile = _profile(description)
     if device_type and profile and profile != PROFILE_402:
-        return f"1000h in line {device_type.line} has the profile {profile}, not {PROFILE_402}"
+        return Text.of("derive.profile", line=device_type.line, profile=profile, wanted=PROFILE_402)
     wrong = [word for word in (CONTROL_WORD, STATUS_WORD) if bits_of(description, word) != 16]
     missing = [word for word in wrong if description.entry(word) is None]
-    carriers = [text for word in missing if (text := _carrier(description, word))]
+    carriers = [said for word in missing if (said := _carrier(description, word))]
     if missing and carriers:
-        return "; ".join(carriers)
+        return Text.of("derive.carriers", carriers=tuple(carriers))
     if missing:
-        names = " and ".join(f"{word:04X}h" for word in missing)
-        return f"{names} {'are' if len(missing) > 1 else 'is'} not described"
+        names = tuple(f"{word:04X}h" for word in missing)
+        return Text.of("derive.missing_one" if len(names) == 1 else "derive.missing_many", objects=names)
     entry = description.entry(wrong[0])
     line, kind = (entry.line, entry.data_type) if entry else (0, None)
-    found = f"is a {kind.name}" if kind else "has no type that we know"
-    return f"{wrong[0]:04X}h in line {line} {found}, not a UNSIGNED16"
+    if kind is None:
+        return Text.of("derive.unknown_type", object=f"{wrong[0]:04X}h", line=line)
+    return Text.of("derive.wrong_type", object=f"{wrong[0]:04X}h", line=line, type=kind.name)
 
 
-def _carrier(description: Description, word: int) -> str:
+def _carrier(description: Description, word: int) -> Said:
     """A contradiction of the file: a PDO maps the word, which nothing describes."""
     for one in description.objects:
         if one.index & 0xFE00 in (0x1600, 0x1A00):
             for entry in one.entries[1:]:
                 mapped = description.number(entry.index, entry.sub) or 0
                 if mapped >> 16 == word:
-                    return (
-                        f"{word:04X}h is not described, though {entry.index:04X}h:{entry.sub:02X} "
-                        f"in line {entry.line} maps it: it is a UNSIGNED16"
-                    )
+                    mapping = f"{entry.index:04X}h:{entry.sub:02X}"
+                    return Text.of("derive.carried", object=f"{word:04X}h", mapping=mapping, line=entry.line)
     return ""
 
 
@@ -171,6 +187,6 @@ def describe(path: Path, folders: Sequence[Path] = (), modules: Sequence[str] = 
     description = read_whole_device_file(path, modules)
     try:
         made = derive_family(description, path.name)
-    except OperationFailed as error:
-        raise FileFaults([Fault(str(path), 0, "", str(error), "a mapping file written by hand")]) from None
+    except NotDerived as error:
+        raise FileFaults([Fault(str(path), 0, "", error.said, Text.of("derive.by_hand"))]) from None
     return family_of(made.text, path, folders)

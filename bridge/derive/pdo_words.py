@@ -15,6 +15,7 @@ from bridge.eds import Description, Entry, StaticDataType
 from bridge.eds.pdos import MappedEntry, PdoSummary
 from bridge.parameter.profiles import effect_of
 from bridge.parameter.write_effect import Effect
+from bridge.text import Text
 
 WORD_BITS: Final = 16
 _DUMMIES: Final = range(0x0001, 0x0008)
@@ -25,7 +26,11 @@ Words = dict[str, tuple[int, int]]
 
 
 class NoLayout(Exception):
-    """The device cannot be driven in this mode; the text says why."""
+    """A device that cannot be driven in this mode; ``said`` is why."""
+
+    def __init__(self, said: Text) -> None:
+        super().__init__(said)
+        self.said = said
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +171,7 @@ class WordNames:
         entry = self._description.entry(one.index, one.sub)
         if entry is None:
             ref = reference(one.index, one.bits, one.sub)
-            raise NoLayout(f"{pdo.name} carries {ref}, which the file does not describe")
+            raise NoLayout(Text.of("derive.carries_unknown", pdo=pdo.name, object=ref))
         return entry
 
     def _rest(self, pdo: PdoSummary, one: MappedEntry) -> int:
@@ -186,11 +191,14 @@ class WordNames:
             return value & mask
         if effect_of(one.index, PROFILE_402) is Effect.COMMANDS:
             return 0
-        raise NoLayout(
-            f"RPDO{pdo.number} carries {one.index:04X}h:{one.sub:02X} ({entry.name}) too, and line "
-            f"{entry.line} of the file has no default value to be sent in it: give it one, or write the "
-            "mapping by hand"
+        said = Text.of(
+            "derive.no_rest",
+            pdo=pdo.name,
+            object=f"{one.index:04X}h:{one.sub:02X}",
+            name=entry.name,
+            line=entry.line,
         )
+        raise NoLayout(said)
 
     def _known(self, one: MappedEntry) -> list[str]:
         names = [name for name, want in self._free.items() if want == (one.index, one.bits) and not one.sub]

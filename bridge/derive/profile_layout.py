@@ -18,6 +18,7 @@ from bridge.derive.pdo_words import (
 )
 from bridge.eds import Description
 from bridge.eds.pdos import MappedEntry, PdoSummary, pdos
+from bridge.text import Said, Text
 
 _BITS: Final = (8, 16, 32)
 """Lengths of objects that words are made of."""
@@ -93,7 +94,7 @@ def layout_of(description: Description, mode: Mode, axes: Axes | None = None) ->
     tpdo_words = _process(told, tpdo)
     for words in (rpdo_words, tpdo_words):
         if len(words) > _MOST_PROCESS_WORDS:
-            raise NoLayout(f"its PDOs have {len(words)} words, a drive has {_MOST_PROCESS_WORDS}")
+            raise NoLayout(Text.of("derive.words", words=len(words), most=_MOST_PROCESS_WORDS))
     return ProfileLayout(rpdo_words, tpdo_words, rpdo, tpdo, tells_mode)
 
 
@@ -176,10 +177,8 @@ def _placed(pdo: PdoSummary, bases: Mapping[int, int], axes: Axes | None) -> int
         base = axes.spare(pdo.receives)
     if base is None:
         first = _FIRST_COB_ID[pdo.receives]
-        raise NoLayout(
-            f"{pdo.name} has no COB-ID that goes by the node id, and all of {first:X}h … "
-            f"{first + 0x100 * (_PREDEFINED - 1):X}h are taken: give it one in the file, as $NODEID+0x210"
-        )
+        last = first + 0x100 * (_PREDEFINED - 1)
+        raise NoLayout(Text.of("derive.no_cob_id", pdo=pdo.name, first=first, last=last))
     return base
 
 
@@ -225,18 +224,23 @@ def _own(
     return sorted(chosen, key=lambda one: one.number)
 
 
-def _why_none(of_direction: Sequence[PdoSummary], want: tuple[int, int], *, receives: bool) -> str:
+def _why_none(of_direction: Sequence[PdoSummary], want: tuple[int, int], *, receives: bool) -> Text:
     """Reason why no PDO carries an object, with what is wrong with the one that has it."""
-    kind = "RPDO" if receives else "TPDO"
-    why = f"no {kind} of the device carries {want[0]:04X}h, and none can be made to"
+    kind, ref = "RPDO" if receives else "TPDO", f"{want[0]:04X}h"
     for one in (one for one in of_direction if _carries(one, want)):
-        odd = next((item for item in one.mapped if item.bits not in _BITS), None)
-        if odd is not None:
-            named = f" ({odd.name})" if odd.name else ""
-            return f"{why}: {one.name} has {odd.index:04X}h:{odd.sub:02X}{named} of {odd.bits} bits beside it"
-        if not one.enabled:
-            return f"{why}: {one.name} is off and cannot be switched on"
-    return why
+        if why := _why_unusable(one):
+            return Text.of("derive.none_carries_because", kind=kind, object=ref, why=why)
+    return Text.of("derive.none_carries", kind=kind, object=ref)
+
+
+def _why_unusable(pdo: PdoSummary) -> Said:
+    odd = next((item for item in pdo.mapped if item.bits not in _BITS), None)
+    if odd is None:
+        return "" if pdo.enabled else Text.of("derive.pdo_off", pdo=pdo.name)
+    ref = f"{odd.index:04X}h:{odd.sub:02X}"
+    if not odd.name:
+        return Text.of("derive.odd_bits", pdo=pdo.name, object=ref, bits=odd.bits)
+    return Text.of("derive.odd_bits_named", pdo=pdo.name, object=ref, name=odd.name, bits=odd.bits)
 
 
 def _is_usable(description: Description, pdo: PdoSummary) -> bool:

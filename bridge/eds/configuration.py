@@ -8,6 +8,7 @@ from bridge.canopen.sdo import COMMANDS
 from bridge.config.download import Download
 from bridge.eds.model import Description, Entry, Plain, Report
 from bridge.eds.value_text import BadValue, encode
+from bridge.text import Text
 
 _COMMUNICATION: Final = range(0x1000, 0x2000)
 _MAPPINGS: Final = (range(0x1600, 0x1800), range(0x1A00, 0x1C00))
@@ -61,31 +62,28 @@ def _data(entry: Entry, node_id: int | None, report: Report, other: int | None) 
     where = f"{entry.index:04X}h:{entry.sub:02X}"
     plain = value.at(node_id)
     if plain is None:
-        report.error(entry.line, f"{where} needs the node id, and none is given: not configured")
+        report.error(entry.line, Text.of("eds.needs_node_id", object=where))
         return None
     if entry.data_type is None:
-        report.error(entry.line, f"{where} has no known data type: not configured")
+        report.error(entry.line, Text.of("eds.type_not_known", object=where))
         return None
     if entry.default and entry.default.at(node_id) == plain:
         return None
     if other is not None and not value.plus_node_id:
         if entry.default and entry.default.plus_node_id and entry.default.at(other) == plain:
             return None
-        if _is_identifier_of(other, entry, plain):
-            report.error(
-                entry.line,
-                f"{where} = {plain:X}h is an identifier of node {other}, which the file was made for, and "
-                f"not of node {node_id}: it takes a file of node {node_id}, or $NODEID in its place",
-            )
+        if _is_identifier_of(plain, entry, other):
+            said = Text.of("eds.id_of_other_node", object=where, id=plain, other=other, node=str(node_id))
+            report.error(entry.line, said)
             return None
     try:
         return encode(plain, entry.data_type)
     except BadValue as error:
-        report.error(entry.line, f"{where}: {error}: not configured")
+        report.error(entry.line, Text.of("eds.not_encoded", object=where, why=error.said))
         return None
 
 
-def _is_identifier_of(node_id: int, entry: Entry, plain: Plain) -> TypeGuard[int]:
+def _is_identifier_of(plain: Plain, entry: Entry, node_id: int) -> TypeGuard[int]:
     """True where the entry holds a COB-ID that ends with the number of the node."""
     holds_one = (entry.index, entry.sub) == _EMCY_ID or any(
         entry.index in indices and entry.sub in subs for indices, subs in _COB_IDS

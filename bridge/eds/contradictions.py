@@ -8,6 +8,7 @@ from typing import Final
 from bridge.canopen import cobid
 from bridge.eds.model import Description, Entry, Finding, FindingSeverity, Object, StaticDataType, Value
 from bridge.eds.value_text import BadValue, bits_of_type, encode
+from bridge.text import Said, Text
 
 _MAPPINGS: Final = {True: range(0x1600, 0x1800), False: range(0x1A00, 0x1C00)}
 """Mapping parameters of RPDOs (True) and TPDOs (CiA 301 §7.5.2.36, §7.5.2.38)."""
@@ -25,29 +26,29 @@ def contradictions(description: Description) -> list[Finding]:
     found: list[Finding] = []
     for one in description.objects:
         for entry in one.entries:
-            found += (_told(entry.line, text) for text in (*_limits(entry), *_node_ids(entry)))
+            found += (_told(entry.line, said) for said in (*_limits(entry), *_node_ids(entry)))
         for receives, mappings in _MAPPINGS.items():
             if one.index in mappings:
                 found += _mapping(description, one, receives)
     return found
 
 
-def _told(line: int, text: str) -> Finding:
-    return Finding(line, FindingSeverity.WARNING, text)
+def _told(line: int, said: Text) -> Finding:
+    return Finding(line, FindingSeverity.WARNING, said)
 
 
 def _place(entry: Entry) -> str:
     return f"{entry.index:04X}h:{entry.sub:02X}"
 
 
-def _limits(entry: Entry) -> Iterator[str]:
+def _limits(entry: Entry) -> Iterator[Text]:
     low, high, default = (_number(value) for value in (entry.low, entry.high, entry.default))
     if low is not None and high is not None and low > high:
-        yield f"{_place(entry)}: LowLimit {low} is above HighLimit {high}"
+        yield Text.of("eds.low_above_high", object=_place(entry), low=str(low), high=str(high))
     elif default is not None and low is not None and default < low:
-        yield f"{_place(entry)}: DefaultValue {default} is below LowLimit {low}"
+        yield Text.of("eds.default_below_low", object=_place(entry), default=str(default), low=str(low))
     elif default is not None and high is not None and default > high:
-        yield f"{_place(entry)}: DefaultValue {default} is above HighLimit {high}"
+        yield Text.of("eds.default_above_high", object=_place(entry), default=str(default), high=str(high))
 
 
 def _number(value: Value | None) -> int | float | None:
@@ -57,7 +58,7 @@ def _number(value: Value | None) -> int | float | None:
     return value.plain
 
 
-def _node_ids(entry: Entry) -> Iterator[str]:
+def _node_ids(entry: Entry) -> Iterator[Text]:
     """A value with $NODEID has to fit on every node; that of a PDO has to be an identifier, too."""
     value = entry.current
     if value is None or not value.plus_node_id or entry.data_type is None:
@@ -69,12 +70,16 @@ def _node_ids(entry: Entry) -> Iterator[str]:
         try:
             encode(plain, entry.data_type)
         except BadValue as error:
-            yield f"{_place(entry)}: {value} of the node {node_id}: {error}"
+            yield Text.of(
+                "eds.not_on_node", object=_place(entry), value=str(value), node=node_id, why=error.said
+            )
             return
         is_identifier = entry.sub == 1 and any(entry.index in each for each in _COMMUNICATION)
         number = plain & ~(cobid.PDO_DISABLED | cobid.NO_REMOTE)
         if is_identifier and number > cobid.COB_ID_MASK and not plain & cobid.PDO_EXTENDED:
-            yield f"{_place(entry)}: {value} of the node {node_id} is {number:X}h, which is no identifier"
+            yield Text.of(
+                "eds.no_identifier", object=_place(entry), value=str(value), node=node_id, number=number
+            )
             return
 
 
@@ -86,32 +91,36 @@ def _mapping(description: Description, one: Object, receives: bool) -> Iterator[
     head = one.entries[0]
     described = max(entry.sub for entry in one.entries)
     if count > described:
-        yield _told(head.line, f"{_place(head)} maps {count} objects, and {described} are described")
+        said = Text.of("eds.maps_more", object=_place(head), count=count, described=described)
+        yield _told(head.line, said)
     length = 0
     for entry in one.entries[1:]:
         word = description.number(one.index, entry.sub)
         if not word or entry.sub > count:
             continue
         length += word & 0xFF
-        text = _mapped(description, word, receives)
-        if text:
-            yield _told(entry.line, f"{_place(entry)} maps {word:08X}h: {text}")
+        why = _mapped(description, word, receives)
+        if why:
+            yield _told(entry.line, Text.of("eds.maps", object=_place(entry), word=word, why=why))
     if length > _MOST_BITS:
-        yield _told(head.line, f"{_place(head)} maps {length} bits, and a PDO has at most {_MOST_BITS}")
+        said = Text.of("eds.maps_too_much", object=_place(head), bits=length, most=_MOST_BITS)
+        yield _told(head.line, said)
 
 
-def _mapped(description: Description, word: int, receives: bool) -> str:
+def _mapped(description: Description, word: int, receives: bool) -> Said:
     """Reason why an object cannot be mapped like this; empty where it can."""
     index, sub, bits = word >> 16, word >> 8 & 0xFF, word & 0xFF
     if index <= _LAST_TYPE:
         return ""
     entry = description.entry(index, sub)
     if entry is None:
-        return f"{index:04X}h:{sub:02X} is not described"
+        return Text.of("eds.mapped_not_described", object=f"{index:04X}h:{sub:02X}")
     place, kind = _place(entry), entry.data_type
     length = bits_of_type(kind) if kind else None
     if kind and length and bits != length and not (kind is StaticDataType.BOOLEAN and bits == 1):
-        return f"{place} has {length} bits ({kind.name}), not {bits}"
-    if not (entry.access.writable if receives else entry.access.readable):
-        return f"{place} is {entry.access.value}, and this PDO is {'received' if receives else 'sent'}"
+        return Text.of("eds.mapped_length", object=place, has=length, type=kind.name, bits=bits)
+    if receives and not entry.access.writable:
+        return Text.of("eds.mapped_received", object=place, access=entry.access.value)
+    if not receives and not entry.access.readable:
+        return Text.of("eds.mapped_sent", object=place, access=entry.access.value)
     return ""

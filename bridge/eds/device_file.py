@@ -17,6 +17,8 @@ from bridge.eds.model import Description, FindingSeverity, Report
 from bridge.eds.modules import UnknownModule
 from bridge.eds.text_file import decode
 from bridge.eds.xdd import read_xdd
+from bridge.text import Text
+from bridge.tomlfile import Unfit
 
 CONCISE_SUFFIXES: Final = (".cdcf", ".concise", ".bin")
 _MOST_BYTES: Final = 16 << 20
@@ -37,22 +39,22 @@ def read_device(content: bytes, name: str, modules: Sequence[str] = ()) -> Descr
     report = Report()
     is_xml = content.lstrip(b" \t\r\n").startswith(_XML_STARTS)
     if is_xml and modules:
-        message = "an XDD describes no modules here"
-        raise FileFaults([Fault(name, 0, MODULES, message, "an EDS or DCF of the device")])
+        said = Text.of("eds.xdd_has_modules")
+        raise FileFaults([Fault(name, 0, MODULES, said, Text.of("eds.xdd_has_modules_advice"))])
     try:
         description = (
             read_xdd(content, report) if is_xml else read_eds(decode(content, report), report, modules)
         )
     except UnknownModule as error:
-        raise FileFaults([Fault(name, 0, MODULES, str(error), error.hint)]) from None
+        raise FileFaults([Fault(name, 0, MODULES, error.said, error.hint)]) from None
     findings = report.findings()
     if not description.objects:
         first = next((one for one in findings if one.severity is FindingSeverity.ERROR), None)
-        line, why = (first.line, f": {first.text}") if first else (0, "")
-        message = f"is not a device description: no object is described in it{why}"
-        raise FileFaults([Fault(name, line, "", message, "an EDS, DCF, XDD or XDC")])
+        line = first.line if first else 0
+        said = Text.of("eds.no_objects_because", why=first.said) if first else Text.of("eds.no_objects")
+        raise FileFaults([Fault(name, line, "", said, Text.of("eds.no_objects_advice"))])
     for one in contradictions(description):
-        report.warning(one.line, one.text)
+        report.warning(one.line, one.said)
     return replace(description, findings=report.findings(), broken_off_at=report.broken_off_at)
 
 
@@ -63,9 +65,9 @@ def read_whole_device_file(path: Path, modules: Sequence[str] = ()) -> Descripti
     line = description.broken_off_at
     if line is None:
         return description
-    why = next(one.text for one in reversed(description.findings) if one.line == line)
-    message = f"the file breaks off: {why}; nothing is made of half a description"
-    raise FileFaults([Fault(str(path), line, "", message, "the whole file, fetched anew")])
+    why = next(one.said for one in reversed(description.findings) if one.line == line)
+    said = Text.of("eds.breaks_off", why=why)
+    raise FileFaults([Fault(str(path), line, "", said, Text.of("eds.breaks_off_advice"))])
 
 
 def contents(path: Path) -> bytes:
@@ -75,9 +77,10 @@ def contents(path: Path) -> bytes:
             content = file.read(_MOST_BYTES + 1)
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise FileFaults([Fault(str(path), 0, "", f"cannot be read: {why}")]) from error
+        raise FileFaults([Fault(str(path), 0, "", Text.of("eds.unreadable", why=str(why)))]) from error
     if len(content) > _MOST_BYTES:
-        raise FileFaults([Fault(str(path), 0, "", f"has more than {_MOST_BYTES >> 20} MiB")])
+        said = Text.of("eds.too_large", most_mib=_MOST_BYTES >> 20)
+        raise FileFaults([Fault(str(path), 0, "", said)])
     return content
 
 
@@ -90,14 +93,14 @@ def read_configuration(path: Path, node_id: int | None = None) -> tuple[Download
     if path.suffix.lower() in CONCISE_SUFFIXES:
         try:
             return parse_concise_dcf(content)
-        except ValueError as error:
-            raise FileFaults([Fault(str(path), 0, "", str(error))]) from error
+        except Unfit as error:
+            raise FileFaults([Fault(str(path), 0, "", error.said)]) from error
     report = Report()
     description = read_device(content, str(path))
     downloads = configuration(description, node_id, report)
     findings = (*description.findings, *report.findings())
     faults = [
-        Fault(str(path), one.line, "", one.text) for one in findings if one.severity is FindingSeverity.ERROR
+        Fault(str(path), one.line, "", one.said) for one in findings if one.severity is FindingSeverity.ERROR
     ]
     if faults:
         raise FileFaults(faults)

@@ -13,6 +13,7 @@ from bridge.eds.modules import Modules
 from bridge.eds.objects import ObjectReader
 from bridge.eds.pdos import add_compact_pdos
 from bridge.eds.text_file import lines
+from bridge.text import Said, Text
 
 _INDEX: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})")
 _SUB: Final = re.compile(r"(?:0x)?([0-9a-f]{1,4})sub(?:0x)?([0-9a-f]{1,2})")
@@ -36,14 +37,11 @@ def read_eds(text: str, report: Report, names: Sequence[str] = ()) -> Descriptio
     plugged = tuple(modules.find(name) for name in names) or modules.connected()
     extended = modules.plug(plugged, anew=bool(names))
     if modules.known and not plugged:
-        missing = (
-            f"{len(modules.known)} modules are described and none is plugged in: their objects are missing"
-        )
-        report.warning(modules.line, missing)
+        report.warning(modules.line, Text.of("eds.none_plugged", count=len(modules.known)))
     reader = _EdsReader(sections, report, modules.brought)
     objects = reader.objects()
     if stripped(all_lines[-1]) and (lost := reader.lost(all_lines)):
-        report.breaks_off(len(all_lines), f"it ends within a line, and {lost}")
+        report.breaks_off(len(all_lines), Text.of("eds.ends_within_line", lost=lost))
     commissioning = reader.commissioning()
     return Description(
         format=reader.format(objects),
@@ -95,14 +93,14 @@ class _EdsReader:
             elif match := _TABLE.fullmatch(key):
                 self._tables[int(match[1], 16), match[2]] = section
 
-    def lost(self, all_lines: Sequence[str]) -> str:
+    def lost(self, all_lines: Sequence[str]) -> Said:
         """Evidence that a file whose last line has no end went on; empty where there is none: editors leave
         that end out."""
         last = stripped(all_lines[-1])
         if last.startswith("[") and "]" not in last:
-            return f"{shown(last)} has no closing bracket"
+            return Text.of("eds.lost_bracket", line=shown(last))
         if "=" not in last and not last.startswith(("[", ";", "#")) and self._begins_key(last):
-            return f"{shown(last)} is no key with a value"
+            return Text.of("eds.lost_value", line=shown(last))
         if _is_end(all_lines):
             return ""
         for name in _LISTS:
@@ -110,7 +108,7 @@ class _EdsReader:
             listed = [_index(text.text) for _, text in section.numbered()] if section else []
             index = listed[-1] if listed else None
             if index is not None and index not in self._roots:
-                return f"{index:04X}h, the last of [{name}], is not described"
+                return Text.of("eds.lost_object", object=f"{index:04X}h", section=name)
         return ""
 
     def _begins_key(self, text: str) -> bool:
@@ -123,9 +121,8 @@ class _EdsReader:
         """[1018sub1] and [1018sub01] are the same entry."""
         first = place.setdefault(number, section)
         if first is not section:
-            self._report.error(
-                section.line, f"[{shown(section.name)}] is [{shown(first.name)}] again: left out"
-            )
+            said = Text.of("eds.section_again", section=shown(section.name), first=shown(first.name))
+            self._report.error(section.line, said)
 
     def format(self, objects: dict[int, Object]) -> str:
         configured = any(e.parameter_value is not None for o in objects.values() for e in o.entries)
@@ -134,7 +131,7 @@ class _EdsReader:
     def device_info(self) -> DeviceInfo:
         section = self._sections.get("deviceinfo")
         if section is None:
-            self._report.warning(0, "there is no [DeviceInfo]: the device is not named")
+            self._report.warning(0, Text.of("eds.no_device_info"))
             return DeviceInfo()
         fields = self._fields
         return DeviceInfo(
@@ -162,7 +159,7 @@ class _EdsReader:
         reader = ObjectReader(self._fields, self._report, self._roots, self._subs, self._tables)
         for index in sorted(set(self._subs) - set(self._roots)):
             line = min(section.line for section in self._subs[index].values())
-            self._report.warning(line, f"there are sub-indices of {index:04X}h and no [{index:04X}]")
+            self._report.warning(line, Text.of("eds.no_section", index=f"{index:04X}"))
             self._roots[index] = Section(f"{index:04X}", line)
         found = {index: reader.read(index) for index in sorted(self._roots) if index >= _FIRST_OBJECT}
         info = self._sections.get("deviceinfo")
@@ -184,19 +181,17 @@ class _EdsReader:
                 if index is None:
                     continue
                 if index in listed:
-                    self._report.warning(
-                        text.line, f"{index:04X}h is listed again, first in line {listed[index]}"
-                    )
+                    said = Text.of("eds.listed_again", object=f"{index:04X}h", first_line=listed[index])
+                    self._report.warning(text.line, said)
                 listed.setdefault(index, text.line)
                 if index not in found:
-                    self._report.error(text.line, f"{index:04X}h is listed and not described")
+                    said = Text.of("eds.listed_not_described", object=f"{index:04X}h")
+                    self._report.error(text.line, said)
             count = self._fields.number(section, "SupportedObjects", 0, 0xFFFF)
             if count is not None and count != len(values):
-                self._report.warning(
-                    section.line, f"[{name}] says {count} objects and lists {len(values)}: the list counts"
-                )
+                said = Text.of("eds.list_count", section=name, count=count, listed=len(values))
+                self._report.warning(section.line, said)
         for index in found:
             if index in self._roots and index not in listed and index not in self._brought:
-                self._report.warning(
-                    self._roots[index].line, f"{index:04X}h is described and not listed: taken"
-                )
+                said = Text.of("eds.not_listed", object=f"{index:04X}h")
+                self._report.warning(self._roots[index].line, said)

@@ -8,6 +8,7 @@ from typing import Final, TypeVar
 from bridge.eds.ini import IniValue, Section, shown
 from bridge.eds.model import Access, Report, StaticDataType, Value
 from bridge.eds.value_text import BadValue, integer, value
+from bridge.text import Said, Text
 
 T = TypeVar("T")
 
@@ -37,7 +38,8 @@ class Fields:
             return None
         number = self.whole(found, name)
         if number is not None and not low <= number <= high:
-            self._report.error(found.line, f"{name}={shown(found.text)} is not within {low}…{high}: left out")
+            said = Text.of("eds.not_within", key=name, value=shown(found.text), low=low, high=high)
+            self._report.error(found.line, said)
             return None
         return number
 
@@ -50,11 +52,11 @@ class Fields:
         if found is None:
             return False
         if found.text.lower() in ("true", "false", "yes", "no"):
-            self._report.warning(found.line, f"{name}={shown(found.text)} should be 1 or 0")
+            self._report.warning(found.line, Text.of("eds.not_a_flag", key=name, value=shown(found.text)))
             return found.text.lower() in ("true", "yes")
         number = self.whole(found, name)
         if number not in (None, 0, 1):
-            self._report.warning(found.line, f"{name}={shown(found.text)} is taken as 1")
+            self._taken(found, name, "1")
         return bool(number)
 
     def value(self, section: Section, name: str, data_type: StaticDataType | None) -> Value | None:
@@ -64,26 +66,30 @@ class Fields:
     def value_of(self, found: IniValue, name: str, data_type: StaticDataType | None) -> Value | None:
         return self._read(found, name, lambda: value(found.text, data_type))
 
-    def _read(self, found: IniValue, name: str, read: Callable[[], tuple[T, str]]) -> T | None:
+    def _read(self, found: IniValue, name: str, read: Callable[[], tuple[T, Said]]) -> T | None:
         """Result of ``read``, with a warning of its note; None where it raises BadValue."""
         try:
             one, note = read()
         except BadValue as error:
-            self._report.error(found.line, f"{name}: {error}: left out")
+            self._report.error(found.line, Text.of("eds.field_left_out", key=name, why=error.said))
             return None
         if note:
-            self._report.warning(found.line, f"{name}: {note}")
+            self._report.warning(found.line, Text.of("eds.field_is_odd", key=name, note=note))
         return one
+
+    def _taken(self, found: IniValue, name: str, taken: str) -> None:
+        said = Text.of("eds.key_taken_as", key=name, value=shown(found.text), taken=taken)
+        self._report.warning(found.line, said)
 
     def access(self, found: IniValue | None, default: Access, line: int, whose: str) -> Access:
         """The access; if it is missing or unknown, that is reported and ``default`` is taken."""
         if found is None:
-            self._report.warning(line, f"{whose} has no AccessType: taken as {default}")
+            self._report.warning(line, Text.of("eds.no_access", object=whose, access=default))
             return default
         word = found.text.lower()
         if word in {one.value for one in Access}:
             return Access(word)
         known = _ACCESS.get(word.replace("_", "").replace("-", "").replace(" ", ""))
         taken = known or default
-        self._report.warning(found.line, f"AccessType={shown(found.text)} is taken as {taken}")
+        self._taken(found, "AccessType", taken)
         return taken

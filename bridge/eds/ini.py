@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.eds.model import Report
+from bridge.text import Text
 
 SPELLING: Final = {
     name.lower(): name
@@ -74,11 +75,13 @@ class _IniReader:
         if self._other_spelling:
             number, key = self._other_spelling[0]
             count = len(self._other_spelling)
-            self._report.warning(
-                number,
-                f"{count} key{'s are' if count > 1 else ' is'} not spelt as CiA 306 has it, "
-                f"such as {key}: taken as {SPELLING[key.lower()]}",
+            said = Text.of(
+                "eds.spelling_one" if count == 1 else "eds.spelling_many",
+                count=count,
+                key=key,
+                taken=SPELLING[key.lower()],
             )
+            self._report.warning(number, said)
         return self._sections
 
     def _line(self, line: str, number: int) -> None:
@@ -88,25 +91,24 @@ class _IniReader:
         key, equals, value = line.partition("=")
         key = key.strip()
         if not equals or not key:
-            self._report.error(number, f"is neither a section nor a key: {shown(line)}")
+            self._report.error(number, Text.of("eds.neither", line=shown(line)))
         elif self._section is None:
-            self._report.error(number, f"{shown(key)} stands before the first section")
+            self._report.error(number, Text.of("eds.before_sections", key=shown(key)))
         else:
             self._assign(self._section, key, value.strip(), number)
 
     def _header(self, line: str, number: int) -> None:
         name, bracket, rest = line[1:].partition("]")
         if not bracket:
-            self._report.warning(number, f"{shown(line)} has no closing bracket: taken as a section")
+            self._report.warning(number, Text.of("eds.no_bracket", line=shown(line)))
         elif rest.strip() and rest.strip()[0] not in ";#":
-            self._report.warning(number, f"{shown(rest.strip())} after the section's name is ignored")
+            self._report.warning(number, Text.of("eds.behind_section", rest=shown(rest.strip())))
         name = re.sub(r"\s+", "", name)
         key = name.lower()
         first = self._sections.get(key)
         if first:
-            self._report.warning(
-                number, f"section [{shown(name)}] appears again, first in line {first.line}: joined"
-            )
+            said = Text.of("eds.section_joined", section=shown(name), first_line=first.line)
+            self._report.warning(number, said)
         else:
             self._sections[key] = Section(name, number)
         self._section = self._sections[key]
@@ -117,14 +119,27 @@ class _IniReader:
             self._other_spelling.append((number, key))
         first = section.keys.get(name)
         if first and first.text:
-            where = f"{shown(key)} appears again in [{shown(section.name)}], first in line {first.line}"
-            if value in (first.text, ""):
-                self._report.warning(number, f"{where}, and says the same")
-            else:
-                # As Windows reads such files, for which these tools were made.
-                self._report.error(number, f"{where}: {shown(first.text)} counts, not {shown(value)}")
+            self._again(section, key, value, number, first)
             return
         section.keys[name] = IniValue(value, number)
+
+    def _again(self, section: Section, key: str, value: str, number: int, first: IniValue) -> None:
+        """Report a key that has its value already: that counts, as for Windows, for which these tools were
+        made."""
+        name, first_line = shown(section.name), first.line
+        if value in (first.text, ""):
+            said = Text.of("eds.key_again", key=shown(key), section=name, first_line=first_line)
+            self._report.warning(number, said)
+            return
+        said = Text.of(
+            "eds.key_again_otherwise",
+            key=shown(key),
+            section=name,
+            first_line=first_line,
+            counts=shown(first.text),
+            other=shown(value),
+        )
+        self._report.error(number, said)
 
 
 def stripped(line: str) -> str:

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
 from typing import Final
 
+from bridge.text import Text
+
 
 class StaticDataType(IntEnum):
     """Static data types by their index (CiA 301 §7.4.7, table 44)."""
@@ -86,11 +88,11 @@ class Finding:
 
     line: int
     severity: FindingSeverity
-    text: str
+    said: Text
 
     def __str__(self) -> str:
         place = f"line {self.line}: " if self.line else ""
-        return f"{self.severity}: {place}{self.text}"
+        return f"{self.severity}: {place}{self.said}"
 
 
 Plain = int | float | str | bytes
@@ -246,16 +248,16 @@ class Report:
         self._more = 0
         self.broken_off_at: int | None = None
 
-    def error(self, line: int, text: str) -> None:
-        self._add(Finding(line, FindingSeverity.ERROR, text))
+    def error(self, line: int, said: Text) -> None:
+        self._add(Finding(line, FindingSeverity.ERROR, said))
 
-    def breaks_off(self, line: int, text: str) -> None:
+    def breaks_off(self, line: int, said: Text) -> None:
         """Report that the file has been lost from behind ``line`` on."""
         self.broken_off_at = line
-        self.error(line, text)
+        self.error(line, said)
 
-    def warning(self, line: int, text: str) -> None:
-        self._add(Finding(line, FindingSeverity.WARNING, text))
+    def warning(self, line: int, said: Text) -> None:
+        self._add(Finding(line, FindingSeverity.WARNING, said))
 
     def _add(self, finding: Finding) -> None:
         if len(self._findings) < self.most:
@@ -267,5 +269,5 @@ class Report:
         """Findings in the order of the file."""
         found = sorted(self._findings, key=lambda finding: finding.line)
         if self._more:
-            found.append(Finding(0, FindingSeverity.WARNING, f"and {self._more} more of this kind"))
+            found.append(Finding(0, FindingSeverity.WARNING, Text.of("eds.more", count=self._more)))
         return tuple(found)

@@ -18,6 +18,7 @@ from bridge.eds.fields import Fields
 from bridge.eds.ini import IniValue, Section, shown
 from bridge.eds.model import Module, ObjectType, Report, StaticDataType
 from bridge.eds.value_text import bits_of_type
+from bridge.text import Text
 
 _PART: Final = re.compile(
     r"m([0-9]{1,5})(moduleinfo|fixed([0-9a-f]{4}(?:sub[0-9a-f]{1,2})?)|subext([0-9a-f]{4}))"
@@ -32,10 +33,11 @@ _CONNECTED: Final = "connectedmodules"
 
 
 class UnknownModule(Exception):
-    """The file has no such module; ``hint`` says which there are."""
+    """A module that the file does not have; ``hint`` says which there are."""
 
-    def __init__(self, name: str, hint: str) -> None:
-        super().__init__(f"the device has no module {shown(name)}")
+    def __init__(self, name: str, hint: Text) -> None:
+        self.said = Text.of("eds.no_module", module=shown(name))
+        super().__init__(self.said)
         self.hint = hint
 
 
@@ -88,7 +90,8 @@ class Modules:
         for place, text in sorted(section.numbered(), key=lambda one: one[0]):
             number = self._fields.whole(text, f"[ConnectedModules] {place}")
             if number not in self._info:
-                self._report.error(text.line, f"module {shown(text.text)} is connected and not described")
+                said = Text.of("eds.module_not_described", module=shown(text.text))
+                self._report.error(text.line, said)
             else:
                 found.append(number)
         return tuple(found)
@@ -102,8 +105,9 @@ class Modules:
             for one, text in zip(self.known, told, strict=True):
                 if wanted and _plain(text) == wanted:
                     return one.number
-        known = ", ".join(str(one) for one in self.known)
-        raise UnknownModule(name, f"it has {known}" if known else "it has no modules")
+        if not self.known:
+            raise UnknownModule(name, Text.of("eds.has_no_modules"))
+        raise UnknownModule(name, Text.of("eds.has_modules", modules=tuple(str(one) for one in self.known)))
 
     def plug(self, numbers: Sequence[int], *, anew: bool) -> frozenset[tuple[int, int]]:
         """Write what these modules bring into the sections of the file, in their order; gives the elements,
@@ -124,7 +128,7 @@ class Modules:
                     continue
                 for at in end.take(extension):
                     if len(added) >= _MOST_ELEMENTS:
-                        self._report.error(section.line, "the modules have too many elements: left out")
+                        self._report.error(section.line, Text.of("eds.too_many_elements"))
                         return frozenset(added)
                     self._add(*at, section)
                     added.add(at)
@@ -136,15 +140,21 @@ class Modules:
         text = section.get("Count")
         match = _COUNT.fullmatch(text.text.replace(" ", "")) if text else None
         if match is None:
-            told = f"Count={shown(text.text)}" if text else "no Count"
-            line = text.line if text else section.line
-            self._report.error(line, f"[{shown(section.name)}] has {told}: its elements are left out")
+            self._no_count(section, text)
             return None
         elements, bits = int(match[1]), int(match[2] or 0)
         # An element of booleans is one bit, however long a value of it is on its way.
         width = 1 if known is StaticDataType.BOOLEAN else (known and bits_of_type(known)) or 8
         last = self._fields.number(section, "ObjExtend", 0, _HIGHEST) or 0
         return _Extension(elements, 0 if elements else bits, width, last)
+
+    def _no_count(self, section: Section, text: IniValue | None) -> None:
+        name = shown(section.name)
+        if text:
+            said = Text.of("eds.bad_count", section=name, count=shown(text.text))
+            self._report.error(text.line, said)
+        else:
+            self._report.error(section.line, Text.of("eds.no_count", section=name))
 
     def _highest(self, index: int) -> int:
         """The highest sub-index of the object as the file has it, 0 where it has no elements."""

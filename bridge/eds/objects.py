@@ -8,6 +8,7 @@ from typing import Final
 from bridge.eds.fields import Fields
 from bridge.eds.ini import IniValue, Section
 from bridge.eds.model import Access, Entry, Object, ObjectType, Report, StaticDataType, count_entry
+from bridge.text import Text
 
 _MOST_SUBS: Final = 254
 _REFUSES_DOWNLOAD: Final = 1
@@ -40,7 +41,7 @@ class ObjectReader:
         name = self._name(root, f"{index:04X}h")
         compact = self._fields.number(root, "CompactSubObj", 0, _MOST_SUBS) or 0
         if compact > self._compact_left:
-            self._report.error(root.line, f"{index:04X}h: too many compact sub-indices in one file: left out")
+            self._report.error(root.line, Text.of("eds.too_many_compact", object=f"{index:04X}h"))
             compact = 0
         self._compact_left -= compact
         kind = self._object_type(index, root, bool(subs or compact))
@@ -52,21 +53,19 @@ class ObjectReader:
             entries[sub] = self._sub(index, sub, subs[sub], fallback)
         count = self._fields.number(root, "SubNumber", 0, 255)
         if count is not None and not compact and count != len(subs):
-            self._report.warning(
-                root.line,
-                f"{index:04X}h says {count} sub-indices and has {len(subs)}: those that are there count",
-            )
+            said = Text.of("eds.sub_count", object=f"{index:04X}h", count=count, there=len(subs))
+            self._report.warning(root.line, said)
         if not entries:
-            self._report.error(root.line, f"{index:04X}h has no sub-indices")
+            self._report.error(root.line, Text.of("eds.no_subs", object=f"{index:04X}h"))
         elif 0 not in entries:
-            self._report.warning(root.line, f"{index:04X}h has no sub-index 0: made from the highest one")
+            self._report.warning(root.line, Text.of("eds.no_sub_0", object=f"{index:04X}h"))
             entries[0] = count_entry(index, max(entries), root.line)
         return Object(index, name, kind, tuple(entries[sub] for sub in sorted(entries)))
 
     def _name(self, section: Section, number: str) -> str:
         name = section.text("ParameterName")
         if not name:
-            self._report.warning(section.line, f"{number} has no ParameterName")
+            self._report.warning(section.line, Text.of("eds.no_name", object=number))
         return name or number
 
     def _object_type(self, index: int, root: Section, has_subs: bool) -> ObjectType:
@@ -75,18 +74,16 @@ class ObjectReader:
         code = self._fields.number(root, "ObjectType")
         if code is None:
             if has_subs:
-                self._report.warning(root.line, f"{index:04X}h has sub-indices and no ObjectType: a record")
+                self._report.warning(root.line, Text.of("eds.no_object_type", object=f"{index:04X}h"))
             return likely
         known = code in {int(kind) for kind in ObjectType}
         kind = ObjectType(code) if known else likely
         if not known:
-            self._report.warning(
-                root.line, f"{index:04X}h: ObjectType {code} is unknown: taken as {likely.name}"
-            )
+            said = Text.of("eds.object_type", object=f"{index:04X}h", code=code, taken=likely.name)
+            self._report.warning(root.line, said)
         elif has_subs and not kind.has_subs:
-            self._report.warning(
-                root.line, f"{index:04X}h is a {kind.name} with sub-indices: taken as a record"
-            )
+            said = Text.of("eds.has_subs", object=f"{index:04X}h", kind=kind.name)
+            self._report.warning(root.line, said)
             return likely
         return kind
 
@@ -111,7 +108,7 @@ class ObjectReader:
         whose = f"{index:04X}h:{sub:02X}" if sub or section.name.lower().find("sub") > 0 else f"{index:04X}h"
         data_type = self._data_type(section, whose, sub, fallback)
         if section.get("DownloadFile"):
-            self._report.warning(section.line, f"{whose}: the file that DownloadFile names is not read")
+            self._report.warning(section.line, Text.of("eds.download_file", object=whose))
         return Entry(
             index,
             sub,
@@ -135,10 +132,12 @@ class ObjectReader:
             if section.get("ObjectType") and self._fields.number(section, "ObjectType") == ObjectType.DOMAIN:
                 return StaticDataType.DOMAIN
             if sub == 0 and "sub" in section.name.lower():
-                self._report.warning(section.line, f"{whose} has no DataType: taken as UNSIGNED8")
-                return StaticDataType.UNSIGNED8
+                taken = StaticDataType.UNSIGNED8
+                said = Text.of("eds.no_data_type_taken", object=whose, taken=taken.name)
+                self._report.warning(section.line, said)
+                return taken
             if fallback is None:
-                self._report.error(section.line, f"{whose} has no DataType: its length is not known")
+                self._report.error(section.line, Text.of("eds.no_data_type", object=whose))
                 return None
         text = found or fallback
         code = self._fields.whole(text, "DataType") if text else None
@@ -146,12 +145,12 @@ class ObjectReader:
         if code is not None and code in {int(one) for one in StaticDataType}:
             data_type = StaticDataType(code)
             if found is None:
-                self._report.warning(
-                    section.line, f"{whose} has no DataType: taken as {data_type.name} like the others"
-                )
+                said = Text.of("eds.data_type_of_others", object=whose, taken=data_type.name)
+                self._report.warning(section.line, said)
             return data_type
         if code is not None and text:
-            self._report.error(text.line, f"{whose}: DataType 0x{code:X} is not known, nor its length")
+            said = Text.of("eds.data_type", object=whose, code=f"0x{code:X}")
+            self._report.error(text.line, said)
         return None
 
     def _named_type(self, code: int | None) -> int | None:
@@ -172,9 +171,9 @@ class ObjectReader:
         for table, kind in ((named, "Name"), (given, "Value")):
             for sub, text in table.items():
                 if not 1 <= sub <= count:
-                    self._report.warning(
-                        text.line, f"[{index:04X}{kind}] {sub} is beyond CompactSubObj={count}"
-                    )
+                    section = f"{index:04X}{kind}"
+                    said = Text.of("eds.beyond_compact", section=section, sub=sub, count=count)
+                    self._report.warning(text.line, said)
         for sub in range(1, count + 1):
             own = (
                 self._fields.value_of(given[sub], f"[{index:04X}Value] {sub}", element.data_type)

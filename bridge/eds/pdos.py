@@ -19,6 +19,7 @@ from bridge.eds.model import (
     Value,
     count_entry,
 )
+from bridge.text import Text
 
 _MOST_PDOS: Final = 512
 _MOST_MAPPED: Final = 64
@@ -48,7 +49,8 @@ def add_compact_pdos(info: Section, objects: dict[int, Object], fields: Fields, 
         there = sum(1 for index in objects if communication <= index < communication + _MOST_PDOS)
         if not mask:
             if count != there and info.get(key):
-                report.warning(info.keys[key.lower()].line, f"{key}={count}, and {there} are described")
+                said = Text.of("eds.pdo_count", key=key, count=count, there=there)
+                report.warning(info.keys[key.lower()].line, said)
             continue
         for number in range(_MOST_PDOS):
             if there >= count:

@@ -8,6 +8,7 @@ from bridge.base.errors import Fault, FileFaults
 from bridge.config import Site
 from bridge.config.download import Download
 from bridge.eds.device_file import read_configuration
+from bridge.text import Text
 from bridge.tomlfile import TomlFile, dotted
 
 
@@ -26,12 +27,13 @@ def read_configurations(site: Site, path: Path) -> dict[str, tuple[Download, ...
                 key = ("bus", b, "node", n, "configuration")
                 line = TomlFile(path).line(key)
                 # A finding without a line of its own is reported where the file is named.
-                faults += [
-                    one
-                    if one.line
-                    else Fault(str(path), line, dotted(key), f"{one.file}: {one.message}", one.hint)
-                    for one in error.faults
-                ]
+                faults += [one if one.line else _named(one, path, line, dotted(key)) for one in error.faults]
     if faults:
         raise FileFaults(faults)
     return found
+
+
+def _named(fault: Fault, site: Path, line: int, key: str) -> Fault:
+    """The fault of a file as a whole, at the line of the site file that names it."""
+    said = Text.of("file.at", place=fault.file, said=Text.plain(fault.said))
+    return Fault(str(site), line, key, said, fault.advice)

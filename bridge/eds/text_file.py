@@ -7,6 +7,7 @@ import re
 from typing import Final
 
 from bridge.eds.model import Report
+from bridge.text import Text
 
 _LINE_END: Final = re.compile(r"\r\n|\n|\r")
 _BYTE_LINE: Final = re.compile(rb"(\r\n|\n|\r)")
@@ -16,10 +17,10 @@ def decode(content: bytes, report: Report) -> str:
     """UTF-8 with or without a byte order mark, UTF-16 with one; a line that is neither is Windows-1252."""
     for mark, encoding in ((codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be")):
         if content.startswith(mark):
-            report.warning(1, "is UTF-16: read as such")
+            report.warning(1, Text.of("eds.utf_16"))
             return content[len(mark) :].decode(encoding, "replace")
     if content.startswith(codecs.BOM_UTF8):
-        report.warning(1, "begins with a byte order mark: skipped")
+        report.warning(1, Text.of("eds.byte_order_mark"))
         content = content.removeprefix(codecs.BOM_UTF8)
     try:
         return content.decode("utf-8")
@@ -40,13 +41,15 @@ def _by_lines(content: bytes, report: Report) -> str:
             text = line.decode("cp1252", "replace")
             others.append(number)
         parts[2 * number - 2] = text.encode()
-    more = len(others) - 1
-    told = "is neither ASCII nor UTF-8: read as Windows-1252"
-    if is_mixed:
-        too = f", as {more} other line{'s' if more > 1 else ''}" if more else ""
-        told += f"{too}; the rest is UTF-8"
-    report.warning(others[0], told)
+    report.warning(others[0], _said(len(others) - 1) if is_mixed else Text.of("eds.windows_1252"))
     return b"".join(parts).decode()
+
+
+def _said(more: int) -> Text:
+    """Text on the first of the lines that are not UTF-8, of which there are so many ``more``."""
+    if not more:
+        return Text.of("eds.mixed")
+    return Text.of("eds.mixed_one" if more == 1 else "eds.mixed_many", count=more)
 
 
 def lines(text: str) -> list[str]:

@@ -9,6 +9,7 @@ from typing import Final
 from bridge.canopen.datatypes import REALS, Integer
 from bridge.eds.ini import shown
 from bridge.eds.model import StaticDataType, Value
+from bridge.text import Said, Text
 
 _INTEGER: Final = re.compile(
     r"([+-]?)(?:0x([0-9a-f]{1,32})|([0-9]{1,39})|([0-9][0-9a-f]{0,31})h)", re.IGNORECASE
@@ -31,37 +32,44 @@ _INTEGERS: Final = {
 
 
 class BadValue(ValueError):
-    """The text is no such value; the message says why."""
+    """A text that is no such value; ``said`` is why, put into words only where somebody reads it."""
+
+    def __init__(self, said: Text) -> None:
+        super().__init__(said)
+        self.said = said
 
 
-def integer(text: str) -> tuple[int, str]:
+def integer(text: str) -> tuple[int, Said]:
     """A whole number, and what is odd about how it is written, or "".
 
     Raises BadValue. 001 is 1 and 010 is 10: tools pad with zeros. The standard allows C's octal numbers;
     where one would give another value, the text says so.
     """
-    note = ""
+    note: Said = ""
     bare = text.strip()
     if ";" in bare:
         bare = bare.partition(";")[0].rstrip()
-        note = f"{shown(text)}: what follows the semicolon is taken as a comment"
+        note = Text.of("eds.comment_behind_value", value=shown(text))
     match = _INTEGER.fullmatch(bare)
     if not match:
-        raise BadValue(f"{shown(text)} is not a number")
+        raise BadValue(Text.of("eds.not_number", value=shown(text)))
     sign, hexadecimal, decimal, assembler = match.groups()
     if decimal is None:
         value = int(hexadecimal or assembler, 16)
         if assembler:
-            note = f"{shown(bare)} is taken as 0x{value:X}"
+            note = Text.of("eds.taken_as", value=shown(bare), taken=f"0x{value:X}")
     else:
         value = int(decimal)
         if len(decimal) > 1 and decimal[0] == "0" and value:
             octal = int(decimal, 8) if set(decimal) <= set("01234567") else value
-            note = f"{decimal} is taken as {value}" + (f", not as octal {octal}" if octal != value else "")
+            if octal != value:
+                note = Text.of("eds.not_octal", value=decimal, taken=str(value), octal=str(octal))
+            else:
+                note = Text.of("eds.taken_as", value=decimal, taken=str(value))
     return (-value if sign == "-" else value), note
 
 
-def expression(text: str) -> tuple[Value, str]:
+def expression(text: str) -> tuple[Value, Said]:
     """A number that may contain $NODEID once, on either side, and what is odd about it. Raises BadValue."""
     if not _NODE_ID.search(text):
         value, note = integer(text)
@@ -76,12 +84,14 @@ def expression(text: str) -> tuple[Value, str]:
         value, _ = integer(term)
         total += -value if sign == "-" else value
     if nodes != 1 or "".join(sign + term for sign, term in terms) != bare:
-        raise BadValue(f"{shown(text)} is not a number with $NODEID")
-    usual = re.fullmatch(r"\$NODEID(\+(0x[0-9A-Fa-f]+|[0-9]+))?", text)
-    return Value(total, True), "" if usual else f"{shown(text)} is taken as {Value(total, True)}"
+        raise BadValue(Text.of("eds.not_expression", value=shown(text)))
+    found = Value(total, True)
+    if re.fullmatch(r"\$NODEID(\+(0x[0-9A-Fa-f]+|[0-9]+))?", text):
+        return found, ""
+    return found, Text.of("eds.taken_as", value=shown(text), taken=str(found))
 
 
-def value(text: str, data_type: StaticDataType | None) -> tuple[Value, str]:
+def value(text: str, data_type: StaticDataType | None) -> tuple[Value, Said]:
     """``text`` as a value of ``data_type``, and what is odd about it. Raises BadValue."""
     if data_type in _TEXTS:
         return Value(text), ""
@@ -115,10 +125,14 @@ def encode(plain: int | float | str | bytes, data_type: StaticDataType) -> bytes
         if data_type in _INTEGERS and isinstance(plain, int):
             return _INTEGERS[data_type].encode(plain)
     except UnicodeEncodeError:
-        raise BadValue(f"{shown(str(plain))} has characters beyond ISO 8859-1") from None
+        raise BadValue(Text.of("eds.not_latin_1", value=shown(str(plain)))) from None
     except ValueError:
-        raise BadValue(f"{plain} is beyond {data_type.name}") from None
-    raise BadValue(f"{plain} is no {data_type.name}")
+        raise BadValue(_beyond(str(plain), data_type)) from None
+    raise BadValue(Text.of("eds.not_of_type", value=str(plain), type=data_type.name))
+
+
+def _beyond(text: str, data_type: StaticDataType) -> Text:
+    return Text.of("eds.beyond_type", value=text, type=data_type.name)
 
 
 def bits_of_type(data_type: StaticDataType) -> int | None:
@@ -132,16 +146,16 @@ def _octets(text: str) -> bytes:
     try:
         return bytes.fromhex(bare)
     except ValueError:
-        raise BadValue(f"{shown(text)} is not a row of bytes in hexadecimal") from None
+        raise BadValue(Text.of("eds.not_bytes", value=shown(text))) from None
 
 
 def _real(text: str) -> float:
     try:
         number = float(text.strip().replace(",", "."))
     except ValueError:
-        raise BadValue(f"{shown(text)} is not a number") from None
+        raise BadValue(Text.of("eds.not_number", value=shown(text))) from None
     if not math.isfinite(number):
-        raise BadValue(f"{shown(text)} is not a finite number")
+        raise BadValue(Text.of("eds.not_finite", value=shown(text)))
     return number
 
 
@@ -149,13 +163,13 @@ def _real_from_bits(number: Value, data_type: StaticDataType) -> float:
     """0x3F800000 for 1.0, as CiA 306 writes reals."""
     real, plain = _REALS[data_type], number.plain
     if not isinstance(plain, int) or number.plus_node_id:
-        raise BadValue("a real number has no $NODEID")
+        raise BadValue(Text.of("eds.real_with_node_id"))
     try:
         found = real.decode(Integer(real.size).encode(plain))
     except ValueError:
-        raise BadValue(f"{plain:#x} is beyond {data_type.name}") from None
+        raise BadValue(_beyond(hex(plain), data_type)) from None
     if not math.isfinite(found):
-        raise BadValue(f"{plain:#x} is not a finite number")
+        raise BadValue(Text.of("eds.not_finite", value=hex(plain)))
     return found
 
 
@@ -168,5 +182,5 @@ def _fitted(number: Value, data_type: StaticDataType | None, text: str) -> Value
     if fits.high < plain <= fits.high - fits.low and re.match(r"\s*0x", text, re.IGNORECASE):
         return Value(fits.from_word(plain), number.plus_node_id)
     if not number.plus_node_id and not fits.low <= plain <= fits.high:
-        raise BadValue(f"{shown(text)} is beyond {data_type.name}")
+        raise BadValue(_beyond(shown(text), data_type))
     return number

@@ -10,6 +10,7 @@ from bridge.eds.model import Commissioning, Description, DeviceInfo, Object, Rep
 from bridge.eds.objects import ObjectReader
 from bridge.eds.xdd_parameters import DEFAULT_ACCESS, XddParameters
 from bridge.eds.xml import Element, parse
+from bridge.text import Text
 
 _KEYS: Final = {
     "name": "parametername",
@@ -57,7 +58,7 @@ class _XddReader:
             if index is None:
                 continue
             if index in roots:
-                self._report.error(element.line, f"{index:04X}h appears again: left out")
+                self._report.error(element.line, Text.of("eds.object_again", object=f"{index:04X}h"))
                 continue
             roots[index] = self._section(element, f"{index:04X}")
             for child in element.all("CANopenSubObject"):
@@ -65,7 +66,8 @@ class _XddReader:
                 if sub is None:
                     continue
                 if sub in subs.setdefault(index, {}):
-                    self._report.error(child.line, f"{index:04X}h:{sub:02X} appears again: left out")
+                    said = Text.of("eds.object_again", object=f"{index:04X}h:{sub:02X}")
+                    self._report.error(child.line, said)
                     continue
                 subs[index][sub] = self._section(child, f"{index:04X}sub{sub:X}")
         reader = ObjectReader(self._fields, self._report, roots, subs, {})
@@ -77,9 +79,10 @@ class _XddReader:
         digits = text.lower().removeprefix("0x")
         if digits and len(digits) <= 4 and set(digits) <= set("0123456789abcdef") and int(digits, 16) <= most:
             if digits != text.lower():
-                self._report.warning(element.line, f"{name}={shown(text)} is taken as {digits}")
+                said = Text.of("eds.key_taken_as", key=name, value=shown(text), taken=digits)
+                self._report.warning(element.line, said)
             return int(digits, 16)
-        self._report.error(element.line, f"{name}={shown(text)} is not a hexadecimal number: left out")
+        self._report.error(element.line, Text.of("eds.not_hexadecimal", key=name, value=shown(text)))
         return None
 
     def _section(self, element: Element, name: str) -> Section:
@@ -98,14 +101,15 @@ class _XddReader:
         self._parameters.fill(section, element)
         has_subs = any(child.tag == "CANopenSubObject" for child in element.children)
         if section.get("AccessType") is None and not has_subs:
-            self._report.warning(element.line, f"{name} has no accessType: taken as {DEFAULT_ACCESS}")
+            said = Text.of("eds.no_xdd_access", object=name, access=DEFAULT_ACCESS)
+            self._report.warning(element.line, said)
             section.keys["accesstype"] = IniValue(DEFAULT_ACCESS, element.line)
         return section
 
     def _device_info(self) -> DeviceInfo:
         identity = self._root.first("DeviceIdentity")
         if identity is None:
-            self._report.warning(0, "there is no DeviceIdentity: the device is not named")
+            self._report.warning(0, Text.of("eds.no_device_identity"))
             return DeviceInfo()
         texts = {child.tag: IniValue(child.text.strip(), child.line) for child in identity.children}
         section = Section("DeviceIdentity", identity.line)

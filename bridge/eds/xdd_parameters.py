@@ -8,6 +8,7 @@ from typing import Final
 from bridge.eds.ini import IniValue, Section, shown
 from bridge.eds.model import ObjectType, Report, StaticDataType
 from bridge.eds.xml import Element
+from bridge.text import Text
 
 _ACCESS: Final = {
     "const": "const",
@@ -67,7 +68,8 @@ class XddParameters:
         parameter = self._parameters.get(reference or "")
         if parameter is None:
             if reference:
-                self._report.warning(element.line, f"there is no parameter {shown(reference)}")
+                said = Text.of("eds.no_parameter", parameter=shown(reference))
+                self._report.warning(element.line, said)
             return
         self._fill(section, parameter)
         template = self._templates.get(parameter.attributes.get("templateidref", ""))
@@ -91,7 +93,8 @@ class XddParameters:
     def _access(self, word: str, line: int) -> str:
         known = _ACCESS.get(word.lower())
         if known is None:
-            self._report.warning(line, f"access={shown(word)} is taken as {DEFAULT_ACCESS}")
+            said = Text.of("eds.key_taken_as", key="access", value=shown(word), taken=DEFAULT_ACCESS)
+            self._report.warning(line, said)
         return known or DEFAULT_ACCESS
 
     def _type_of(self, parameter: Element) -> str | None:

@@ -9,13 +9,18 @@ from typing import Final, NoReturn
 from xml.parsers import expat
 
 from bridge.eds.model import Report
+from bridge.text import Text
 
 _DEEPEST: Final = 64
 _MOST_ELEMENTS: Final = 500_000
 
 
 class _XmlRefused(Exception):
-    """The text is XML that we refuse to read further."""
+    """XML that we refuse to read further; ``said`` is why."""
+
+    def __init__(self, said: Text) -> None:
+        super().__init__(said)
+        self.said = said
 
 
 @dataclass(slots=True)
@@ -54,11 +59,12 @@ def parse(content: bytes, report: Report) -> Element:
     try:
         parser.Parse(content, True)
     except expat.ExpatError as error:
-        report.breaks_off(error.lineno, f"is not XML from here on: {expat.ErrorString(error.code)}")
+        why = expat.ErrorString(error.code)
+        report.breaks_off(error.lineno, Text.of("eds.not_xml", why=str(why)))
     except _XmlRefused as error:
-        report.breaks_off(parser.CurrentLineNumber, str(error))
+        report.breaks_off(parser.CurrentLineNumber, error.said)
     except (ValueError, LookupError) as error:  # it declares an encoding that Python does not have
-        report.error(1, f"cannot be decoded: {error}")
+        report.error(1, Text.of("eds.not_decoded", why=str(error)))
     return builder.root
 
 
@@ -82,14 +88,12 @@ class _Builder:
     @staticmethod
     def _refuse(*details: object) -> NoReturn:
         del details
-        raise _XmlRefused(
-            "has a document type or an entity: a device description needs none, so it is refused"
-        )
+        raise _XmlRefused(Text.of("eds.document_type"))
 
     def _start(self, tag: str, attributes: dict[str, str], line: int) -> None:
         self._count += 1
         if self._count > _MOST_ELEMENTS or len(self._open) > _DEEPEST:
-            raise _XmlRefused("has too many elements, or too many within each other")
+            raise _XmlRefused(Text.of("eds.too_many_xml_elements"))
         named = {_local(name).lower(): value.strip() for name, value in attributes.items()}
         element = Element(_local(tag), line, named)
         self._open[-1].children.append(element)

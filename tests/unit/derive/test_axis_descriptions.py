@@ -11,9 +11,13 @@ import pytest
 from bridge.base.errors import OperationFailed
 from bridge.command import Action, Identity, Outcome, Request, Role, Source, WriteParameter
 from bridge.derive import derive_family
+from bridge.derive.axis_descriptions import AxisDescription
+from bridge.derive.family import NotDerived
 from bridge.drive import DriveState
+from bridge.eds import Description
 from bridge.mapping.axes import on_axis
 from bridge.sim.core.nmt_slave import SlaveState
+from bridge.text import Text, render
 from tests.support.invented_eds import (
     BASIC,
     SPIN,
@@ -226,6 +230,29 @@ def test_what_cannot_be_driven_is_refused_in_one_sentence(sections: Mapping[str,
     with pytest.raises(OperationFailed, match=why) as refused:
         derive_family(described(sections), "spin.eds")
     assert "\n" not in str(refused.value)
+
+
+def test_a_refusal_names_the_objects_of_the_axis_in_both_languages() -> None:
+    no_rpdo = {
+        name: one for name, one in device(1, 2, access="const").items() if name[:4] not in ("1401", "1601")
+    }
+    with pytest.raises(NotDerived) as refused:
+        derive_family(described(no_rpdo), "spin.eds")
+    assert str(refused.value) == (
+        "spin.eds: velocity: axis 2: no RPDO of the device carries 6840h, and none can be made to"
+    )
+    assert render(refused.value.said, "de") == (
+        "spin.eds: velocity: Achse 2: kein RPDO des Geräts trägt 6840h, und keines lässt sich dazu bringen"
+    )
+
+
+def test_objects_among_the_facts_of_a_text_are_those_of_the_axis() -> None:
+    view = AxisDescription(2, Description("EDS"))
+    inner = Text.of("derive.missing_many", objects=("6040h", "1017h", Text.plain("6041h")))
+    said = Text.of("derive.profile", line=6040, profile=0x6040, wanted=inner)
+    assert str(view.of_node(said)) == (
+        "1000h in line 6040 has the profile 24640, not 6840h and 1017h and 6841h are not described"
+    )
 
 
 def test_beyond_the_predefined_cob_ids_the_file_has_to_say_them() -> None:

@@ -11,6 +11,7 @@ from bridge.base.errors import FileFaults
 from bridge.config.download import to_concise_dcf
 from bridge.eds import configuration, read_configuration, read_device
 from bridge.project import load_project
+from bridge.text import render
 
 DCF = """[DeviceComissioning]
 NodeID=5
@@ -127,6 +128,28 @@ def test_half_a_configuration_is_none(tmp_path: Path, name: str, old: str, new: 
         read_configuration(file)
 
 
+@pytest.mark.parametrize(
+    ("content", "english", "german"),
+    [
+        (
+            b"\x02",
+            "is too short for a concise DCF: it begins with the number of entries",
+            "ist zu kurz für eine Concise DCF: sie beginnt mit der Anzahl der Einträge",
+        ),
+        (b"\2\0\0\0\0\x20", "ends within entry 1 of 2", "endet innerhalb von Eintrag 1 von 2"),
+    ],
+)
+def test_what_a_concise_dcf_has_wrong_is_told_in_both_languages(
+    tmp_path: Path, content: bytes, english: str, german: str
+) -> None:
+    file = tmp_path / "a.cdcf"
+    file.write_bytes(content)
+    with pytest.raises(FileFaults) as caught:
+        read_configuration(file)
+    [fault] = caught.value.faults
+    assert [render(fault.said, language) for language in ("en", "de")] == [english, german]
+
+
 def test_a_site_takes_the_configuration_file_it_names(tmp_path: Path) -> None:
     (tmp_path / "site.toml").write_text(SITE)
     (tmp_path / "conveyor.dcf").write_text(DCF)
@@ -139,6 +162,8 @@ def test_a_configuration_file_that_is_not_there_is_a_fault_of_the_site_file(tmp_
         load_project(tmp_path / "site.toml")
     [fault] = caught.value.faults
     assert (fault.line, fault.key) == (11, "bus[0].node[0].configuration")
+    file = tmp_path / "conveyor.dcf"
+    assert render(fault.said, "de") == f"{file}: kann nicht gelesen werden: No such file or directory"
 
 
 def test_a_bad_line_of_a_configuration_file_is_named(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ def told_of(device: Mapping[str, Section]) -> list[str]:
     lines = content.decode().splitlines()
     found = contradictions(read_device(content, "spin.eds"))
     # Each names the section that speaks of it.
-    return [f"{lines[one.line - 1]} {one.text}" for one in found]
+    return [f"{lines[one.line - 1]} {one.said}" for one in found]
 
 
 def test_a_good_file_has_none() -> None:

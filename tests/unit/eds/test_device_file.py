@@ -1,8 +1,8 @@
-"""Files of any content, read or refused: nothing but ``FileFaults`` is ever raised."""
+"""Files of any content, read or refused: nothing but ``FileFaults`` is ever raised, and all is told in both
+languages."""
 
 from __future__ import annotations
 
-import contextlib
 import json
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,8 +14,10 @@ from typer.testing import CliRunner
 from bridge.base.errors import FileFaults
 from bridge.cli.app import make_app
 from bridge.eds import configuration, read_device
+from bridge.eds.model import Report
 from bridge.eds.pdos import pdos
 from bridge.mapping.loader import mappings_dir
+from bridge.text import LANGUAGES, render
 from tests.support.nightly import examples
 from tests.unit.eds.test_configuration import DCF
 from tests.unit.eds.test_xdd import XDD
@@ -41,12 +43,27 @@ def mutated(draw: st.DrawFn) -> bytes:
 
 
 def use(content: bytes) -> None:
-    with contextlib.suppress(FileFaults):
+    try:
         description = read_device(content, "wild.eds")
-        for node_id in (None, 127):
-            configuration(description, node_id)
-            list(pdos(description, node_id))
-        assert all(str(finding) for finding in description.findings)
+    except FileFaults as error:
+        assert all(render(fault.text, language) for fault in error.faults for language in LANGUAGES)
+        return
+    report = Report()
+    for node_id in (None, 127):
+        configuration(description, node_id, report)
+        list(pdos(description, node_id))
+    findings = (*description.findings, *report.findings())
+    assert all(str(finding) for finding in findings)
+    assert all(render(finding.said, language) for finding in findings for language in LANGUAGES)
+
+
+def test_what_a_value_has_wrong_is_told_in_both_languages() -> None:
+    content = b"[1000]\nParameterName=x\nDataType=5\nAccessType=ro\nDefaultValue=010\nHighLimit=300\n"
+    odd, wrong = read_device(content, "wild.eds").findings[-2:]
+    assert str(odd.said) == "DefaultValue: 010 is taken as 10, not as octal 8"
+    assert render(odd.said, "de") == "DefaultValue: 010 wird als 10 gelesen, nicht oktal als 8"
+    assert str(wrong.said) == "HighLimit: 300 is beyond UNSIGNED8: left out"
+    assert render(wrong.said, "de") == "HighLimit: 300 liegt außerhalb von UNSIGNED8: weggelassen"
 
 
 @given(st.binary(max_size=400))

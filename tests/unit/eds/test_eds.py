@@ -49,7 +49,7 @@ def read(text: str | bytes) -> Description:
 def odd(text: str) -> tuple[Description, list[Finding]]:
     """HEAD and ``text``, with what ``text`` is reported for besides not being listed."""
     description = read(HEAD + text)
-    return description, [one for one in description.findings if "not listed" not in one.text]
+    return description, [one for one in description.findings if "not listed" not in str(one.said)]
 
 
 def entry(keys: str, section: str = "2000") -> str:
@@ -75,7 +75,7 @@ def test_umlauts_are_read_however_they_were_saved(encoding: str) -> None:
 
 def test_the_line_of_the_first_foreign_character_is_named() -> None:
     [finding] = read(HEAD.replace("Mover", "Über").encode("cp1252")).findings
-    assert (finding.line, "Windows-1252" in finding.text) == (4, True)
+    assert (finding.line, "Windows-1252" in str(finding.said)) == (4, True)
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
@@ -87,14 +87,14 @@ def test_lower_case_keys_are_read_and_reported_once() -> None:
     description = read(HEAD.lower())
     assert description.number(0x1000) == 0x10192
     [finding] = description.findings
-    assert "not spelt as CiA 306 has it" in finding.text
+    assert "not spelt as CiA 306 has it" in str(finding.said)
     assert finding.line == 2
 
 
 def test_a_stray_line_is_named_and_ignored() -> None:
     description, [finding] = odd("this is nothing\n")
     assert (finding.line, finding.severity) == (21, FindingSeverity.ERROR)
-    assert "this is nothing" in finding.text
+    assert "this is nothing" in str(finding.said)
     assert description.number(0x1000) == 0x10192
 
 
@@ -114,7 +114,7 @@ def test_a_section_that_is_there_twice_is_joined() -> None:
     found = description.entry(0x2000)
     assert found
     assert (found.data_type, found.access) == (StaticDataType.UNSIGNED16, Access.WO)
-    assert "appears again, first in line 21" in finding.text
+    assert "appears again, first in line 21" in str(finding.said)
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_numbers_in_every_form(text: str, number: int) -> None:
 
 def test_a_number_that_c_would_read_in_octal_says_how_it_is_taken() -> None:
     _, [finding] = odd(entry("DataType=7\nAccessType=rw\nDefaultValue=010"))
-    assert "taken as 10, not as octal 8" in finding.text
+    assert "taken as 10, not as octal 8" in str(finding.said)
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_a_missing_sub_0_is_made() -> None:
         "[2000]\nParameterName=List\nObjectType=8\n[2000sub3]\nParameterName=C\nDataType=6\nAccessType=rw\n"
     )
     assert description.number(0x2000, 0) == 3
-    assert "no sub-index 0" in finding.text
+    assert "no sub-index 0" in str(finding.said)
 
 
 def test_compact_sub_indices_have_names_and_values_of_their_own() -> None:
@@ -251,7 +251,7 @@ def test_a_type_that_the_file_itself_describes_is_looked_up() -> None:
 
 def test_lists_and_objects_that_disagree_are_named() -> None:
     description = read(HEAD.replace("1=0x1000", "1=0x1001"))
-    texts = [finding.text for finding in description.findings]
+    texts = [str(finding.said) for finding in description.findings]
     assert texts == ["1001h is listed and not described", "1000h is described and not listed: taken"]
 
 
@@ -273,4 +273,4 @@ def test_a_file_that_cannot_be_opened_is_a_fault(tmp_path: Path) -> None:
 def test_the_report_of_a_wild_file_stays_short() -> None:
     description = read(HEAD + "nothing\n" * 10_000)
     assert len(description.findings) == 501
-    assert description.findings[-1].text == "and 9500 more of this kind"
+    assert str(description.findings[-1].said) == "and 9500 more of this kind"

@@ -18,7 +18,7 @@ class Case:
     @property
     def told(self) -> list[tuple[FindingSeverity, str]]:
         assert all(one.line == 7 for one in self.report.findings())
-        return [(one.severity, one.text) for one in self.report.findings()]
+        return [(one.severity, str(one.said)) for one in self.report.findings()]
 
 
 def test_a_number_within_its_range_is_taken() -> None:

@@ -13,7 +13,7 @@ from bridge.eds.model import FindingSeverity, Report
 def read(text: str) -> tuple[dict[str, dict[str, tuple[str, int]]], list[tuple[int, str]]]:
     report = Report()
     sections = read_sections(text.split("\n"), report)
-    told = [(one.line, one.text) for one in report.findings()]
+    told = [(one.line, str(one.said)) for one in report.findings()]
 
     keys = {
         name: {key: (found.text, found.line) for key, found in one.keys.items()}

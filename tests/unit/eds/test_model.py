@@ -19,6 +19,7 @@ from bridge.eds.model import (
     StaticDataType,
     Value,
 )
+from bridge.text import Text
 
 
 @pytest.mark.parametrize(
@@ -104,23 +105,23 @@ def test_an_object_is_found_by_its_index(indices: set[int], wanted: int) -> None
 
 def test_findings_come_in_the_order_of_the_file_and_their_number_has_an_end() -> None:
     report = Report()
-    report.warning(9, "second")
-    report.error(2, "first")
-    assert [one.text for one in report.findings()] == ["first", "second"]
+    report.warning(9, Text.plain("second"))
+    report.error(2, Text.plain("first"))
+    assert [str(one.said) for one in report.findings()] == ["first", "second"]
     for number in range(Report.most + 10):
-        report.warning(100 + number, "more")
+        report.warning(100 + number, Text.plain("more"))
     found = report.findings()
     assert len(found) == Report.most + 1
-    assert "12" in found[-1].text, "those that are left out are counted"
+    assert "12" in str(found[-1].said), "those that are left out are counted"
 
 
 def test_where_a_file_breaks_off_is_an_error_with_its_line() -> None:
-    report = Report()
-    report.breaks_off(7, "ends")
+    report, ends = Report(), Text.plain("ends")
+    report.breaks_off(7, ends)
     assert report.broken_off_at == 7
-    assert report.findings() == (Finding(7, FindingSeverity.ERROR, "ends"),)
-    assert str(Finding(7, FindingSeverity.ERROR, "ends")) == "error: line 7: ends"
-    assert str(Finding(0, FindingSeverity.WARNING, "odd")) == "warning: odd"
+    assert report.findings() == (Finding(7, FindingSeverity.ERROR, ends),)
+    assert str(Finding(7, FindingSeverity.ERROR, ends)) == "error: line 7: ends"
+    assert str(Finding(0, FindingSeverity.WARNING, Text.plain("odd"))) == "warning: odd"
 
 
 @pytest.mark.parametrize(

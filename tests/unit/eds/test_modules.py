@@ -49,7 +49,9 @@ def test_elements_follow_each_other_in_the_order_of_the_modules(modules: list[st
     description = with_modules(*modules)
     assert elements(description) == subs
     assert description.number(0x6000, 0) == (subs[-1] if subs else None)
-    assert not [one for one in description.findings if "6000" in one.text and " maps " not in one.text]
+    assert not [
+        one for one in description.findings if "6000" in str(one.said) and " maps " not in str(one.said)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -103,7 +105,7 @@ def test_an_element_says_what_the_module_says_and_has_a_name_of_its_own() -> Non
 def test_a_fixed_object_is_there_once_and_only_with_its_module() -> None:
     assert with_modules(AI2, AI2).entry(0x6423) is not None
     assert with_modules(DI8).entry(0x6423) is None
-    assert not [one for one in with_modules(AI2).findings if "6423" in one.text]
+    assert not [one for one in with_modules(AI2).findings if "6423" in str(one.said)]
 
 
 @pytest.mark.parametrize("name", ["AC-DI8", "ac-di8", " AC - DI8 ", "8 digital inputs", "1"])
@@ -140,12 +142,12 @@ def test_a_file_that_was_made_for_its_modules_has_their_elements_already() -> No
 def test_a_module_that_is_connected_and_not_described_is_told() -> None:
     description = read_device(coupler(more=connected(1, 9)), "coupler.dcf")
     assert description.plugged == (1,)
-    assert "module 9 is connected and not described" in [one.text for one in description.findings]
+    assert "module 9 is connected and not described" in [str(one.said) for one in description.findings]
 
 
 def test_that_none_is_plugged_in_is_told() -> None:
     description = read_device(coupler(), "coupler.eds")
-    assert [one.text for one in description.findings if "modules" in one.text] == [
+    assert [str(one.said) for one in description.findings if "modules" in str(one.said)] == [
         f"{len(MODULES)} modules are described and none is plugged in: their objects are missing"
     ]
     assert [one.order_code for one in description.modules] == [DI8, DI4, DO8, AI2]
@@ -156,7 +158,7 @@ def test_a_count_that_is_none_is_told_and_left_out(count: str) -> None:
     one = module(1, "Inputs", "IN", extension("6000", INPUTS, count))
     description = with_modules("IN", content=coupler(modules=(one,)))
     assert elements(description) == []
-    assert [one.text for one in description.findings if "its elements are left out" in one.text]
+    assert [str(one.said) for one in description.findings if "its elements are left out" in str(one.said)]
 
 
 @pytest.mark.landing
@@ -164,7 +166,7 @@ def test_no_more_elements_than_any_device_has_are_made() -> None:
     one = module(1, "Inputs", "IN", extension("6000", INPUTS, "254", more="ObjExtend=254"))
     description = with_modules(*["IN"] * 60, content=coupler(modules=(one,)))
     assert len(description.extended) == 10_000
-    assert "the modules have too many elements: left out" in [one.text for one in description.findings]
+    assert "the modules have too many elements: left out" in [str(one.said) for one in description.findings]
 
 
 @pytest.mark.parametrize("change", [str.lower, str.upper], ids=["lower", "upper"])

@@ -13,7 +13,7 @@ def read(text: str) -> tuple[Object, list[str]]:
     found: Description = read_device(f"{listed}{text}".encode(), "x.eds")
     one = found.object(0x2000)
     assert one is not None
-    return one, [finding.text for finding in found.findings if "2000h" in finding.text]
+    return one, [text for one in found.findings if "2000h" in (text := str(one.said))]
 
 
 VAR = "[2000]\nParameterName=Own\nObjectType=0x7\nDataType=0x0006\nAccessType=rw\n"

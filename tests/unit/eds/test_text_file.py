@@ -23,7 +23,7 @@ from bridge.eds.text_file import decode
 def test_each_line_is_read_in_its_encoding(content: bytes, text: str, findings: list[str]) -> None:
     report = Report()
     assert decode(content, report) == text
-    assert [one.text for one in report.findings()] == findings
+    assert [str(one.said) for one in report.findings()] == findings
     assert all(
         one.line == content[: content.index("ö".encode("cp1252"))].count(b"\n") + 1
         for one in report.findings()

@@ -85,7 +85,7 @@ def test_of_a_broken_file_the_whole_part_is_read() -> None:
     assert [one.index for one in description.objects] == [0x1000, 0x1800]
     [finding] = description.findings
     assert finding.severity is FindingSeverity.ERROR
-    assert "is not XML from here on" in finding.text
+    assert "is not XML from here on" in str(finding.said)
 
 
 def test_elements_within_elements_have_an_end() -> None:

@@ -89,7 +89,7 @@ def test_an_access_that_is_left_out_is_read_only(attributes: str, access: Access
 def test_an_unknown_access_is_read_only_and_told() -> None:
     description = read(parameter("<UINT/>", 'access="sometimes"'))
     assert only(description).access is Access.RO
-    assert [one.text for one in description.findings] == ["access=sometimes is taken as ro"]
+    assert [str(one.said) for one in description.findings] == ["access=sometimes is taken as ro"]
 
 
 def test_what_the_object_says_itself_comes_first() -> None:
@@ -101,7 +101,7 @@ def test_an_object_without_any_access_is_read_only_and_told() -> None:
     bare = '<CANopenObject index="2000" name="Thing" objectType="7" dataType="06"/>'
     description = read("", objects=bare)
     assert only(description).access is Access.RO
-    assert [one.text for one in description.findings] == ["2000 has no accessType: taken as ro"]
+    assert [str(one.said) for one in description.findings] == ["2000 has no accessType: taken as ro"]
 
 
 def test_nothing_is_configured_that_may_only_be_read() -> None:

@@ -44,7 +44,7 @@ def test_elements_are_found_wherever_they_stand_in_their_order() -> None:
 def test_a_document_type_is_refused(content: bytes) -> None:
     report = Report()
     root = parse(content, report)
-    assert "document type or an entity" in report.findings()[0].text
+    assert "document type or an entity" in str(report.findings()[0].said)
     assert report.broken_off_at == 1
     assert root.children == []
 
@@ -54,13 +54,13 @@ def test_what_stands_before_a_break_is_there() -> None:
     root = parse(b"<a>\n<b/>\n<c", report)
     assert [one.tag for one in root.walk()] == ["", "a", "b"]
     assert report.broken_off_at == 3
-    assert report.findings()[0].text.startswith("is not XML from here on: ")
+    assert str(report.findings()[0].said).startswith("is not XML from here on: ")
 
 
 def test_too_deep_a_tree_is_refused() -> None:
     report = Report()
     parse(b"<a>" * 100 + b"</a>" * 100, report)
-    assert report.findings()[0].text == "has too many elements, or too many within each other"
+    assert str(report.findings()[0].said) == "has too many elements, or too many within each other"
     fine = Report()
     parse(b"<a>" * 64 + b"</a>" * 64, fine)
     assert fine.findings() == ()

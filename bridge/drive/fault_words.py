@@ -117,11 +117,12 @@ class FaultWords:
         if german := self._german.get(name):
             return german
         if name.endswith("h"):
-            return self._emcy.text(int(name[:-1], 16))
+            return self._code_text(name[:-1]) or self._emcy.text(int(name[:-1], 16))
         return self._faults.texts.get(name) or self._emcy.events.get(name) or ""
 
     def _code_text(self, code: str) -> str:
-        """Text of an emergency code. One that begins with the drive's own numbers has their German."""
+        """Text of an emergency code, or of a group, that the family lists; "" for any other. One that begins
+        with the drive's own numbers has their German."""
         text = self._emcy.codes.get(code, "")
         numbers = _NUMBERS.match(text)
         german = self._german.get(numbers[1]) if numbers else None

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from bridge.mapping.entry_types import ObjectRef
 from bridge.mapping.model import Family
 from bridge.mapping.parameters import object_of
+from bridge.text import Text
+from bridge.tomlfile import Unfit
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +26,7 @@ class Alias:
 def aliases(family: Family) -> Iterator[Alias]:
     """Parameters, and elements of parameters, that stand for other objects.
 
-    Raises ValueError for a name that is no parameter of the family; the mapping's checks find that first.
+    Raises ``Unfit`` for a name that is no parameter of the family; the mapping's checks find that first.
     """
     for is_same, table in ((True, family.aliases.same), (False, family.aliases.related)):
         for name, targets in table.items():
@@ -35,10 +37,10 @@ def aliases(family: Family) -> Iterator[Alias]:
 
 
 def place_of(family: Family, name: str) -> ObjectRef:
-    """Object of the parameter that an alias names. Raises ValueError where there is none."""
+    """Object of the parameter that an alias names. Raises ``Unfit`` where there is none."""
     for parameter in family.parameter:
         if parameter.name == name and parameter.object is not None:
             return parameter.object
     if family.parameter_names is None:
-        raise ValueError("names of parameters need [parameter_names]")
+        raise Unfit(Text.of("mapping.no_parameter_names"))
     return object_of(family.parameter_names, name)

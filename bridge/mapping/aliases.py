@@ -7,16 +7,18 @@ from typing import Annotated, Final, cast
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from bridge.mapping.entry_types import Ref, Table
+from bridge.text import Text
+from bridge.tomlfile import Unfit
 
 COMMUNICATION: Final = range(0x1000, 0x2000)
 """The communication profile area (CiA 301 §7.5.1)."""
 
 
 def _split(value: object) -> object:
-    """Objects in a text, or in a list of texts, separated by spaces. Raises ValueError."""
+    """Objects in a text, or in a list of texts, separated by spaces. Raises ``Unfit``."""
     texts = cast("list[object]", value) if isinstance(value, list) else [value]
     if not texts or not all(isinstance(text, str) and text.split() for text in texts):
-        raise ValueError('must be objects as "1400:02", apart by spaces, or a list with one for each element')
+        raise Unfit(Text.of("mapping.alias_form"))
     return [str(text).split() for text in texts]
 
 

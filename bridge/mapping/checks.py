@@ -13,7 +13,8 @@ from bridge.mapping.checks_process import check_cob_id, check_parameter, check_p
 from bridge.mapping.checks_values import check_meanings, check_values
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import ControlWord, Family, pattern_bits
-from bridge.tomlfile import Key
+from bridge.text import Text
+from bridge.tomlfile import Key, Unfit
 
 NODE_POINTS: Final = (
     "nmt_state",
@@ -34,7 +35,8 @@ def check(family: Family, file: MergedFile) -> None:
     """Note in ``file`` all entries that do not go together."""
     facts = family.family
     if facts.node_id_low > facts.node_id_high:
-        file.fault(("family", "node_id_low"), f"is above node_id_high, {facts.node_id_high}")
+        said = Text.of("mapping.above_node_id_high", high=facts.node_id_high)
+        file.fault(("family", "node_id_low"), said)
     check_kind(family, file)
     if family.slot:
         check_process(family, file)
@@ -57,38 +59,40 @@ def check(family: Family, file: MergedFile) -> None:
 
 def _check_sdo(family: Family, file: MergedFile) -> None:
     slots = [slot.name for slot in family.slot]
-    twice(((f"{sdo.number}", ("sdo", s, "number")) for s, sdo in enumerate(family.sdo)), "SDO server", file)
+    numbers = ((f"{sdo.number}", ("sdo", s, "number")) for s, sdo in enumerate(family.sdo))
+    twice(numbers, Text.of("mapping.noun_sdo_server"), file)
     for s, sdo in enumerate(family.sdo):
         if sdo.slot is not None and sdo.slot not in slots:
-            hint = f"known: {', '.join(slots)}"
-            file.fault(("sdo", s, "slot"), f"there is no slot {sdo.slot!r}", hint)
+            said = Text.of("mapping.no_slot", slot=sdo.slot)
+            file.fault(("sdo", s, "slot"), said, Text.of("mapping.known", names=tuple(slots)))
         for name, cob_id in (("request", sdo.request), ("reply", sdo.reply)):
             check_cob_id(cob_id, family, ("sdo", s, name), file)
 
 
 def _check_parameters(family: Family, file: MergedFile) -> None:
     names = [(parameter.name, ("parameter", p, "name")) for p, parameter in enumerate(family.parameter)]
-    twice(names, "parameter", file)
+    twice(names, Text.of("mapping.noun_parameter"), file)
     points = [(one.leaf, ("parameter", p, "name")) for p, one in enumerate(family.parameter) if one.point]
     if len({one.name for one in family.parameter}) == len(family.parameter):
-        twice(points, "point of a parameter,", file)
+        twice(points, Text.of("mapping.noun_parameter_point"), file)
     for p, one in enumerate(family.parameter):
         key: Key = ("parameter", p)
         if one.object is None and family.parameter_names is None:
-            file.fault(key, f"{one.name} has no object", "give it one, or [parameter_names]")
+            said = Text.of("mapping.no_object", parameter=one.name)
+            file.fault(key, said, Text.of("mapping.no_object_advice"))
         else:
             try:
                 family.object_of(one)
-            except ValueError as error:
-                file.fault((*key, "name"), str(error))
+            except Unfit as error:
+                file.fault((*key, "name"), error.said)
         if one.low is not None and one.high is not None and one.low > one.high:
-            file.fault((*key, "low"), f"is above high, {one.high:g}")
+            file.fault((*key, "low"), Text.of("mapping.above_high", high=one.high))
         if one.every_ms and not one.point:
-            file.fault((*key, "every_ms"), "has no effect without point = true")
+            file.fault((*key, "every_ms"), Text.of("mapping.no_effect_without", setting="point = true"))
         if one.factor == 0:
-            file.fault((*key, "factor"), "must not be 0")
+            file.fault((*key, "factor"), Text.of("mapping.zero"))
         if one.data_type in ("string", "bytes") and (one.factor != 1 or one.states):
-            file.fault((*key, "data_type"), "a text has neither factor nor states")
+            file.fault((*key, "data_type"), Text.of("mapping.text_unscaled"))
 
 
 def _check_eeprom(family: Family, file: MergedFile) -> None:
@@ -102,16 +106,19 @@ def _check_eeprom(family: Family, file: MergedFile) -> None:
     if check_parameter(saving.parameter, family, key, file):
         one = family.parameter_named(saving.parameter)
         if not (one.command and one.writable):
-            file.fault(key, f"{one.name} is no command", "give it command = true")
+            said = Text.of("mapping.no_command", parameter=one.name)
+            file.fault(key, said, Text.of("mapping.no_command_advice"))
     if family.eeprom and family.eeprom.save:
-        file.fault(("eeprom", "save"), "has no effect beside save_command")
+        file.fault(("eeprom", "save"), Text.of("mapping.no_effect_beside", other="save_command"))
 
 
 def _check_polls(family: Family, file: MergedFile) -> None:
-    twice(((poll.name, ("poll", p, "name")) for p, poll in enumerate(family.poll)), "poll", file)
+    names = ((poll.name, ("poll", p, "name")) for p, poll in enumerate(family.poll))
+    twice(names, Text.of("mapping.noun_poll"), file)
     for p, poll in enumerate(family.poll):
         if poll.name in NODE_POINTS:
-            file.fault(("poll", p, "name"), f"every node has {poll.name!r} of its own", "choose another name")
+            said = Text.of("mapping.name_of_node", name=poll.name)
+            file.fault(("poll", p, "name"), said, Text.of("mapping.name_of_node_advice"))
         _check_integer(poll.data_type, ("poll", p, "data_type"), file)
 
 
@@ -124,12 +131,13 @@ def _check_bits(family: Family, file: MergedFile) -> None:
         *((poll.bits, ("poll", p, "bits")) for p, poll in enumerate(family.poll)),
     ]
     for bits, key in named:
-        twice(((name, (*key, place)) for place, name in enumerate(bits) if name), "bit", file)
+        names = ((name, (*key, place)) for place, name in enumerate(bits) if name)
+        twice(names, Text.of("mapping.noun_bit"), file)
 
 
 def _check_integer(data_type: DataType, key: Key, file: MergedFile) -> None:
     if not data_type.is_integer:
-        file.fault(key, "must be an integer type", "uint8, uint16, uint32, int16 or int32")
+        file.fault(key, Text.of("mapping.no_integer_type"), Text.of("mapping.no_integer_type_advice"))
 
 
 def _check_control_word(control: ControlWord, file: MergedFile) -> None:
@@ -139,23 +147,23 @@ def _check_control_word(control: ControlWord, file: MergedFile) -> None:
     commands["disable_voltage"] = control.disable_voltage
     for name, command in {"enabling": enabling, **commands}.items():
         if command.value & ~command.mask:
-            file.fault(("control_word", name), "value has bits outside its mask")
+            file.fault(("control_word", name), Text.of("mapping.beyond_mask"))
     for name, word in (("stopped", control.stopped), ("ready", control.ready), ("run", control.run)):
         key: Key = ("control_word", name)
         enables = word & enabling.mask == enabling.value
         if enables is not (name == "run"):
-            does = "would enable" if enables else "does not enable"
-            file.fault(key, f"{word:04X}h {does} the drive")
+            said = Text.of("mapping.would_enable" if enables else "mapping.does_not_enable", word=word)
+            file.fault(key, said)
         if control.valid_bit is not None and not word >> control.valid_bit & 1:
-            file.fault(key, f"{word:04X}h is not valid: bit {control.valid_bit} is 0")
+            file.fault(key, Text.of("mapping.word_invalid", word=word, bit=control.valid_bit))
         if word & acknowledge:
-            file.fault(key, f"{word:04X}h acknowledges: bit {control.acknowledge_bit} is 1")
+            file.fault(key, Text.of("mapping.word_acknowledges", word=word, bit=control.acknowledge_bit))
     for name, command in commands.items():
         if (control.run & ~command.mask | command.value) & enabling.mask == enabling.value:
-            file.fault(("control_word", name), "leaves the drive enabled")
+            file.fault(("control_word", name), Text.of("mapping.leaves_enabled"))
     for name, bits in (("forward", control.forward), ("reverse", control.reverse), ("begin", control.begin)):
         if bits & (enabling.mask | acknowledge):
-            file.fault(("control_word", name), "has bits of enabling or of the acknowledge")
+            file.fault(("control_word", name), Text.of("mapping.bits_of_enabling"))
 
 
 def _check_handshake(family: Family, file: MergedFile) -> None:
@@ -165,23 +173,23 @@ def _check_handshake(family: Family, file: MergedFile) -> None:
     commands = sorted(value.name for value in family.value if value.group == "command")
     key: Key = ("control_word", "handshake")
     if handshake.value not in commands:
-        message = f"there is no command value {handshake.value!r}"
-        file.fault((*key, "value"), message, f"known: {', '.join(commands)}")
+        said = Text.of("mapping.no_command_value", name=handshake.value)
+        file.fault((*key, "value"), said, Text.of("mapping.known", names=tuple(commands)))
     control = family.control_word
     if 1 << handshake.bit & (control.enabling.mask | 1 << control.acknowledge_bit):
-        file.fault((*key, "bit"), "is a bit of enabling or of the acknowledge")
+        file.fault((*key, "bit"), Text.of("mapping.bit_of_enabling"))
 
 
 def _check_states(family: Family, file: MergedFile) -> None:
     """Check that the word that is served while tripped decodes as *fault*, and that every state can occur."""
     states = family.status_word.state
     if not any(state.name == "operation_enabled" for state in states):
-        hint = "without it the bridge never knows that the drive moves"
-        file.fault(("status_word", "state"), 'needs a state named "operation_enabled"', hint)
+        said = Text.of("mapping.state_needed", state="operation_enabled")
+        file.fault(("status_word", "state"), said, Text.of("mapping.enabled_state_advice"))
     faults = [s for s, state in enumerate(states) if state.name == "fault"]
     _check_shadows(family, faults[:1], file)
     if not faults:
-        file.fault(("status_word", "state"), 'needs a state named "fault"')
+        file.fault(("status_word", "state"), Text.of("mapping.state_needed", state="fault"))
         return
     mask, value = pattern_bits(states[faults[0]].pattern)
     for s, state in enumerate(states[: faults[0]]):
@@ -189,8 +197,8 @@ def _check_states(family: Family, file: MergedFile) -> None:
         if not (mask & other_mask & (value ^ other_value)):
             file.fault(
                 ("status_word", "state", s, "pattern"),
-                f"{state.name} takes words that are a fault too",
-                "the first state that matches counts",
+                Text.of("mapping.state_takes_faults", state=state.name),
+                Text.of("mapping.state_takes_faults_advice"),
             )
 
 
@@ -205,7 +213,7 @@ def _check_shadows(family: Family, told: list[int], file: MergedFile) -> None:
             if other_mask & ~mask == 0 and value & other_mask == other_value:
                 file.fault(
                     ("status_word", "state", s, "pattern"),
-                    f"{states[s].name} is never told: {states[earlier].name} takes all its words",
-                    "the first state that matches counts: put the narrower pattern first",
+                    Text.of("mapping.state_shadowed", state=states[s].name, earlier=states[earlier].name),
+                    Text.of("mapping.state_shadowed_advice"),
                 )
                 break

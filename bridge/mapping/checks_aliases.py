@@ -6,6 +6,8 @@ from bridge.mapping.alias_places import aliases, place_of
 from bridge.mapping.aliases import COMMUNICATION
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family
+from bridge.text import Text
+from bridge.tomlfile import Unfit
 
 
 def check_aliases(family: Family, file: MergedFile) -> None:
@@ -20,12 +22,13 @@ def _are_known(family: Family, file: MergedFile) -> bool:
             key = ("aliases", kind, name)
             try:
                 place_of(family, name)
-            except ValueError as error:
-                file.fault(key, str(error))
+            except Unfit as error:
+                file.fault(key, error.said)
                 fine = False
             for ref in (ref for objects in targets for ref in objects):
                 if ref.index not in COMMUNICATION:
-                    file.fault(key, f"{ref} is no communication object", "those are 1000 … 1FFF")
+                    said = Text.of("mapping.no_communication_object", object=str(ref))
+                    file.fault(key, said, Text.of("mapping.no_communication_object_advice"))
     return fine
 
 
@@ -36,9 +39,11 @@ def _check_starts(family: Family, file: MergedFile) -> None:
         for n, start in enumerate(slot.start):
             alias = known.get((start.object.index, start.object.sub))
             if start.object.index in COMMUNICATION or alias:
-                what = f"{start.object} stands for {alias.objects[0]}, which" if alias else f"{start.object}"
+                written = str(start.object)
                 file.fault(
                     ("slot", s, "start", n, "object"),
-                    f"{what} belongs to the communication",
-                    "the keys of the slot's PDOs set theirs, the site file sets the others",
+                    Text.of("mapping.start_of_alias", object=written, other=str(alias.objects[0]))
+                    if alias
+                    else Text.of("mapping.start_of_communication", object=written),
+                    Text.of("mapping.start_of_communication_advice"),
                 )

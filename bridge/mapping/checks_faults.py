@@ -8,6 +8,7 @@ from bridge.mapping.checks_process import check_parameter, twice
 from bridge.mapping.faults import FORM_FIELD, FaultEntry
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family
+from bridge.text import Text
 from bridge.tomlfile import Key
 
 _WIDEST: Final = 32
@@ -17,22 +18,22 @@ def check_faults(family: Family, file: MergedFile) -> None:
     """Note in ``file`` all entries that do not go together."""
     emcy, faults = family.emcy, family.faults
     if emcy.events and emcy.event is None and emcy.number is None:
-        file.fault(("emcy", "events"), "has no meaning without emcy.event or emcy.number")
+        file.fault(("emcy", "events"), Text.of("mapping.events_without_place"))
     if emcy.number is not None and emcy.number.byte + emcy.number.size > 8:
-        file.fault(("emcy", "number"), "ends behind the message, which has bytes 0…7")
+        file.fault(("emcy", "number"), Text.of("mapping.number_beyond_message"))
     for name, given in (("current", faults.current), ("last", faults.last)):
         if given is not None:
             check_parameter(given.parameter, family, ("faults", name, "parameter"), file)
     for field in FORM_FIELD.finditer(faults.form):
         if field[2] and not _WIDEST > int(field[2]) >= int(field[3]):
-            file.fault(("faults", "form"), f"{field[0]} has no bits", "the higher one first, 31…0")
-    twice(((one.name, ("fault", n, "name")) for n, one in enumerate(family.fault)), "fault", file)
-    known = known_faults(family)
+            said = Text.of("mapping.form_without_bits", field=field[0])
+            file.fault(("faults", "form"), said, Text.of("mapping.form_without_bits_advice"))
     named: list[tuple[str, Key]] = [(one.name, ("fault", n, "name")) for n, one in enumerate(family.fault)]
+    twice(named, Text.of("mapping.noun_fault"), file)
+    known = known_faults(family)
     for name, key in [*named, *((name, ("faults", "german", name)) for name in faults.german)]:
         if name not in known and name.partition(".")[0] not in emcy.events:
-            hint = "it is in faults.texts, in emcy.events, or in emcy.codes with an h behind it"
-            file.fault(key, f"there is no fault {name!r}", hint)
+            file.fault(key, Text.of("mapping.no_fault", name=name), Text.of("mapping.no_fault_advice"))
     for n, one in enumerate(family.fault):
         _check_languages(one, ("fault", n), file)
     kinds: list[tuple[str, Key]] = [(kind, ("faults", "kinds", name)) for name, kind in faults.kinds.items()]
@@ -40,8 +41,9 @@ def check_faults(family: Family, file: MergedFile) -> None:
         kinds.append((faults.other_kind, ("faults", "other_kind")))
     for kind, key in kinds:
         if kind not in faults.advice:
-            hint = f"it has {', '.join(sorted(faults.advice)) or 'none'}"
-            file.fault(key, f"faults.advice has no {kind!r}", hint)
+            there = tuple(sorted(faults.advice))
+            hint = Text.of("mapping.it_has", names=there) if there else Text.of("mapping.it_has_none")
+            file.fault(key, Text.of("mapping.no_kind", kind=kind), hint)
 
 
 def known_faults(family: Family) -> dict[str, str]:
@@ -52,7 +54,8 @@ def known_faults(family: Family) -> dict[str, str]:
 
 def _check_languages(one: FaultEntry, key: Key, file: MergedFile) -> None:
     """Check that a cause or remedy in one language is there in the other."""
-    for what in ("cause", "remedy"):
+    for field in ("cause", "remedy"):
         for language, other in (("en", "de"), ("de", "en")):
-            if getattr(getattr(one, language), what) and not getattr(getattr(one, other), what):
-                file.fault((*key, other), f"has no {what}, which {language} has")
+            if getattr(getattr(one, language), field) and not getattr(getattr(one, other), field):
+                said = Text.of("mapping.one_language", field=field, language=language)
+                file.fault((*key, other), said)

@@ -7,7 +7,8 @@ from typing import Final
 from bridge.mapping.checks_process import check_parameter
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family, ProcessValue
-from bridge.tomlfile import Key
+from bridge.text import Text
+from bridge.tomlfile import Key, Unfit
 
 _TEXTS: Final = ("string", "bytes")
 _OF_MODE: Final = (10, 12, 13)
@@ -30,8 +31,8 @@ def check_values(family: Family, file: MergedFile) -> None:
         _check_conditions(family, value, key, file)
         first = seen.setdefault(value.leaf, (*key, "name"))
         if first != (*key, "name"):
-            message = f"point {value.leaf!r} is there twice"
-            file.fault((*key, "name"), message, f"first in line {file.line(first)}")
+            said = Text.of("mapping.twice", noun=Text.of("mapping.noun_point"), name=value.leaf)
+            file.fault((*key, "name"), said, Text.of("mapping.first_in_line", line=file.line(first)))
 
 
 def check_meanings(family: Family, file: MergedFile) -> None:
@@ -41,32 +42,33 @@ def check_meanings(family: Family, file: MergedFile) -> None:
         # The status word's bits may mean something in one mode of operation only.
         words = family.process.rpdo[1:] if meaning.group == "command" else family.process.tpdo
         if meaning.word not in words:
-            hint = f"known: {', '.join(words)}"
-            file.fault((*key, "word"), f"there is no value word {meaning.word!r}", hint)
+            said = Text.of("mapping.no_value_word", word=meaning.word)
+            file.fault((*key, "word"), said, Text.of("mapping.known", names=tuple(words)))
         try:
             family.object_of_meaning(meaning, family.sets)
-        except ValueError as error:
-            file.fault((*key, "parameter"), str(error))
+        except Unfit as error:
+            file.fault((*key, "parameter"), error.said)
 
 
 def _check_words(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
     process = family.process
     if (value.word is not None and value.words) or not (value.word_names or value.code):
-        file.fault(key, f"{value.name} needs one of word, words and code")
+        file.fault(key, Text.of("mapping.words_needed", value=value.name))
         return
     if value.code:
         _check_code(family, value, key, file)
         if not value.word_names:
             return
     if len(value.words) == 1 or len(set(value.word_names)) != len(value.word_names):
-        file.fault((*key, "words"), "must be two words, the low one first")
+        file.fault((*key, "words"), Text.of("mapping.two_words"))
     is_command = value.group == "command"
     # The control word goes through the watchdog's gate: nothing else writes it.
     known = process.rpdo[1:] if is_command else process.tpdo
     at = (*key, "word" if value.word is not None else "words")
     missing = [word for word in value.word_names if word not in known]
     for word in missing:
-        file.fault(at, f"there is no value word {word!r}", f"known: {', '.join(known)}")
+        hint = Text.of("mapping.known", names=tuple(known))
+        file.fault(at, Text.of("mapping.no_value_word", word=word), hint)
     if missing:
         return
     for slot in family.slot:
@@ -74,18 +76,21 @@ def _check_words(family: Family, value: ProcessValue, key: Key, file: MergedFile
         carried = [set(pdo.words or (process.rpdo if is_command else process.tpdo)) for pdo in pdos]
         names = set(value.word_names)
         if names <= set[str]().union(*carried) and not any(names <= words for words in carried):
-            file.fault(at, f"the words of {value.name} are in two PDOs of {slot.name}", "they must be in one")
+            said = Text.of("mapping.in_two_pdos", value=value.name, slot=slot.name)
+            file.fault(at, said, Text.of("mapping.in_two_pdos_advice"))
 
 
 def _check_code(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
     """Check that meanings tell the codes of the words that a value may be made from."""
     told = [meaning.word for meaning in family.meaning if meaning.group == value.group]
     untold = [word for word in value.word_names if word not in told]
-    if untold or not told:
-        which = ", ".join(untold) or f"{value.group} words"
-        file.fault((*key, "code"), f"no [[meaning]] tells what {which} carry")
+    if untold:
+        file.fault((*key, "code"), Text.of("mapping.no_meaning", words=tuple(untold)))
+    elif not told:
+        file.fault((*key, "code"), Text.of("mapping.no_meaning_of_group", group=value.group))
     if value.word_names and len(value.code) != len(value.word_names):
-        file.fault((*key, "code"), f"has {len(value.code)} for {len(value.word_names)} words")
+        said = Text.of("mapping.codes_unequal", count=len(value.code), words=len(value.word_names))
+        file.fault((*key, "code"), said)
 
 
 def _check_kind(value: ProcessValue, key: Key, file: MergedFile) -> None:
@@ -98,55 +103,59 @@ def _check_kind(value: ProcessValue, key: Key, file: MergedFile) -> None:
     }
     given = [name for name, is_given in kinds.items() if is_given]
     if len(given) > 1:
-        file.fault(
-            (*key, given[1]), f"{value.name} has {given[0]} already", "one of scale, states, bits, bit"
-        )
+        said = Text.of("mapping.two_kinds", value=value.name, kind=given[0])
+        file.fault((*key, given[1]), said, Text.of("mapping.two_kinds_advice"))
         return
     is_long = value.width == 2
-    if value.data_type is not None and value.data_type.endswith("32") is not is_long:
-        words = "two words" if is_long else "one word"
-        right = "int32, uint32 or real32" if is_long else "int16 or uint16"
-        file.fault((*key, "data_type"), f"{value.data_type} does not fit {words}", right)
+    kind = value.data_type
+    if kind is not None and kind.endswith("32") is not is_long:
+        said = Text.of("mapping.type_of_one_word" if is_long else "mapping.type_of_two_words", type=kind)
+        right = Text.of("mapping.types_of_two_words" if is_long else "mapping.types_of_one_word")
+        file.fault((*key, "data_type"), said, right)
         return
     if value.is_real and given:
-        file.fault((*key, given[0]), "has no meaning for a real32", "leave it out: the number is the value")
+        file.fault((*key, given[0]), Text.of("mapping.real_alone"), Text.of("mapping.real_alone_advice"))
         return
     if value.bit is not None and is_long:
-        file.fault((*key, "bit"), "is a bit of one word", "name it as word")
+        file.fault(
+            (*key, "bit"), Text.of("mapping.bit_of_one_word"), Text.of("mapping.bit_of_one_word_advice")
+        )
     if len(value.bits) > 16 * value.width:
-        file.fault((*key, "bits"), f"has {len(value.bits)} names for {16 * value.width} bits")
+        said = Text.of("mapping.more_names_than_bits", count=len(value.bits), bits=16 * value.width)
+        file.fault((*key, "bits"), said)
     if given and given[0] != "scale":
         for name in ("low", "high"):
             if getattr(value, name) is not None:
-                file.fault((*key, name), f"has no meaning with {given[0]}")
+                file.fault((*key, name), Text.of("mapping.no_meaning_with", other=given[0]))
     low, high = value.raw_range
     for number in value.states:
         if not low <= number <= high:
-            file.fault((*key, "states"), f"{number} is no {value.raw_type.value}", f"{low}…{high}")
+            said = Text.of("mapping.not_of_type", number=number, type=value.raw_type.value)
+            file.fault((*key, "states"), said, Text.of("range.between", low=str(low), high=str(high)))
     if value.low is not None and value.high is not None and value.low > value.high:
-        file.fault((*key, "low"), f"is above high, {value.high:g}")
+        file.fault((*key, "low"), Text.of("mapping.above_high", high=value.high))
 
 
 def _check_follows(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
     if value.follows is None:
         return
     if value.group != "command":
-        file.fault((*key, "follows"), "is for commands: an actual value follows nothing")
+        file.fault((*key, "follows"), Text.of("mapping.actual_follows"))
         return
     if value.code and not value.word_names:
-        file.fault((*key, "follows"), "needs words: with a code its place is not known before the boot-up")
+        file.fault((*key, "follows"), Text.of("mapping.follows_without_words"))
         return
     actual = {other.name: other for other in family.value if other.group == "actual"}
     followed = actual.get(value.follows)
     if followed is None:
-        message = f"there is no actual value {value.follows!r}"
-        file.fault((*key, "follows"), message, f"known: {', '.join(sorted(actual))}")
+        said = Text.of("mapping.no_actual_value", name=value.follows)
+        file.fault((*key, "follows"), said, Text.of("mapping.known", names=tuple(sorted(actual))))
     elif not followed.word_names or (followed.data_type, followed.scale, len(followed.word_names)) != (
         value.data_type,
         value.scale,
         len(value.word_names),
     ):
-        file.fault((*key, "follows"), f"{value.follows} has other words or another scale")
+        file.fault((*key, "follows"), Text.of("mapping.follows_another", value=value.follows))
 
 
 def _check_scale(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
@@ -157,15 +166,16 @@ def _check_scale(family: Family, value: ProcessValue, key: Key, file: MergedFile
     if scale.full is None:
         for name in ("at", "limit"):
             if name in scale.model_fields_set:
-                file.fault((*at, name), "has no meaning without full")
+                file.fault((*at, name), Text.of("mapping.no_meaning_without", setting="full"))
         if scale.factor == 0:
-            file.fault((*at, "factor"), "must not be 0")
+            file.fault((*at, "factor"), Text.of("mapping.zero"))
         return
     if scale.at is None:
-        file.fault((*at, "at"), "is missing", "the word at 100 %")
+        file.fault((*at, "at"), Text.of("toml.missing"), Text.of("mapping.at_missing_advice"))
     for name in ("factor", "offset"):
         if name in scale.model_fields_set:
-            file.fault((*at, name), "has no meaning with full", "value = word × full / at")
+            said = Text.of("mapping.no_meaning_with", other="full")
+            file.fault((*at, name), said, Text.of("mapping.scale_by_full"))
     _check_number(scale.full, family, (*at, "full"), file)
     if scale.over is not None:
         _check_number(scale.over, family, (*at, "over"), file)
@@ -174,7 +184,7 @@ def _check_scale(family: Family, value: ProcessValue, key: Key, file: MergedFile
 def _check_number(name: str, family: Family, key: Key, file: MergedFile) -> None:
     """Check that ``name`` is a listed parameter that holds a number."""
     if check_parameter(name, family, key, file) and family.parameter_named(name).data_type in _TEXTS:
-        file.fault(key, f"{name} is a text")
+        file.fault(key, Text.of("mapping.is_text", parameter=name))
 
 
 def _check_conditions(family: Family, value: ProcessValue, key: Key, file: MergedFile) -> None:
@@ -185,20 +195,22 @@ def _check_conditions(family: Family, value: ProcessValue, key: Key, file: Merge
     for place, name in enumerate(value.steady):
         _check_number(name, family, (*key, "steady", place), file)
     for name in [one.name for one in family.parameter if one.name in value.when and not one.read]:
-        file.fault((*key, "when", name), f"{name} cannot be read", "name one that the drive tells")
+        said = Text.of("mapping.unreadable", parameter=name)
+        file.fault((*key, "when", name), said, Text.of("mapping.unreadable_advice"))
     leaves = {one.leaf: one for one in family.value}
     seen = {value.leaf}
     needed = value.needs
     while needed is not None:
         if needed not in leaves or needed in seen:
-            known_leaves = ", ".join(sorted(set(leaves) - {value.leaf}))
-            why = "needs itself" if needed in seen else f"there is no value {needed!r}"
-            file.fault((*key, "needs"), why, f"known: {known_leaves}")
+            is_circle = needed in seen
+            said = Text.of("mapping.needs_itself") if is_circle else Text.of("mapping.no_value", name=needed)
+            others = tuple(sorted(set(leaves) - {value.leaf}))
+            file.fault((*key, "needs"), said, Text.of("mapping.known", names=others))
             return
         seen.add(needed)
         needed = leaves[needed].needs
     if value.otherwise and not value.when:
-        file.fault((*key, "otherwise"), "has no meaning without when")
+        file.fault((*key, "otherwise"), Text.of("mapping.no_meaning_without", setting="when"))
     _check_shared_bit(family, value, key, file)
 
 
@@ -210,13 +222,14 @@ def _check_shared_bit(family: Family, value: ProcessValue, key: Key, file: Merge
     for other in family.value:
         same = (other.group, other.word) == (value.group, value.word)
         if other is not value and same and other.bit == value.bit:
-            hint = "say when it is meant: code, when or needs"
-            file.fault((*key, "bit"), f"is {other.name}, too, and nothing says when", hint)
+            said = Text.of("mapping.bit_shared", other=other.name)
+            file.fault((*key, "bit"), said, Text.of("mapping.bit_shared_advice"))
             return
     is_of_mode = any(
         (one.group, one.word) == (value.group, value.word) and one.bit is not None and one.code
         for one in family.value
     )
     if is_of_mode and value.bit in _OF_MODE:
-        told = ", ".join(sorted({one.parameter for one in family.meaning if one.word == value.word}))
-        file.fault((*key, "bit"), f"has its meaning from {told} as others of this word", "give it a code")
+        told = tuple(sorted({one.parameter for one in family.meaning if one.word == value.word}))
+        said = Text.of("mapping.bit_of_mode", parameters=told)
+        file.fault((*key, "bit"), said, Text.of("mapping.bit_of_mode_advice"))

@@ -12,6 +12,7 @@ from bridge.config.field_types import Name as Name
 from bridge.config.model import Table as Table
 from bridge.image import DataType
 from bridge.text import Text
+from bridge.tomlfile import Unfit
 
 WORD_BITS: Final = 16
 _MOST_BITS: Final = 64
@@ -67,7 +68,7 @@ def _object(text: object) -> object:
         return text
     match = _OBJECT.fullmatch(text) if isinstance(text, str) else None
     if not match:
-        raise ValueError('must be an object as "3002:01", index and sub-index in hexadecimal')
+        raise Unfit(Text.of("mapping.object_form"))
     return ObjectRef(int(match[1], 16), int(match[2], 16))
 
 
@@ -77,43 +78,40 @@ def _mapped(text: object) -> object:
     matches = [_PART.fullmatch(part) for part in text.split("+")] if isinstance(text, str) else []
     found = [match for match in matches if match]
     if not found or len(found) != len(matches):
-        raise ValueError(
-            'must be an object as "3002:01", with its bits as "6060:00/8", or several in one word as '
-            '"2AC8:00+2830:00"'
-        )
+        raise Unfit(Text.of("mapping.mapped_form"))
     bits = tuple(int(match[3] or 0) for match in found)
     mapped = MappedObject(
         parts=tuple(ObjectRef(int(match[1], 16), int(match[2], 16)) for match in found), bits=bits
     )
     if any(match[3] and not 1 <= int(match[3]) <= _MOST_BITS for match in found):
-        raise ValueError(f"must have 1…{_MOST_BITS} bits")
+        raise Unfit(Text.of("mapping.bits_form", most=_MOST_BITS))
     if mapped.is_composite and sum(mapped.lengths) > WORD_BITS:
-        raise ValueError(f"has {sum(mapped.lengths)} bits, a word has {WORD_BITS}")
+        raise Unfit(Text.of("mapping.more_than_word", bits=sum(mapped.lengths), most=WORD_BITS))
     return mapped
 
 
 def _pattern(text: str) -> str:
     text = text.replace(" ", "")
     if not _PATTERN.fullmatch(text):
-        raise ValueError("must be written with 0, 1 and X (do not care), highest bit first")
+        raise Unfit(Text.of("mapping.pattern_form"))
     return text
 
 
 def _code(text: str) -> str:
     if not _CODE.fullmatch(text):
-        raise ValueError("must be four hexadecimal digits in capitals, or two and xx for the group")
+        raise Unfit(Text.of("mapping.code_form"))
     return text
 
 
 def _number(text: str) -> str:
     if not _NUMBER.fullmatch(text):
-        raise ValueError('must be a fault number with one decimal, such as "10.3"')
+        raise Unfit(Text.of("mapping.number_form"))
     return text
 
 
 def _decimal(text: str) -> str:
     if not _DECIMAL.fullmatch(text):
-        raise ValueError('must be a number in decimal, such as "41"')
+        raise Unfit(Text.of("mapping.decimal_form"))
     return str(int(text))
 
 
@@ -122,7 +120,7 @@ def _state(key: object) -> object:
         return int(key)
     if isinstance(key, int):
         return key
-    raise ValueError("must be a number in decimal, such as 3")
+    raise Unfit(Text.of("mapping.state_form"))
 
 
 def _text_schema(pattern: str) -> WithJsonSchema:

@@ -9,7 +9,8 @@ from pydantic import AfterValidator, Field
 
 from bridge.mapping import emcy_codes
 from bridge.mapping.entry_types import Decimal, EmcyCode, FaultNumber, Table, Wording
-from bridge.text import Words
+from bridge.text import Text, Words
+from bridge.tomlfile import Unfit
 
 FORM_FIELD: Final = re.compile(r"\{(number|group|hex|bits (\d{1,2})-(\d{1,2}))(?::(\d))?\}")
 """Fields of a ``FaultForm``, with the least number of their digits."""
@@ -18,13 +19,13 @@ _NAME: Final = re.compile(r"\d{1,10}(\.\d{1,3})?|[0-9A-F]{2}(?:[0-9A-F]{2}|xx)h"
 
 def _form(text: str) -> str:
     if re.search(r"[{}]", FORM_FIELD.sub("", text)):
-        raise ValueError("takes {number}, {group}, {hex} and {bits 15-0}, each with digits as in {group:3}")
+        raise Unfit(Text.of("mapping.fault_form"))
     return text
 
 
 def _fault_name(text: str) -> str:
     if not _NAME.fullmatch(text):
-        raise ValueError('must be a fault number "10.3", an event "41" or a code "8130h"')
+        raise Unfit(Text.of("mapping.fault_name"))
     return text
 
 

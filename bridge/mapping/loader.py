@@ -13,6 +13,7 @@ from bridge.base.errors import Fault, FileFaults
 from bridge.mapping.checks import check
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import Family
+from bridge.text import Text
 from bridge.tomlfile import TomlFile
 
 _SITE_FOLDER: Final = "mappings"
@@ -64,7 +65,7 @@ def load_family(name: str, folders: Sequence[Path] = ()) -> Family:
     paths = _files(folders).get(name)
     if not paths or is_template(paths[0]):
         path = paths[0] if paths else folders[0] / f"{name}.toml"
-        hint = f"there are: {', '.join(family_names(folders))}"
+        hint = Text.of("mapping.there_are", names=tuple(family_names(folders)))
         raise FileFaults([Fault(str(path), 0, "", missing(name, template=bool(paths)), hint)])
     return read_family(paths[0], folders)
 
@@ -75,9 +76,9 @@ def is_family(name: str, folders: Sequence[Path]) -> bool:
     return bool(paths) and not is_template(paths[0])
 
 
-def missing(name: str, *, template: bool) -> str:
+def missing(name: str, *, template: bool) -> Text:
     """Reason why no site can use a mapping of this name."""
-    return f"{name!r} is a template: it can only be extended" if template else f"there is no mapping {name!r}"
+    return Text.of("mapping.is_template" if template else "mapping.none", mapping=name)
 
 
 def template_names(folders: Sequence[Path] = ()) -> list[str]:
@@ -128,13 +129,13 @@ def _chain(first: TomlFile, folders: Sequence[Path]) -> list[TomlFile]:
         own = next((n for n, each in enumerate(candidates) if each.resolve() == here), None)
         following = candidates if own is None else candidates[own + 1 :]
         if not following:
-            what = "extends itself" if own is not None else missing(name, template=False)
-            others = ", ".join(other for other in sorted(files) if other != name)
-            file.fault(("extends",), what, f"there are: {others}")
+            said = Text.of("mapping.extends_itself") if own is not None else missing(name, template=False)
+            others = tuple(other for other in sorted(files) if other != name)
+            file.fault(("extends",), said, Text.of("mapping.there_are", names=others))
             file.finish()
         base = following[0]
         if any(base.resolve() == each.path.resolve() for each in chain):
-            file.fault(("extends",), f"{name!r} extends this file in its turn")
+            file.fault(("extends",), Text.of("mapping.extends_in_turn", mapping=name))
             file.finish()
         chain.insert(0, TomlFile(base))
     return chain

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final, cast
 
 from bridge.base.errors import Fault, FileFaults
-from bridge.text import Words
+from bridge.text import Said, Text
 from bridge.tomlfile import Key, TomlFile
 from bridge.tomlfile.file import Model, dotted, validated
 
@@ -66,12 +66,14 @@ class MergedFile:
                 self._remove(kind, known.index(name))
                 continue
             key: Key = ("without", n)
-            message = f"there is no {entry!r} in what this file extends"
-            names = [name for name in known if name]
+            said = Text.of("mapping.not_extended", entry=entry)
+            names = tuple(name for name in known if name)
             hint = (
-                f"known: {', '.join(names)}" if names else f"it is one of {', '.join(_BY_NAME)}, : and a name"
+                Text.of("mapping.known", names=names)
+                if names
+                else Text.of("mapping.without_form", kinds=tuple(_BY_NAME))
             )
-            self.faults.append(Fault(str(file.path), file.line(key), dotted(key), message, hint))
+            self.faults.append(Fault(str(file.path), file.line(key), dotted(key), said, hint))
 
     def _items(self, kind: str) -> list[Any]:
         items: object = self.data.get(kind) if kind in _BY_NAME else None
@@ -177,7 +179,7 @@ class MergedFile:
         file, source = self.place(key)
         return file.line(source)
 
-    def fault(self, key: Sequence[int | str], said: Words, hint: Words = "") -> None:
+    def fault(self, key: Sequence[int | str], said: Text, hint: Said = "") -> None:
         file, source = self.place(key)
         self.faults.append(Fault(str(file.path), file.line(source), dotted(source), said, hint))
 

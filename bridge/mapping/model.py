@@ -27,6 +27,8 @@ from bridge.mapping.own_supervision import OwnReaction as OwnReaction
 from bridge.mapping.own_supervision import OwnSupervision
 from bridge.mapping.parameters import Eeprom, Parameter, ParameterNames, object_of
 from bridge.mapping.process import Meaning, NodeTpdo, Pdo, Process, ProcessValue, SdoServer, Slot
+from bridge.text import Text
+from bridge.tomlfile import Unfit
 
 
 class FamilyTable(Table):
@@ -275,11 +277,11 @@ class Family(Table):
         return [*value.steady, *(name for name in value.scaled_by if not self.parameter_named(name).read)]
 
     def object_of(self, parameter: Parameter) -> ObjectRef:
-        """Object of a parameter. Raises ValueError where it has none."""
+        """Object of a parameter. Raises ``Unfit`` where it has none."""
         if parameter.object is not None:
             return self.place(parameter.object)
         if self.parameter_names is None:
-            raise ValueError(f"{parameter.name} has no object")
+            raise Unfit(Text.of("mapping.no_object", parameter=parameter.name))
         named = object_of(self.parameter_names, parameter.name, parameter.sets, parameter.elements)
         return self.place(named)
 
@@ -379,8 +381,8 @@ class Family(Table):
         return ObjectRef(ref.index, ref.sub + step * (in_set - 1))
 
     def object_of_meaning(self, meaning: Meaning, in_set: int) -> ObjectRef:
-        """Object in which the drive says what a word carries. Raises ValueError where there is none."""
+        """Object in which the drive says what a word carries. Raises ``Unfit`` where there is none."""
         if self.parameter_names is None:
-            raise ValueError(f"{meaning.parameter} has no object")
+            raise Unfit(Text.of("mapping.no_object", parameter=meaning.parameter))
         first = object_of(self.parameter_names, meaning.parameter, self.sets if self.sets > 1 else 0)
         return self.object_in_set(self.place(first), in_set)

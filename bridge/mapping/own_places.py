@@ -10,6 +10,7 @@ from typing import Final
 from bridge.canopen.datatypes import INTEGERS, Integer
 from bridge.config import BusTable, NodeTable
 from bridge.mapping.model import Family, ObjectRef, OwnObject, OwnSupervision, Slot
+from bridge.text import Said, Text
 
 LIFE_TIME_FACTOR: Final = (0x100D, 0)
 """Life time factor: the life time is guard time (100Ch) × this (CiA 301 §7.5.2.12)."""
@@ -119,20 +120,21 @@ def wanted(family: Family, bus: BusTable, node: NodeTable) -> list[OwnWant]:
     return wants
 
 
-def impossible(family: Family, time_ms: int) -> str:
+def impossible(family: Family, time_ms: int) -> Said:
     """Reason why ``own_timeout_ms`` cannot be this; empty if it can."""
     entry = settable(family)
     name = family.family.name
     if entry is None:
         guards = any(one.watches == "guarding" for one in family.own_supervision)
-        own = 'it has life guarding alone: supervision = "guarding", supervision_ms × life_time_factor'
-        return f"cannot be set in {name}: {own if guards else 'its mapping names no object for it'}"
-    if time_ms % entry.unit_ms:
-        return f"{time_ms} is no multiple of {entry.unit_ms:g} ms, the steps of {entry.name} in {name}"
+        return Text.of("mapping.own_time_by_guarding" if guards else "mapping.own_time_unplaced", family=name)
+    step_ms = entry.unit_ms
+    if time_ms % step_ms:
+        return Text.of("mapping.own_time_no_step", time=time_ms, step=step_ms, name=entry.name, family=name)
     place = place_of(family, entry)
     low, high = (1, 0xFFFF) if entry.watches == "heartbeat" else (max(1, place.low), place.high)
-    if not low <= time_ms / entry.unit_ms <= high:
-        return f"{time_ms} ms does not fit: {name} takes {low * entry.unit_ms:g}…{high * entry.unit_ms:g} ms"
+    if not low <= time_ms / step_ms <= high:
+        least_ms, most_ms = low * step_ms, high * step_ms
+        return Text.of("mapping.own_time_beyond", time=time_ms, family=name, low=least_ms, high=most_ms)
     return ""
 
 

@@ -11,6 +11,8 @@ from bridge.canopen.datatypes import Plain, TypeName, encode
 from bridge.config.field_types import PlainValue
 from bridge.image import DataType
 from bridge.mapping.entry_types import ObjectRef, Ref, States, Table
+from bridge.text import Text
+from bridge.tomlfile import Unfit
 
 GROUPS: Final = ("number", "letter", "element", "set")
 """Groups that the pattern of parameter names may have."""
@@ -38,12 +40,12 @@ def _name_pattern(text: str) -> str:
     try:
         pattern = re.compile(text, re.ASCII)
     except re.error as error:
-        raise ValueError(f"must be a regular expression: {error}") from None
+        raise Unfit(Text.of("mapping.pattern_syntax", why=str(error))) from None
     unknown = sorted(set(pattern.groupindex) - set(GROUPS))
     if unknown:
-        raise ValueError(f"must name the groups {', '.join(GROUPS)} only; it has {', '.join(unknown)}")
+        raise Unfit(Text.of("mapping.pattern_groups", groups=GROUPS, unknown=tuple(unknown)))
     if "number" not in pattern.groupindex:
-        raise ValueError("must have a group (?P<number>…)")
+        raise Unfit(Text.of("mapping.pattern_number", group="(?P<number>…)"))
     return text
 
 
@@ -185,36 +187,44 @@ class Eeprom(Table):
 
 
 def object_of(names: ParameterNames, name: str, sets: int = 0, elements: int = 0) -> ObjectRef:
-    """Object of the parameter called ``name``. Raises ValueError with what is wrong.
+    """Object of the parameter called ``name``. Raises ``Unfit`` with what is wrong.
 
     A name without a set means the first one of a parameter with ``sets``, one without an element the first of
     a parameter with ``elements``; elsewhere the sub-index is ``names.sub``. Where elements and sets share the
     sub-index, an element of a parameter without sets is in the first set (BU 2500 §6.6.1).
     """
     match = re.fullmatch(names.pattern, name, re.ASCII)
-    if match is None:
-        raise ValueError(f"{name!r} is no parameter; they are written as {names.example}")
-    groups = match.groupdict()
-    letter = (groups.get("letter") or "A").upper()
-    base = 16 if names.hexadecimal else 10
-    index = (
-        names.index
-        + names.letter_step * (ord(letter) - ord("A"))
-        + names.number_step * int(groups["number"], base)
-    )
+    numbers = None if match is None else _numbers_in(match, hexadecimal=names.hexadecimal)
+    if match is None or numbers is None:
+        raise Unfit(Text.of("mapping.no_parameter_name", name=name, example=names.example))
+    index = names.index + names.letter_step * numbers["letter"] + names.number_step * numbers["number"]
     sub = names.sub
-    element, in_set = groups.get("element"), groups.get("set")
+    element, in_set = numbers.get("element"), numbers.get("set")
+    first = names.element_first
     if element is not None or elements:
-        number = names.element_first if element is None else int(element, base)
-        sub += names.element_step * (number - names.element_first)
-        if elements and not 0 <= number - names.element_first < elements:
-            last = names.element_first + elements - 1
-            raise ValueError(f"{name!r}: its elements are {names.element_first}…{last}")
+        number = first if element is None else element
+        sub += names.element_step * (number - first)
+        if elements and not 0 <= number - first < elements:
+            raise Unfit(Text.of("mapping.no_element", name=name, low=first, high=first + elements - 1))
     if in_set is not None or sets or (names.set_step and (element is not None or elements)):
-        number = 1 if in_set is None else int(in_set)
+        number = 1 if in_set is None else in_set
         sub += names.set_step * number
         if sets and not 1 <= number <= sets:
-            raise ValueError(f"{name!r}: its parameter sets are 1…{sets}")
+            raise Unfit(Text.of("mapping.no_set", name=name, high=sets))
     if not (0 <= index <= 0xFFFF and 0 <= sub <= 0xFF):
-        raise ValueError(f"{name!r} would be the object {index:X}h:{sub:X}, which there cannot be")
+        raise Unfit(Text.of("mapping.impossible_object", name=name, index=index, sub=sub))
     return ObjectRef(index, sub)
+
+
+def _numbers_in(match: re.Match[str], *, hexadecimal: bool) -> dict[str, int] | None:
+    """Numbers of those groups that a name has, its letter counted from A; None where the pattern takes for a
+    number or a letter what is none, or where the name has no number."""
+    groups = {group: text for group, text in match.groupdict().items() if text is not None}
+    letter = groups.pop("letter", "") or "A"
+    base = 16 if hexadecimal else 10
+    try:
+        numbers = {group: int(text, 10 if group == "set" else base) for group, text in groups.items()}
+        numbers["letter"] = ord(letter.upper()) - ord("A")
+    except (ValueError, TypeError):  # several letters are no character
+        return None
+    return numbers if "number" in numbers else None

@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final, cast
 
+from bridge.base.data_type_texts import text_of_misfit
 from bridge.base.errors import Fault, FileFaults
+from bridge.canopen.datatypes import DataTypeError
 from bridge.config import MODULES, Site, mapping_key, read_site
 from bridge.image.limits import ValueNotTaken
 from bridge.mapping.loader import (
@@ -21,6 +23,7 @@ from bridge.mapping.loader import (
 from bridge.mapping.model import Family
 from bridge.mapping.own_places import impossible
 from bridge.mapping.process import SYNC_PERIOD
+from bridge.text import Text
 from bridge.tomlfile import RawTable, TomlFile
 
 DESCRIBED: Final = "eds:"
@@ -55,11 +58,12 @@ def load_site_and_families(path: Path, describe: Describe | None = None) -> tupl
             continue
         file_of_it = described_file(path, name)
         if MODULES in node.content and file_of_it is None:
-            hint = f'a coupler has its EDS as its mapping, "{DESCRIBED}FILE"'
-            file.fault((*node.key, MODULES), f"{name} knows of no modules", hint)
+            said = Text.of("mapping.no_modules", mapping=name)
+            file.fault((*node.key, MODULES), said, Text.of("mapping.no_modules_advice", prefix=DESCRIBED))
             continue
         if file_of_it is not None and not file_of_it.is_file():
-            file.fault((*node.key, "mapping"), f"there is no file {file_of_it}", _near(file_of_it))
+            said = Text.of("mapping.no_file", file=str(file_of_it))
+            file.fault((*node.key, "mapping"), said, _near(file_of_it))
             continue
         if describe and file_of_it is not None:
             try:
@@ -67,17 +71,20 @@ def load_site_and_families(path: Path, describe: Describe | None = None) -> tupl
             except FileFaults as error:
                 for fault in error.faults:
                     if fault.key == MODULES:
-                        file.fault((*node.key, MODULES), f"{file_of_it}: {fault.message}", fault.hint)
+                        said = Text.of("file.at", place=str(file_of_it), said=fault.said)
+                        file.fault((*node.key, MODULES), said, fault.advice)
                     elif fault not in of_families:
                         of_families.append(fault)
             continue
         if not is_family(name, folders):
-            known, templates = family_names(folders), template_names(folders)
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f'did you mean "{near[0]}"?' if near else f"there are: {', '.join(known)}"
-            if (path.parent / name).is_file():
-                hint = f'a device description is "{DESCRIBED}{name}"'
-            file.fault((*node.key, "mapping"), missing(name, template=name in templates), hint)
+            said = missing(name, template=name in template_names(folders))
+            is_description = (path.parent / name).is_file()
+            hint = (
+                Text.of("mapping.description_form", name=f"{DESCRIBED}{name}")
+                if is_description
+                else _near_family(name, family_names(folders))
+            )
+            file.fault((*node.key, "mapping"), said, hint)
             continue
         try:
             families[name] = load_family(name, folders)
@@ -90,11 +97,19 @@ def load_site_and_families(path: Path, describe: Describe | None = None) -> tupl
     return site, families
 
 
-def _near(missing: Path) -> str:
+def _near_family(missing: str, known: Sequence[str]) -> Text:
+    """Hint to a mapping of nearly that name, else to all that there are."""
+    near = difflib.get_close_matches(missing, known, n=1)
+    if near:
+        return Text.of("toml.did_you_mean", name=f'"{near[0]}"')
+    return Text.of("mapping.there_are", names=tuple(known))
+
+
+def _near(missing: Path) -> Text:
     """Hint to a file of nearly that name, else to how such a name is meant."""
     there = [one.name for one in missing.parent.glob("*") if one.is_file()]
     near = difflib.get_close_matches(missing.name, there, n=1)
-    return f"did you mean {near[0]}?" if near else "a name is relative to the site file"
+    return Text.of("toml.did_you_mean", name=near[0]) if near else Text.of("mapping.no_file_advice")
 
 
 def _nodes(file: TomlFile) -> list[RawTable]:
@@ -123,25 +138,29 @@ def _check_node(node: RawTable, family: Family, file: TomlFile) -> None:
     facts = family.family
     node_id = node.whole("id")
     if node_id is not None and not facts.node_id_low <= node_id <= facts.node_id_high:
-        allowed = f"{facts.node_id_low}…{facts.node_id_high}"
-        file.fault((*node.key, "id"), f"{facts.name} has addresses {allowed}, not {node_id}")
+        low, high = facts.node_id_low, facts.node_id_high
+        said = Text.of("mapping.node_id_range", family=facts.name, low=low, high=high, id=node_id)
+        file.fault((*node.key, "id"), said)
     _check_sdo_channels(node, family, file)
     drives = list(node.tables("drive"))
     if family.is_device and drives:
-        file.fault(drives[0].key, f"{facts.name} is no drive and has none", "leave [[bus.node.drive]] out")
+        said = Text.of("mapping.no_drives", family=facts.name)
+        file.fault(drives[0].key, said, Text.of("mapping.no_drives_advice"))
     if not family.is_device and not drives:
-        slots = ", ".join(slot.name for slot in family.slot)
-        file.fault((*node.key, "drive"), "is missing", f"a [[bus.node.drive]] for each drive; slots: {slots}")
+        slots = tuple(slot.name for slot in family.slot)
+        hint = Text.of("mapping.drives_missing_advice", slots=slots)
+        file.fault((*node.key, "drive"), Text.of("toml.missing"), hint)
     if not family.is_device and "unit_id" in node.content:
-        file.fault((*node.key, "unit_id"), "each drive has its own", "put it into [[bus.node.drive]]")
+        hint = Text.of("mapping.unit_id_of_drive_advice")
+        file.fault((*node.key, "unit_id"), Text.of("mapping.unit_id_of_drive"), hint)
     for key in ("own_timeout_ms", "enforce"):
         if family.is_device and not family.output and key in node.content:
-            file.fault((*node.key, key), f"{facts.name} has no outputs: has no effect")
+            file.fault((*node.key, key), Text.of("mapping.time_without_outputs", family=facts.name))
     _check_outputs(node, family, file)
     time_ms = node.whole("own_timeout_ms")
-    why = impossible(family, time_ms) if time_ms is not None and 1 <= time_ms <= 0xFFFF else ""
-    if why:
-        file.fault((*node.key, "own_timeout_ms"), why)
+    why_not = impossible(family, time_ms) if time_ms is not None and 1 <= time_ms <= 0xFFFF else ""
+    if why_not:
+        file.fault((*node.key, "own_timeout_ms"), why_not)
 
 
 def _check_outputs(node: RawTable, family: Family, file: TomlFile) -> None:
@@ -150,18 +169,20 @@ def _check_outputs(node: RawTable, family: Family, file: TomlFile) -> None:
         return
     outputs = node.table("outputs")
     if not family.output:
-        file.fault(outputs.key, f"{family.family.name} has no outputs", "leave [bus.node.outputs] out")
+        said = Text.of("mapping.no_outputs", family=family.family.name)
+        file.fault(outputs.key, said, Text.of("mapping.no_outputs_advice"))
         return
     known = {output.name: output for output in family.output}
     for name, value in outputs.table("on_expiry").content.items():
         key = (*outputs.key, "on_expiry", name)
         if name not in known:
-            file.fault(key, f"there is no output {name!r}", f"there are {', '.join(known)}")
+            hint = Text.of("mapping.outputs_there", names=tuple(known))
+            file.fault(key, Text.of("mapping.no_output", name=name), hint)
         elif value != "hold":
             try:
                 known[name].encode(value)
             except ValueNotTaken as error:
-                file.fault(key, error.said, 'a value, or "hold"')
+                file.fault(key, error.said, Text.of("mapping.on_expiry_advice"))
 
 
 def _check_sdo_channels(node: RawTable, family: Family, file: TomlFile) -> None:
@@ -173,19 +194,20 @@ def _check_sdo_channels(node: RawTable, family: Family, file: TomlFile) -> None:
     numbers = cast("list[object]", asked)
     for place, number in enumerate(numbers):
         if isinstance(number, int) and number >= 2 and number not in known:
-            hint = f"it has {', '.join(map(str, known))}" if known else "it has the first one only"
-            message = f"{family.family.name} has no SDO channel {number}"
-            file.fault((*node.key, "sdo_channels"), message, hint)
+            there = tuple(map(str, known))
+            hint = Text.of("mapping.it_has", names=there) if there else Text.of("mapping.first_channel_only")
+            said = Text.of("mapping.no_sdo_channel", family=family.family.name, number=number)
+            file.fault((*node.key, "sdo_channels"), said, hint)
         elif number in numbers[:place]:
-            file.fault((*node.key, "sdo_channels"), f"SDO channel {number} is there twice")
+            file.fault((*node.key, "sdo_channels"), Text.of("mapping.sdo_channel_twice", number=str(number)))
 
 
 def _check_drive(drive: RawTable, family: Family, file: TomlFile) -> None:
     slot = drive.text("slot")
     slots = [slot.name for slot in family.slot]
     if slot is not None and slot not in slots:
-        message = f"{family.family.name} has no slot {slot!r}"
-        file.fault((*drive.key, "slot"), message, f"it has {', '.join(slots)}")
+        said = Text.of("mapping.family_without_slot", family=family.family.name, slot=slot)
+        file.fault((*drive.key, "slot"), said, Text.of("mapping.it_has", names=tuple(slots)))
     if slot in slots:
         _check_pdos(drive, family, slot, file)
     scales = {name for value in family.value for name in value.scaled_by}
@@ -193,9 +215,9 @@ def _check_drive(drive: RawTable, family: Family, file: TomlFile) -> None:
     for name in given.content:
         parameter, in_set = family.parameter_and_set(name)
         if parameter not in scales or not 1 <= in_set <= family.sets:
-            message = f"{family.family.name} does not scale with {name!r}"
-            hint = f"it scales with {', '.join(sorted(scales))}" if scales else ""
-            file.fault((*given.key, name), message, hint)
+            said = Text.of("mapping.no_scale", family=family.family.name, parameter=name)
+            hint = Text.of("mapping.scales_with", parameters=tuple(sorted(scales))) if scales else ""
+            file.fault((*given.key, name), said, hint)
 
 
 def _check_sync_period(bus: RawTable, drive: RawTable, family: Family, file: TomlFile) -> None:
@@ -206,13 +228,19 @@ def _check_sync_period(bus: RawTable, drive: RawTable, family: Family, file: Tom
     for start in (start for slot in family.slot if slot.name == drive.text("slot") for start in slot.start):
         if not start.is_sync_period:
             continue
-        written = f"{family.family.name} writes it into {start.object} of {start.type}"
+        written = Text.of(
+            "mapping.sync_period_written",
+            family=family.family.name,
+            object=str(start.object),
+            type=start.type,
+        )
         try:
             start.download(period_ms)
-        except ValueError as error:
-            file.fault((*bus.key, SYNC_PERIOD), f"{written}: {error}")
+        except DataTypeError as error:
+            said = Text.of("mapping.sync_period_unfit", written=written, why=text_of_misfit(error))
+            file.fault((*bus.key, SYNC_PERIOD), said)
         if period_ms == 0:
-            file.fault((*bus.key, SYNC_PERIOD), f"must not be 0: {written}")
+            file.fault((*bus.key, SYNC_PERIOD), Text.of("mapping.sync_period_zero", written=written))
 
 
 def _check_pdos(drive: RawTable, family: Family, slot: str, file: TomlFile) -> None:
@@ -226,9 +254,10 @@ def _check_pdos(drive: RawTable, family: Family, slot: str, file: TomlFile) -> N
             number = table.whole("number")
             place = numbers[0] if number is None else number
             key = (*table.key, "number")
+            pdo = f"{name.upper()}{place}"
             if place not in numbers:
-                hint = f"it has {', '.join(map(str, numbers))}"
-                file.fault(key, f"{slot} of {family.family.name} has no {name.upper()}{place}", hint)
+                said = Text.of("mapping.no_pdo", slot=slot, family=family.family.name, pdo=pdo)
+                file.fault(key, said, Text.of("mapping.it_has", names=tuple(map(str, numbers))))
             elif place in seen:
-                file.fault(key, f"there are two tables for {name.upper()}{place}")
+                file.fault(key, Text.of("mapping.two_tables", pdo=pdo))
             seen.append(place)

@@ -12,6 +12,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
+from bridge.base.data_type_texts import text_of_misfit
+from bridge.canopen.datatypes import DataTypeError
 from bridge.text import Said, Text
 from bridge.tomlfile.unfit import Unfit
 
@@ -45,6 +47,8 @@ def _said(detail: ErrorDetails) -> Text:
     match detail["type"]:
         case "value_error" if isinstance(facts["error"], Unfit):
             return facts["error"].said
+        case "value_error" if isinstance(facts["error"], DataTypeError):
+            return text_of_misfit(facts["error"])
         case "missing":
             return Text.of("toml.missing")
         case "extra_forbidden":

@@ -97,3 +97,11 @@ def test_an_emergency_code_is_explained_too() -> None:
     one = FaultWords(LENZE, "de").of_code(0x8210)
     assert str(one) == "8210h PDO kürzer als erwartet"
     assert "verworfen" in one.cause
+
+
+def test_a_code_that_stands_for_numbers_of_the_drive_has_their_german() -> None:
+    words = FaultWords(NORD, "de")
+    said = "4.0/4.1 Überstrom Modul"
+    assert str(words.of_code(0x2200)) == f"2200h {said}"
+    assert words.code_text(0x2200) == said
+    assert words.code_text(0x5001) == "hardware"  # by its group, which has no number

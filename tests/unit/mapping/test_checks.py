@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
+from bridge.mapping import read_family
+from bridge.text import render
 from tests.support.sample_family import FAMILY, told
 
 
@@ -52,3 +56,25 @@ def test_an_sdo_server_leaves_room_for_the_node_id(tmp_path: Path):
     server = "[[sdo]]\nnumber = 2\nrequest = 0x7FF\nreply = 0x2C0\n[control_word]"
     [fault] = told(tmp_path, FAMILY.replace("[control_word]", server))
     assert "sdo[0].request: 7FFh leaves no room for the node id" in fault
+
+
+def test_a_finding_is_told_in_german_too(tmp_path: Path):
+    slot = FAMILY[FAMILY.index("[[slot]]") : FAMILY.index("[[value]]")]
+    path = tmp_path / "one.toml"
+    path.write_text(FAMILY + slot)
+    with pytest.raises(FileFaults) as caught:
+        read_family(path)
+    (fault,) = caught.value.faults
+    said, advice = render(fault.said, "de"), render(fault.advice, "de")
+    assert (said, advice) == ("Slot 'one' ist doppelt vorhanden", "zuerst in Zeile 9")
+
+
+def test_no_validator_raises_words_without_a_code():
+    """``Unfit`` has a text with a code; what ``MergedFile.fault`` takes is held by its types."""
+    bare = [
+        f"{path}:{node.lineno}"
+        for path in sorted(Path("bridge/mapping").glob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "ValueError"
+    ]
+    assert not bare

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,8 @@ from bridge.base.errors import FileFaults
 from bridge.drive import FaultWords
 from bridge.drive.fault_words import listed_faults
 from bridge.mapping import load_family
+from bridge.mapping.checks_faults import known_faults
+from bridge.mapping.entry_types import Wording
 from bridge.mapping.loader import family_names, mappings_dir, read_family
 from bridge.mapping.model import Family
 
@@ -88,6 +91,47 @@ def test_every_fault_has_a_german_name(name: str) -> None:
     family = FAMILIES[name]
     missing = [one for one in listed_faults(family) if one not in family.faults.german]
     assert not missing
+
+
+DENIES = {
+    "en": r"\b(?:no|not|never|none|nothing|nowhere|without|cannot)\b",
+    "de": r"\b(?:kein\w*|nicht|nichts|nie|ohne)\b",
+}
+"""Words that turn a sentence into its opposite."""
+DENIED_OTHERWISE = {
+    "Unnötiges darin weglassen": "what it does not need",
+    "ein zu bedienender Eingang des Antriebs blieb aus": "that has to be served was not",
+    "Die Telegrammübertragung ist fehlerhaft": "Telegrams are not transmitted correctly",
+}
+"""German that denies by another word what its English denies by one of these."""
+
+
+def sentences(family: Family) -> Iterator[tuple[str, str]]:
+    """English and German of all that a mapping file says in both."""
+    known, faults = known_faults(family), family.faults
+    yield from ((known[name], german) for name, german in faults.german.items() if name in known)
+    for one in (*family.fault, *faults.advice.values()):
+        yield one.en.cause, one.de.cause
+        yield one.en.remedy, one.de.remedy
+    for said in (faults.elsewhere, *(one.otherwise for one in (*family.value, *family.meaning))):
+        if isinstance(said, Wording):
+            yield said.en, said.de
+
+
+def denies(text: str, language: str) -> bool:
+    return re.search(DENIES[language], text, re.IGNORECASE) is not None
+
+
+def test_what_is_denied_in_one_language_is_denied_in_the_other() -> None:
+    pairs = {pair for family in FAMILIES.values() for pair in sentences(family)}
+    opposed = {pair for pair in pairs if denies(pair[0], "en") is not denies(pair[1], "de")}
+    explained = {
+        pair
+        for pair in opposed
+        if any(english in pair[0] and german in pair[1] for german, english in DENIED_OTHERWISE.items())
+    }
+    assert opposed == explained
+    assert len(explained) == len(DENIED_OTHERWISE)
 
 
 def changed(folder: Path, more: str) -> Family:

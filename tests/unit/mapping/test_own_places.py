@@ -18,6 +18,7 @@ from bridge.mapping.own_places import (
     suggested_ms,
     wanted,
 )
+from bridge.text import render
 from tests.support import sites
 
 NORD = sites.family(sites.FAMILY)
@@ -75,9 +76,10 @@ def test_a_want_with_conditions_is_met_by_whatever_is_none_of_them() -> None:
 
 def test_a_time_that_the_family_cannot_have_is_told() -> None:
     assert impossible(NORD, 300) == ""
-    assert "does not fit" in impossible(NORD, 10_000_000)
-    assert impossible(STOEBER, 300).startswith("cannot be set in ")
-    assert "life guarding alone" in impossible(STOEBER, 300)
+    assert "does not fit" in render(impossible(NORD, 10_000_000))
+    guarded = render(impossible(STOEBER, 300))
+    assert guarded.startswith("cannot be set in ")
+    assert "life guarding alone" in guarded
 
 
 def test_what_a_drive_will_hold_is_the_factory_s_until_somebody_writes_it() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from bridge.mapping.parameters import ParameterNames, object_of
+from bridge.tomlfile import Unfit
 
 NAMES = {
     "nord": {
@@ -67,3 +70,19 @@ def test_names_of_parameters_are_objects(
 def test_a_name_that_is_none(name: str, sets: int, elements: int, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         object_of(ParameterNames.model_validate(NAMES["nord"]), name, sets, elements)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "name"),
+    [
+        (r"P(?P<number>\w+)", "P10G"),
+        (r"P(?P<number>\d+)(\[(?P<element>\w+)\])?", "P102[a]"),
+        (r"P(?P<number>\d+)(\.(?P<set>\w))?", "P102.a"),
+        (r"P(?P<number>\d+)?", "P"),
+        (r"(?P<letter>[A-Z]+)(?P<number>\d+)", "AB10"),
+    ],
+)
+def test_a_pattern_that_takes_words_for_numbers_names_none(pattern: str, name: str) -> None:
+    names = ParameterNames.model_validate({"pattern": pattern, "example": "P102", "index": 0x2000})
+    with pytest.raises(Unfit, match=f"'{re.escape(name)}' is no parameter; they are written as P102"):
+        object_of(names, name)

@@ -219,6 +219,11 @@ def test_each_bit_has_a_german_name(mapping: str) -> None:
     assert {f"bit.{name}" for _, name in bits_of(mapping)} <= texts()["de"].keys()
 
 
+def test_no_name_of_a_bit_is_left_over() -> None:
+    known = {f"bit.{name}" for mapping in MAPPINGS for _, name in bits_of(mapping)}
+    assert {code for code in texts()["de"] if code.startswith("bit.")} <= known
+
+
 class Running(Bench):
     """A simulated drive of a family that runs, and is then stopped by the page's tab."""
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import Annotated, Final, Literal
+import sys
+from typing import Annotated, Final, Literal, TypeGuard
 
 from pydantic import Field
 
@@ -14,13 +15,14 @@ from bridge.image import DataType, Value
 from bridge.image.limits import ValueNotTaken, out_of_range
 from bridge.mapping.entry_types import Name, Ref, States, Table
 from bridge.mapping.parameters import VALUE_TYPES
-from bridge.mapping.process import Process
+from bridge.mapping.process import LARGEST_REAL, Process
 from bridge.text import Text
 
 SignalType = Literal[
     "bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "real32", "real64"
 ]
 _REALS: Final = {"real32": struct.Struct("<f"), "real64": struct.Struct("<d")}
+_LARGEST: Final = {"real32": LARGEST_REAL, "real64": sys.float_info.max}
 
 
 class Signal(Table):
@@ -81,7 +83,7 @@ class Signal(Table):
             if value not in (0, 1):
                 raise ValueNotTaken(Text.of("takes.bool", value=repr(value)))
             return int(bool(value))
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if not _is_number(value):
             raise ValueNotTaken(Text.of("takes.number"))
         low, high = self.low, self.high
         if (low is not None and value < low) or (high is not None and value > high):
@@ -89,14 +91,33 @@ class Signal(Table):
         number = (value - self.offset) / self.factor if self.is_scaled else value
         real = _REALS.get(self.data_type)
         if real is not None:
+            largest = _LARGEST[self.data_type]
+            if abs(number) > largest:
+                raise self._beyond(-largest, largest, value)
             return int.from_bytes(real.pack(number), "little")
         if not self.is_scaled and number != int(number):
             raise ValueNotTaken(Text.of("takes.whole_number", value=f"{value:g}"))
-        raw, kind = round(number), INTEGERS[self.data_type]
+        kind = INTEGERS[self.data_type]
+        # Within reach of the type first: what a scale makes of a large number may be infinite.
+        raw = round(max(kind.low - 1, min(kind.high + 1, number)))
         if not kind.low <= raw <= kind.high:
-            ends = [kind.low * self.factor + self.offset, kind.high * self.factor + self.offset]
-            raise out_of_range(min(ends), max(ends), value)
+            raise self._beyond(kind.low, kind.high, value)
         return raw & ((1 << self.size) - 1)
+
+    def _beyond(self, low: float, high: float, value: float) -> ValueNotTaken:
+        """Refusal of a value that the type, from ``low`` to ``high``, does not hold."""
+        ends = [low * self.factor + self.offset, high * self.factor + self.offset]
+        return out_of_range(min(ends), max(ends), value)
+
+
+def _is_number(value: object) -> TypeGuard[int | float]:
+    """Whether it is a finite number. An integer of more than 308 digits counts as infinite."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 OnExpiry = bool | int | float | Literal["hold"]

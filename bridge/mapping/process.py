@@ -20,7 +20,8 @@ ValueKind = Literal["int16", "uint16", "int32", "uint32", "real32"]
 REAL: Final = "real32"
 """Type of a floating-point number of two words (CiA 301 §7.1.6.6), which is its own value, without a
 scale."""
-_LARGEST_REAL: Final = float.fromhex("0x1.fffffep+127")
+LARGEST_REAL: Final = float.fromhex("0x1.fffffep+127")
+"""Largest number of a real32."""
 
 
 class Process(Table):
@@ -292,7 +293,7 @@ class ProcessValue(Table):
     @property
     def raw_range(self) -> tuple[int, int] | tuple[float, float]:
         if self.is_real:
-            return -_LARGEST_REAL, _LARGEST_REAL
+            return -LARGEST_REAL, LARGEST_REAL
         number = INTEGERS[self.raw_type]
         return number.low, number.high
 

@@ -53,6 +53,9 @@ def test_a_type_has_its_length_and_its_sign(
     assert signal("int16", factor=0.1).value_type is DataType.FLOAT
 
 
+LARGEST = struct.unpack("<f", b"\xff\xff\x7f\x7f")[0]
+
+
 @pytest.mark.parametrize(
     ("data_type", "more", "value", "why"),
     [
@@ -64,6 +67,11 @@ def test_a_type_has_its_length_and_its_sign(
         ("uint8", {"low": 1, "high": 9}, 10, "takes 1…9, not 10"),
         ("uint8", {}, 256, "takes 0…255, not 256"),
         ("int8", {"factor": -0.5}, 100, "takes -63.5…64, not 100"),
+        ("real64", {}, 10**400, "takes a number"),
+        ("uint8", {"factor": 0.001}, 1.7e308, "takes 0…0.255, not 1.7e+308"),
+        ("real32", {}, 1e39, f"takes -{LARGEST:.0f}…{LARGEST:.0f}, not 1e+39"),
+        ("real32", {"factor": 1e-30}, 1e300, "takes -340282000…340282000, not 1e+300"),
+        ("real64", {"factor": 1e-308}, -1e300, "takes -1.79769…1.79769, not -1e+300"),
     ],
 )
 def test_what_an_output_does_not_take_is_told_with_what_it_does(

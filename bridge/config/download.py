@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from bridge.canopen.sdo import COMMANDS
+from bridge.text import Text
+from bridge.tomlfile import Unfit
 
 _HEAD: Final = struct.Struct("<HBI")
 _COUNT: Final = struct.Struct("<I")
@@ -39,24 +41,25 @@ class Download:
 def parse_concise_dcf(content: bytes) -> tuple[Download, ...]:
     """The objects of a concise DCF, 1F22h (CiA 302-3): count, then index, sub-index, size, data.
 
-    Raises ValueError that names the entry where the stream is cut or says something impossible.
+    Raises Unfit that names the entry where the stream is cut or says something impossible.
     """
     if len(content) < _COUNT.size:
-        raise ValueError("is too short for a concise DCF: it begins with the number of entries")
+        raise Unfit(Text.of("download.short"))
     count = _COUNT.unpack_from(content)[0]
     place = _COUNT.size
     found: list[Download] = []
     for entry in range(1, count + 1):
         if place + _HEAD.size > len(content):
-            raise ValueError(f"ends within entry {entry} of {count}")
+            raise Unfit(Text.of("download.cut", entry=entry, count=count))
         index, sub, size = _HEAD.unpack_from(content, place)
         place += _HEAD.size
         if not size or place + size > len(content):
-            raise ValueError(f"entry {entry}, {index:04X}h:{sub:02X}, has an impossible size of {size} bytes")
+            said = Text.of("download.size", entry=entry, index=index, sub=sub, size=size)
+            raise Unfit(said)
         found.append(Download(index, sub, content[place : place + size], index not in COMMANDS))
         place += size
     if place != len(content):
-        raise ValueError(f"has {len(content) - place} bytes after its {count} entries")
+        raise Unfit(Text.of("download.surplus", surplus=len(content) - place, count=count))
     return tuple(found)
 
 

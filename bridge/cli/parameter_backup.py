@@ -23,6 +23,7 @@ from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.codec import shown
 from bridge.parameter.factory import DESCRIPTIONS, described
 from bridge.parameter.set_file import fault_of, read_set
+from bridge.text import Text
 
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="a parameter set, TOML")]
 Wait = Annotated[
@@ -174,9 +175,8 @@ def refuse_another(file: Path, content: BackupFile, identity: Mapping[str, int])
     """Raises ``FileFaults`` where the file is of another kind of node than has told ``identity``."""
     if found := backups.why_another(content.identity, identity):
         name, why = found
-        raise FileFaults(
-            [fault_of(file, content, name, f"{why}; nothing written", "a backup of such a node")]
-        )
+        said = Text.of("set_file.nothing_written", why=why)
+        raise FileFaults([fault_of(file, content, name, said, Text.of("set_file.other_node_advice"))])
 
 
 def differences(target: Target, values: Mapping[str, Value]) -> backups.Comparison:

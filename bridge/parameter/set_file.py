@@ -9,6 +9,7 @@ from bridge.parameter import backups
 from bridge.parameter.backup_file import BackupFile, read_backup
 from bridge.parameter.factory import DESCRIPTIONS, factory
 from bridge.parameter.names import Names
+from bridge.text import Said, Text
 
 
 def read_set(file: Path, names: Names, mapping: str, drive: str, node_id: int) -> BackupFile:
@@ -17,21 +18,22 @@ def read_set(file: Path, names: Names, mapping: str, drive: str, node_id: int) -
     if file.suffix.lower() in DESCRIPTIONS:
         objects = factory(file, names, node_id)
         if not objects:
-            hint = "the EDS, DCF or XDD file of this drive"
-            raise FileFaults([Fault(str(file), 0, "", f"has no factory settings of {drive}", hint)])
+            said = Text.of("set_file.no_factory", drive=drive)
+            raise FileFaults([Fault(str(file), 0, "", said, Text.of("set_file.no_factory_advice"))])
         return BackupFile(mapping, drive, "", {}, {}, objects=objects)
     content = read_backup(file)
     if content.mapping != mapping:
-        message = f"the file is of {content.mapping}, and {drive} has {mapping}"
-        raise FileFaults([fault_of(file, content, "mapping", message, "a backup of such a drive")])
+        said = Text.of("set_file.other_mapping", of_file=content.mapping, drive=drive, of_drive=mapping)
+        advice = Text.of("set_file.other_mapping_advice")
+        raise FileFaults([fault_of(file, content, "mapping", said, advice)])
     faults = [
-        fault_of(file, content, name, str(error)) for name, error in backups.misfits(names, content.all)
+        fault_of(file, content, name, error.said) for name, error in backups.misfits(names, content.all)
     ]
     if faults:
         raise FileFaults(faults)
     return content
 
 
-def fault_of(file: Path, content: BackupFile, name: str, message: str, hint: str = "") -> Fault:
+def fault_of(file: Path, content: BackupFile, name: str, said: Text, advice: Said = "") -> Fault:
     """A fault at the line of ``file`` that has ``name``."""
-    return Fault(str(file), content.lines.get(name, 0), name, message, hint)
+    return Fault(str(file), content.lines.get(name, 0), name, said, advice)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from bridge.base.errors import Fault, FileFaults
@@ -32,6 +33,18 @@ def read_set(file: Path, names: Names, mapping: str, drive: str, node_id: int) -
     if faults:
         raise FileFaults(faults)
     return content
+
+
+def why_another(of_file: Mapping[str, int], of_node: Mapping[str, int]) -> tuple[str, Text] | None:
+    """Part of its identity by which a set is not of a drive of this kind, and the reason; None where it is,
+    or where the set does not say."""
+    for name in ("vendor", "product"):
+        of_set, own = of_file.get(name), of_node.get(name)
+        if of_set is not None and own is None:
+            return name, Text.of("parameter_set.unknown_node", part=name, of_file=of_set)
+        if of_set is not None and own is not None and of_set != own:
+            return name, Text.of("parameter_set.other_node", part=name, of_file=of_set, of_node=own)
+    return None
 
 
 def fault_of(file: Path, content: BackupFile, name: str, said: Text, advice: Said = "") -> Fault:

@@ -40,7 +40,7 @@ def test_silence_that_stops_nobody_is_refused_with_what_would(tmp_path: Path) ->
     )
     assert '"disable_voltage", "quick_stop" or "stop"' in fault.hint
     assert render(fault.advice, "de") == (
-        '"disable_voltage", "quick_stop" oder "stop"; oder own_timeout_ms und enforce = true, wo er seine '
+        '"disable_voltage", "quick_stop" oder "stop"; oder own_timeout_ms und enforce = true, falls er seine '
         "Prozessdaten selbst überwacht"
     )
 

@@ -20,6 +20,7 @@ from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row
 from bridge.northbound.modbus.units import device_maps, drive_maps, units_of
 from bridge.northbound.zenoh.keys import KeySpace
 from bridge.project import Project
+from bridge.text import Text
 
 _NAMESPACE: Final = "urn:drivebridge:points"
 _POINT: Final = ("type", "unit", "access", "description")
@@ -80,7 +81,7 @@ def opcua_table(project: Project) -> ExportTable:
 def zenoh_table(project: Project) -> ExportTable:
     """Every key: data type, unit, access, description. Raises ``OperationFailed`` without zenoh."""
     if project.site.zenoh is None:
-        raise OperationFailed(f"{project.path} has no [zenoh] table")
+        raise OperationFailed(Text.of("export.no_zenoh", site=str(project.path)))
     catalogue = _catalogue(project)
     points = catalogue.points
     space = KeySpace(project.site.zenoh.prefix, project.site.site.name, points)
@@ -122,8 +123,5 @@ def _dbc_writer() -> Callable[[BusDescription], str]:
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] != "cantools":
             raise
-        raise OperationFailed(
-            "writing a DBC file needs cantools, which is not installed: "
-            f"`{sys.executable} -m pip install cantools` (or install drivebridge as drivebridge[dbc])"
-        ) from None
+        raise OperationFailed(Text.of("export.no_cantools", python=sys.executable)) from None
     return dbc_text

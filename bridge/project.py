@@ -47,12 +47,12 @@ def _refuse_vain_silence(project: Project) -> None:
     found = list(_vain_silences(project))
     if found:
         file, _ = read_site(project.path)
-        for where, why, hint in found:
-            file.fault(where, why, hint)
+        for where, why, advice in found:
+            file.fault(where, why, advice)
         raise FileFaults(file.faults)
 
 
-def _vain_silences(project: Project) -> Iterator[tuple[Key, Text, str]]:
+def _vain_silences(project: Project) -> Iterator[tuple[Key, Text, Text]]:
     """Keys of the site file that ask for silence, why it would not stop the drive, and what would."""
     for b, bus in enumerate(project.site.bus):
         for n, node in enumerate(bus.node):
@@ -62,7 +62,8 @@ def _vain_silences(project: Project) -> Iterator[tuple[Key, Text, str]]:
                 table = ("bus", b, "node", n, "drive", d)
                 if drive.reaction.holds:
                     if drive.then_silence_ms:
-                        yield (*table, "then_silence_ms"), _NEVER_SILENT, "0 (never), or another on_expiry"
+                        advice = Text.of("check.never_silent_advice")
+                        yield (*table, "then_silence_ms"), Text.of("check.never_silent"), advice
                     continue
                 slot = family.slot_named(drive.slot)
                 of_drive = family.of_slot(slot)
@@ -73,24 +74,26 @@ def _vain_silences(project: Project) -> Iterator[tuple[Key, Text, str]]:
                 why = Text.of("check.silence_does_not_stop", why=why)
                 watch = _own_watch(family, node, slot)
                 if drive.reaction.is_silent:
-                    hint = f"{_OTHERS}; or {watch}"
-                    yield (*table, "on_expiry"), why, hint
+                    yield (*table, "on_expiry"), why, _other_reaction(watch)
                 if drive.then_silence_ms:
-                    yield (*table, "then_silence_ms"), why, f"0 (never); or {watch}"
+                    yield (*table, "then_silence_ms"), why, Text.of("check.then_silence_advice", watch=watch)
 
 
 _STOPS: Final = [f'"{name}"' for name, rule in REACTIONS.items() if rule.sends_stop]
-_OTHERS: Final = f"{', '.join(_STOPS[:-1])} or {_STOPS[-1]}"
 """Reactions that stop any drive."""
-_NEVER_SILENT: Final = Text.of("check.never_silent")
 
 
-def _own_watch(family: Family, node: NodeTable, slot: Slot) -> str:
+def _other_reaction(watch: Text) -> Text:
+    *others, last = _STOPS
+    return Text.of("check.silent_reaction_advice", reactions=tuple(others), last=last, watch=watch)
+
+
+def _own_watch(family: Family, node: NodeTable, slot: Slot) -> Text:
     """Text on the settings that make silence a stop."""
     channels = channels_needed(family, node, [slot])
-    watch = "own_timeout_ms and enforce = true where it has a watch of its own over its process data"
-    reached = f", and sdo_channels = {channels}, over which its own parameters are reached"
-    return watch + reached if channels else watch
+    if channels:
+        return Text.of("check.own_watch_channels_advice", channels=str(channels))
+    return Text.of("check.own_watch_advice")
 
 
 def _settings(node: NodeTable, from_file: Sequence[Download]) -> Raw:

@@ -6,6 +6,7 @@ The command line turns each into its exit code; nothing below it decides how a p
 from __future__ import annotations
 
 import errno
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -20,9 +21,13 @@ def is_exhausted(error: BaseException | None) -> bool:
 
 
 class BridgeError(Exception):
-    """Base of all errors that the user gets as one sentence."""
+    """Base of all errors that the user gets as one sentence; ``str()`` is its English."""
 
     exit_code: int = 1
+
+    def __init__(self, said: Words = "") -> None:
+        super().__init__(render(said))
+        self.said = said
 
 
 class OperationFailed(BridgeError):
@@ -81,6 +86,6 @@ class FileFaults(BridgeError):
 
     exit_code = 2
 
-    def __init__(self, faults: list[Fault]) -> None:
-        super().__init__("\n".join(str(fault) for fault in faults))
+    def __init__(self, faults: Sequence[Fault]) -> None:
+        super().__init__(Text.of("file.several", faults=tuple(fault.text for fault in faults)))
         self.faults = tuple(faults)

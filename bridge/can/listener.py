@@ -17,6 +17,7 @@ from typing import Final, Protocol
 from bridge.can.cansockets import CanSockets
 from bridge.can.receiver import BATCH, Receiver, Stamps
 from bridge.canopen.frame import Frame
+from bridge.text import Text, Words
 
 RECORD: Final = struct.Struct("=dIB3x8s")
 """A frame on the way from a wiretap: time in monotonic seconds, identifier with flags, length, data."""
@@ -32,7 +33,7 @@ class Listener(Protocol):
 
     lost: int
     """Frames that came and were not taken in time, so far."""
-    failure: str
+    failure: Words
     """Reason why nothing comes any more; empty while something may."""
 
     def open(self) -> None:
@@ -48,12 +49,16 @@ class Listener(Protocol):
         ...
 
 
+class _BusProcessEnded(ConnectionResetError):
+    """The end of the stream from the process that has the bus."""
+
+
 class _Gathering:
     """Base of both kinds: frames in a queue that is read as the socket has some."""
 
     def __init__(self) -> None:
         self.lost = 0
-        self.failure = ""
+        self.failure: Words = ""
         self._frames = deque[Frame]()
         self._socket: socket.socket | None = None
 
@@ -76,7 +81,8 @@ class _Gathering:
         try:
             self._read()
         except OSError as error:
-            self.failure = error.strerror or str(error)
+            has_ended = isinstance(error, _BusProcessEnded)
+            self.failure = Text.of("can.bus_process_ended") if has_ended else error.strerror or str(error)
             self.close()
 
     def _read(self) -> None:
@@ -149,7 +155,7 @@ class TapListener(_Gathering):
         except BlockingIOError:
             return
         if not data:
-            raise ConnectionResetError(0, "the process that has the bus has ended")
+            raise _BusProcessEnded
         data = self._rest + data
         whole = len(data) - len(data) % RECORD.size
         self._rest = data[whole:]

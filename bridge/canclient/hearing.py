@@ -52,7 +52,7 @@ class Hearing:
         finally:
             listener.close()
         if listener.failure:
-            self._ended(listener.failure)
+            self._ended(str(listener.failure))
 
     def close(self) -> None:
         self._is_over.set()

@@ -6,6 +6,7 @@ from typing import Final
 
 from bridge.base.errors import Fault, FileFaults
 from bridge.config import Site
+from bridge.text import Text
 
 DEVICE: Final = -1
 """In place of a drive's number among those of its node."""
@@ -23,6 +24,6 @@ def unit_ids(site: Site) -> dict[tuple[str, int], int]:
         for position, own in owners or [(DEVICE, node.unit_id)]:
             unit = own or next(free, 0)
             if not unit:
-                raise FileFaults([Fault("", 0, "unit_id", "more than 247 drives have no Modbus unit id")])
+                raise FileFaults([Fault("", 0, "unit_id", Text.of("site.unit_ids_exhausted"))])
             units[node.name, position] = unit
     return units

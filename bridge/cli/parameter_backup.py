@@ -22,7 +22,8 @@ from bridge.parameter import backups
 from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.codec import shown
 from bridge.parameter.factory import DESCRIPTIONS, described
-from bridge.parameter.set_file import fault_of, read_set
+from bridge.parameter.set_file import fault_of, read_set, why_another
+from bridge.text import Text
 
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="a parameter set, TOML")]
 Wait = Annotated[
@@ -172,11 +173,10 @@ def content_for(target: Target, file: Path) -> BackupFile:
 
 def refuse_another(file: Path, content: BackupFile, identity: Mapping[str, int]) -> None:
     """Raises ``FileFaults`` where the file is of another kind of node than has told ``identity``."""
-    if found := backups.why_another(content.identity, identity):
+    if found := why_another(content.identity, identity):
         name, why = found
-        raise FileFaults(
-            [fault_of(file, content, name, f"{why}; nothing written", "a backup of such a node")]
-        )
+        said = Text.of("set_file.nothing_written", why=why)
+        raise FileFaults([fault_of(file, content, name, said, Text.of("set_file.other_node_advice"))])
 
 
 def differences(target: Target, values: Mapping[str, Value]) -> backups.Comparison:

@@ -9,6 +9,10 @@ from typing import Annotated, Final, Literal, cast
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
+from bridge.canopen.pdo import MOST_BITS, PdoEntry
+from bridge.text import Text
+from bridge.tomlfile import Unfit
+
 OnLoss = Literal["restart", "stop_node", "stop_all", "nothing"]
 OnFailedStart = Literal["reset_communication", "report"]
 MandatoryMissing = Literal["go_on", "hold_all", "stop_all"]
@@ -31,6 +35,7 @@ _NAME: Final = re.compile(r"[a-z][a-z0-9_]*")
 _PREFIX: Final = re.compile(r"[\w.-]+(/[\w.-]+)*", re.ASCII)
 _CONTROLLER: Final = re.compile(r"[A-Za-z0-9_.\-]{1,64}")
 _OBJECT: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})")
+_MAPPED: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})/([0-9]{1,2})")
 _MOST_COUNTER: Final = 240
 _SHORTEST_REASON: Final = 10
 _LOCATOR: Final = re.compile(r"[a-z][a-z0-9-]*/.+")
@@ -42,36 +47,36 @@ def _regular_expression(text: str) -> str:
     try:
         re.compile(text)
     except re.error as error:
-        raise ValueError(f"must be a regular expression: {error}") from None
+        raise Unfit(Text.of("site.regular_expression", why=str(error))) from None
     return text
 
 
 def _reason(text: str) -> str:
     if len(text.strip()) < _SHORTEST_REASON:
-        raise ValueError(f"must say why, in {_SHORTEST_REASON} characters or more")
+        raise Unfit(Text.of("site.reason", least=_SHORTEST_REASON))
     return text
 
 
 def _name(text: str) -> str:
     if not _NAME.fullmatch(text):
-        raise ValueError("must be lower_snake_case: a letter, then letters, digits and _")
+        raise Unfit(Text.of("site.name"))
     return text
 
 
 def _prefix(text: str) -> str:
     if not _PREFIX.fullmatch(text):
-        raise ValueError("must be words of letters, digits and _ . - with / between them")
+        raise Unfit(Text.of("site.prefix"))
     return text
 
 
 def _endpoint(text: str) -> str:
     host, colon, port = text.rpartition(":")
     if not colon or not port.isdigit() or not 0 <= int(port) <= 65535:
-        raise ValueError("must be an address and a port such as 127.0.0.1:4840")
+        raise Unfit(Text.of("site.endpoint"))
     try:
         ipaddress.ip_address(host.strip("[]"))
     except ValueError:
-        raise ValueError("must start with an IP address; 0.0.0.0 is every interface") from None
+        raise Unfit(Text.of("site.endpoint_address")) from None
     return text
 
 
@@ -81,13 +86,9 @@ def _gateway(text: str) -> str:
     try:
         host = _endpoint(text).rpartition(":")[0].strip("[]")
     except ValueError:
-        raise ValueError(
-            'must be "socket", or an address of this machine and a port, "127.0.0.1:7000"'
-        ) from None
+        raise Unfit(Text.of("site.gateway")) from None
     if not ipaddress.ip_address(host).is_loopback:
-        raise ValueError(
-            "must be an address of this machine such as 127.0.0.1: the gateway asks nobody who he is"
-        )
+        raise Unfit(Text.of("site.gateway_loopback"))
     return text
 
 
@@ -95,31 +96,31 @@ def _network(text: str) -> str:
     try:
         ipaddress.ip_network(text, strict=True)
     except ValueError as error:
-        raise ValueError(f"must be a network such as 192.168.1.0/24: {error}") from None
+        raise Unfit(Text.of("site.network", why=str(error))) from None
     return text
 
 
 def _downtime(seconds: float) -> float:
     if seconds in (IGNORE_ALL_S, 0) or 0.1 <= seconds <= 100.0:
         return seconds
-    raise ValueError("must be -0.1 (ignore), 0 (off) or 0.1…100.0")
+    raise Unfit(Text.of("site.downtime"))
 
 
 def _counter(value: int) -> int:
     if value == 0 or 2 <= value <= _MOST_COUNTER:
         return value
-    raise ValueError("must be 0 (SYNC without a counter) or 2…240 (1019h)")
+    raise Unfit(Text.of("site.sync_counter"))
 
 
 def _range(limits: list[int]) -> list[int]:
     if len(limits) != 2 or limits[0] > limits[1]:
-        raise ValueError("must be the lowest and the highest time such as [100, 2000]")
+        raise Unfit(Text.of("site.timeout_range"))
     return limits
 
 
 def _locator(text: str) -> str:
     if not _LOCATOR.fullmatch(text):
-        raise ValueError("must be a protocol and an address such as tcp/192.168.1.10:7447")
+        raise Unfit(Text.of("site.locator"))
     return text
 
 
@@ -127,25 +128,25 @@ def _host_name(text: str) -> str:
     with contextlib.suppress(ValueError):
         return str(ipaddress.ip_address(text))
     if not _HOST_NAME.fullmatch(text):
-        raise ValueError("must be a host name such as bridge.plant.example, or an IP address")
+        raise Unfit(Text.of("site.host_name"))
     return text
 
 
 def _uri(text: str) -> str:
     if not _URI.fullmatch(text):
-        raise ValueError("must be a URI such as urn:hall-3:drivebridge")
+        raise Unfit(Text.of("site.uri"))
     return text
 
 
 def _controller(text: str) -> str:
     if not _CONTROLLER.fullmatch(text) or text == "anonymous":
-        raise ValueError("must be a user's name of 1…64 letters, digits and _ . -")
+        raise Unfit(Text.of("site.controller"))
     return text
 
 
 def _plain(value: object) -> object:
     if not isinstance(value, bool | int | float | str):
-        raise ValueError("must be a number, true or false, or a text in quotes")
+        raise Unfit(Text.of("site.plain_value"))
     return value
 
 
@@ -156,14 +157,31 @@ def listed(value: object) -> object:
 
 def _object(text: str) -> str:
     if not _OBJECT.fullmatch(text):
-        raise ValueError('must be an object as "2097:01", index and sub-index in hexadecimal')
+        raise Unfit(Text.of("site.object"))
     return text
+
+
+def _mapped(text: object) -> object:
+    if isinstance(text, PdoEntry):
+        return text
+    match = _MAPPED.fullmatch(text) if isinstance(text, str) else None
+    if not match or not 1 <= int(match[3]) <= MOST_BITS:
+        raise Unfit(Text.of("site.mapped_object"))
+    return PdoEntry(int(match[1], 16), int(match[2], 16), int(match[3]))
+
+
+def _fits(objects: list[PdoEntry]) -> list[PdoEntry]:
+    bits = sum(mapped.bits for mapped in objects)
+    if bits > MOST_BITS:
+        raise Unfit(Text.of("site.pdo_bits", bits=bits, most=MOST_BITS))
+    return objects
 
 
 Name = Annotated[str, AfterValidator(_name)]
 RegularExpression = Annotated[str, AfterValidator(_regular_expression)]
 PlainValue = Annotated[bool | int | float | str, BeforeValidator(_plain)]
 ObjectName = Annotated[str, AfterValidator(_object)]
+PdoMapping = Annotated[list[Annotated[PdoEntry, BeforeValidator(_mapped)]], AfterValidator(_fits)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Gateway = Annotated[str, AfterValidator(_gateway)]
 Network = Annotated[str, AfterValidator(_network)]

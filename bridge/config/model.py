@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Annotated, Final, Literal
 
 from pydantic import (
-    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -16,8 +14,9 @@ from pydantic import (
     field_validator,
 )
 
-from bridge.canopen.datatypes import TypeName, encode
-from bridge.canopen.pdo import MOST_BITS, PdoEntry
+from bridge.base.data_type_texts import text_of_misfit
+from bridge.canopen.datatypes import DataTypeError, TypeName, encode
+from bridge.canopen.pdo import PdoEntry
 from bridge.config.download import Download
 from bridge.config.field_types import (
     LIFE_SIGN_MS,
@@ -39,6 +38,7 @@ from bridge.config.field_types import (
     OnIntruder,
     OnLoss,
     ParameterRights,
+    PdoMapping,
     PlainValue,
     Prefix,
     Reason,
@@ -50,8 +50,7 @@ from bridge.config.field_types import (
     listed,
 )
 from bridge.config.reaction import REACTIONS, Reaction, ReactionRule
-
-_MAPPED: Final = re.compile(r"([0-9A-Fa-f]{4}):([0-9A-Fa-f]{2})/([0-9]{1,2})")
+from bridge.tomlfile import Unfit
 
 
 class Table(BaseModel):
@@ -66,25 +65,6 @@ class SiteTable(Table):
     front_memory_mb: int = Field(400, ge=200, le=1_000_000, description="200…1000000 MB")
 
 
-def _mapped(text: object) -> object:
-    if isinstance(text, PdoEntry):
-        return text
-    match = _MAPPED.fullmatch(text) if isinstance(text, str) else None
-    if not match or not 1 <= int(match[3]) <= MOST_BITS:
-        raise ValueError('must be an object and its length in bits as "3000:01/16"')
-    return PdoEntry(int(match[1], 16), int(match[2], 16), int(match[3]))
-
-
-def _fits(objects: list[PdoEntry]) -> list[PdoEntry]:
-    bits = sum(mapped.bits for mapped in objects)
-    if bits > MOST_BITS:
-        raise ValueError(f"has {bits} bits, a PDO has {MOST_BITS}")
-    return objects
-
-
-Mapped = Annotated[PdoEntry, BeforeValidator(_mapped)]
-
-
 class PdoTable(Table):
     """Settings of one PDO that the bridge writes to the node; what is left out stays as the node has it."""
 
@@ -94,7 +74,7 @@ class PdoTable(Table):
     transmission_type: int | None = Field(None, ge=0, le=255, description="0…255, as the device allows")
     inhibit_ms: float | None = Field(None, ge=0, le=6553.5, description="0…6553.5 ms, in steps of 0.1")
     event_ms: int | None = Field(None, ge=0, le=65535, description="0…65535 ms")
-    mapping: Annotated[list[Mapped], AfterValidator(_fits)] = Field(default_factory=list[PdoEntry])
+    mapping: PdoMapping = Field(default_factory=list[PdoEntry])
 
 
 PdoTables = Annotated[list[PdoTable], BeforeValidator(listed)]
@@ -215,7 +195,10 @@ class ConfigureTable(Table):
         """The fault is the value's, with its line. Without a type there is a fault already."""
         kind = info.data.get("type")
         if kind is not None:
-            encode(kind, value)
+            try:
+                encode(kind, value)
+            except DataTypeError as error:
+                raise Unfit(text_of_misfit(error)) from None
         return value
 
     @property

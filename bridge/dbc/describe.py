@@ -18,6 +18,7 @@ from bridge.drive import default_codecs
 from bridge.lint.checked_bus import CheckedBus, CheckedDrive, CheckedNode, CheckedPdo
 from bridge.mapping.model import Pdo, Slot
 from bridge.node.boot import factory_entries, layouts, match_words
+from bridge.text import Text
 
 _WARNING: Final = (
     "Made by drivebridge from the site file and the mapping files, not from the nodes. A node whose own "
@@ -135,8 +136,7 @@ def _refuse_doubles(messages: Sequence[Message]) -> None:
         other = seen.setdefault(message.cob_id, message)
         if other is not message:
             raise OperationFailed(
-                f"{other.name} and {message.name} have the same COB-ID {message.cob_id:03X}h: "
-                "`drivebridge check` says which keys collide"
+                Text.of("export.cob_id_twice", one=other.name, other=message.name, cob_id=message.cob_id)
             )
 
 

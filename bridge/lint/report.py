@@ -8,7 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from bridge.base.errors import Fault, FileFaults
-from bridge.text import Said
+from bridge.text import Said, Text
 from bridge.tomlfile import Key, TomlFile, dotted
 
 
@@ -39,13 +39,13 @@ class LintReport:
         except FileFaults:  # the file has gone since it was loaded: its content still counts
             self._file = None
 
-    def error(self, key: Key, said: Said, advice: Said = "") -> None:
+    def error(self, key: Key, said: Text, advice: Said = "") -> None:
         self._add(Severity.ERROR, key, said, advice)
 
-    def warning(self, key: Key, said: Said, advice: Said = "") -> None:
+    def warning(self, key: Key, said: Text, advice: Said = "") -> None:
         self._add(Severity.WARNING, key, said, advice)
 
-    def _add(self, severity: Severity, key: Sequence[int | str], said: Said, advice: Said) -> None:
+    def _add(self, severity: Severity, key: Sequence[int | str], said: Text, advice: Said) -> None:
         line = self._file.line(key) if self._file else 0
         fault = Fault(self._path, line, dotted(key), said, advice)
         self._findings.append(LintFinding(severity, fault))

@@ -13,6 +13,7 @@ from typing import Final
 from cryptography import x509
 
 from bridge.base.errors import Fault, FileFaults
+from bridge.text import Text
 from bridge.tomlfile.lines import key_lines
 
 _log = logging.getLogger(__name__)
@@ -20,12 +21,12 @@ _log = logging.getLogger(__name__)
 _STEP: Final = re.compile(r"(\w+)|\[(\d+)\]")
 
 
-def check_validity(file: str, certificate: x509.Certificate, hint: str) -> None:
-    """Raises ``FileFaults`` for one that has run out; ``hint`` says what to do then."""
+def check_validity(file: str, certificate: x509.Certificate, advice: Text) -> None:
+    """Raises ``FileFaults`` for one that has run out; ``advice`` says what to do then."""
     now = datetime.now(UTC)
     if certificate.not_valid_after_utc <= now:
-        message = f"was valid until {certificate.not_valid_after_utc:%Y-%m-%d}"
-        raise FileFaults([Fault(file, 0, "", message, hint)])
+        said = Text.of("certificate.ended", day=f"{certificate.not_valid_after_utc:%Y-%m-%d}")
+        raise FileFaults([Fault(file, 0, "", said, advice)])
     if certificate.not_valid_before_utc > now:
         # Most often it is the clock of a box that has just been switched on.
         _log.warning("%s is not valid before %s: is the clock right?", file, certificate.not_valid_before_utc)
@@ -35,7 +36,8 @@ def placed(fault: Fault, keys: Mapping[str | None, str], site: Path) -> Fault:
     """The fault at the line of the site file's key that it is about; ``keys`` are those that name files, by
     the files."""
     if fault.file in keys:
-        fault = replace(fault, key=keys[fault.file], said=f"{fault.file} {fault.message}")
+        said = Text.of("certificate.of_file", file=fault.file, said=Text.plain(fault.said))
+        fault = replace(fault, key=keys[fault.file], said=said)
     if not fault.key:
         return fault
     steps = [name or int(number) for name, number in _STEP.findall(fault.key)]

@@ -11,6 +11,7 @@ from argon2.exceptions import InvalidHashError, VerificationError
 
 from bridge.base.errors import Fault, FileFaults
 from bridge.config import UserTable
+from bridge.text import Text
 
 ANONYMOUS: Final = "anonymous"
 _HASHER = PasswordHasher()
@@ -54,10 +55,11 @@ def check_users(users: Sequence[UserTable]) -> None:
     for position, user in enumerate(users):
         key = f"opcua.user[{position}]"
         if user.name in seen or user.name == ANONYMOUS:
-            faults.append(Fault("site file", 0, f"{key}.name", f"the name {user.name!r} is taken"))
+            said = Text.of("site.user_name_taken", name=user.name)
+            faults.append(Fault("site file", 0, f"{key}.name", said))
         seen.add(user.name)
         if not is_password_hash(user.password_hash):
-            hint = "the line that `drivebridge hash-password` prints"
-            faults.append(Fault("site file", 0, f"{key}.password_hash", "is not an Argon2 hash", hint))
+            said, advice = Text.of("site.password_hash"), Text.of("site.password_hash_advice")
+            faults.append(Fault("site file", 0, f"{key}.password_hash", said, advice))
     if faults:
         raise FileFaults(faults)

@@ -11,6 +11,7 @@ from typing import Final, cast
 
 from bridge.base.errors import Fault
 from bridge.image import Value
+from bridge.text import Said, Text
 from bridge.tomlfile import TomlFile, dotted
 
 _FORMAT: Final = 3
@@ -96,7 +97,7 @@ class _BackupReader:
         self._check_present(mapping)
         values, objects = self._table("parameters"), self._table("objects")
         for name in values.keys() & objects.keys():
-            self._fault(("objects", name), "stands in [parameters], too: leave one of them out")
+            self._fault(("objects", name), Text.of("backup_file.twice"))
         identity = self._identity()
         self._check_end(form)
         self._file.finish()
@@ -106,9 +107,9 @@ class _BackupReader:
         drive, saved = self._text("drive"), self._text("saved")
         return BackupFile(mapping, drive, saved, values, {}, identity=identity, objects=objects, lines=lines)
 
-    def _fault(self, key: tuple[str, ...], message: str, hint: str = "") -> None:
+    def _fault(self, key: tuple[str, ...], said: Text, advice: Said = "") -> None:
         shown = dotted(key if key[0] == "identity" else (key[0], *map(_quoted, key[1:])))
-        self._file.faults.append(Fault(str(self._file.path), self._file.line(key), shown, message, hint))
+        self._file.faults.append(Fault(str(self._file.path), self._file.line(key), shown, said, advice))
 
     def _text(self, key: str) -> str:
         return str(self._content.get(key, ""))
@@ -116,28 +117,28 @@ class _BackupReader:
     def _format(self) -> object:
         form = self._content.get("format")
         if form not in _READ:
-            hint = "is this a file of `drivebridge parameters backup`?"
-            self._fault(("format",), f"must be {_FORMAT}", hint)
+            advice = Text.of("backup_file.format_advice")
+            self._fault(("format",), Text.of("backup_file.format", format=_FORMAT), advice)
         return form
 
     def _check_present(self, mapping: str) -> None:
         if not mapping:
-            self._fault(("mapping",), "is missing", "the mapping that the parameters are named by")
+            self._fault(("mapping",), Text.of("toml.missing"), Text.of("backup_file.mapping_advice"))
         if "parameters" not in self._content:
-            self._fault(("parameters",), "is missing", "a table of names and values")
+            self._fault(("parameters",), Text.of("toml.missing"), Text.of("backup_file.table_advice"))
 
     def _table(self, key: str) -> dict[str, Value]:
         """Values of a table by name, without those that no parameter can have."""
         values: dict[str, Value] = {}
         found: object = self._content.get(key, {})
         if not isinstance(found, dict):
-            self._fault((key,), "must be a table of names and values")
+            self._fault((key,), Text.of("backup_file.table"))
             return values
         for name, value in cast("dict[str, object]", found).items():
             if not isinstance(value, bool | int | float | str) or (
                 isinstance(value, float) and not math.isfinite(value)
             ):
-                self._fault((key, name), "must be a number, a text, true or false")
+                self._fault((key, name), Text.of("backup_file.value"))
             else:
                 values[name] = value
         return values
@@ -146,7 +147,7 @@ class _BackupReader:
         identity: dict[str, int] = {}
         for name, value in self._table("identity").items():
             if name not in IDENTITY or isinstance(value, bool) or not isinstance(value, int):
-                self._fault(("identity", name), f"must be a whole number, called {', '.join(IDENTITY)}")
+                self._fault(("identity", name), Text.of("backup_file.identity", names=IDENTITY))
             else:
                 identity[name] = value
         return identity
@@ -156,12 +157,12 @@ class _BackupReader:
         lines = self._file.text.splitlines()
         if not self._file.text.endswith("\n"):
             # Half a number is a number: 12.5 that breaks off is 12.
-            said = "the file ends within this line", "a line end, if it is whole"
+            said, advice = Text.of("backup_file.line_cut"), Text.of("backup_file.line_cut_advice")
         elif form == _ENDED and _END not in lines:
-            said = "the file ends before its last line", f"it is {_END!r}"
+            said, advice = Text.of("backup_file.cut"), Text.of("backup_file.cut_advice", line=_END)
         else:
             return
-        self._file.faults.append(Fault(str(self._file.path), len(lines), "", *said))
+        self._file.faults.append(Fault(str(self._file.path), len(lines), "", said, advice))
 
 
 def _one_line(text: str) -> str:

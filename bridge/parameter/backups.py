@@ -263,16 +263,6 @@ def identify(into: dict[str, int]) -> Steps:
     into |= found
 
 
-def why_another(of_file: Mapping[str, int], of_node: Mapping[str, int]) -> tuple[str, str] | None:
-    """Part of its identity by which a set is not of a drive of this kind, and the reason; None where it is,
-    or where the set does not say."""
-    for name in ("vendor", "product"):
-        if name in of_file and of_file[name] != of_node.get(name):
-            is_now = f"{of_node[name]:08X}h" if name in of_node else "not told"
-            return name, f"the file is of a node with {name} {of_file[name]:08X}h, and this one's is {is_now}"
-    return None
-
-
 def _refusal(entry: ParameterEntry, error: ParameterError, into: Backup) -> str:
     """Reason why a value was not read, in words. Raises ``error`` again where the drive has not answered at
     all, but for what it was silent about before: whoever begins again has seen that it answers."""

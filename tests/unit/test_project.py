@@ -8,6 +8,7 @@ import pytest
 
 from bridge.base.errors import FileFaults
 from bridge.project import count, load_project
+from bridge.text import render
 from tests.support import sites
 
 
@@ -38,6 +39,10 @@ def test_silence_that_stops_nobody_is_refused_with_what_would(tmp_path: Path) ->
         "silence does not stop this drive: P151 watches the RPDOs of all 2 drives"
     )
     assert '"disable_voltage", "quick_stop" or "stop"' in fault.hint
+    assert render(fault.advice, "de") == (
+        '"disable_voltage", "quick_stop" oder "stop"; oder own_timeout_ms und enforce = true, falls er seine '
+        "Prozessdaten selbst überwacht"
+    )
 
 
 def test_what_holds_is_never_silent(tmp_path: Path) -> None:

@@ -22,10 +22,15 @@ from cryptography.hazmat.primitives.serialization import (
 
 from bridge.base.errors import Fault, FileFaults
 from bridge.northbound.opcua.selfsigned import KEY_BITS, new_key, self_signed
+from bridge.text import Text
 
 _log = logging.getLogger(__name__)
 
 _PEM: Final = b"-----BEGIN"
+
+
+class _NotRsa(ValueError):
+    """A private key of another kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,18 +46,19 @@ def load_own(certificate: Path, private_key: Path) -> OwnCertificate:
     try:
         loaded = read_certificate(certificate)
     except (OSError, ValueError) as error:
-        faults.append(_fault(certificate, error, "a certificate (X.509) in PEM or DER"))
+        faults.append(_fault(certificate, error, Text.of("certificate.x509_advice")))
     try:
         key = _read_key(private_key)
     except (OSError, ValueError, TypeError) as error:
-        faults.append(_fault(private_key, error, "an RSA key without a password in PEM or DER"))
+        faults.append(_fault(private_key, error, Text.of("certificate.rsa_advice")))
     if loaded is None or key is None:
         raise FileFaults(faults)
     if key.key_size < KEY_BITS:
-        message = f"has {key.key_size} bits; OPC UA's policies ask for at least {KEY_BITS}"
-        raise FileFaults([Fault(str(private_key), 0, "", message)])
+        said = Text.of("certificate.key_short", bits=key.key_size, least=KEY_BITS)
+        raise FileFaults([Fault(str(private_key), 0, "", said)])
     if loaded.public_key() != key.public_key():
-        raise FileFaults([Fault(str(private_key), 0, "", f"is not the key of {certificate}")])
+        said = Text.of("certificate.not_its_key", certificate=str(certificate))
+        raise FileFaults([Fault(str(private_key), 0, "", said)])
     return OwnCertificate(loaded, key)
 
 
@@ -67,8 +73,7 @@ def new_own(certificate: Path, key: Path, application_uri: str, names: Sequence[
     try:
         private_key = _read_key(key)
     except (ValueError, TypeError) as error:
-        hint = "delete it and a new one is made; clients must trust that one anew"
-        raise FileFaults([Fault(str(key), 0, "", f"cannot be used: {error}", hint)]) from error
+        raise FileFaults([_fault(key, error, Text.of("certificate.new_key_advice"))]) from error
     made = self_signed(private_key, application_uri, names)
     write_private(certificate, made.public_bytes(Encoding.DER))
     _log.info("made an OPC UA certificate: %s, SHA-256 %s", certificate, fingerprint(made))
@@ -109,7 +114,7 @@ def _read_key(path: Path) -> RSAPrivateKey:
     load = load_pem_private_key if _PEM in content else load_der_private_key
     key = load(content, password=None)
     if not isinstance(key, RSAPrivateKey):
-        raise ValueError("not an RSA key")
+        raise _NotRsa
     return key
 
 
@@ -124,8 +129,12 @@ def reason(error: Exception) -> str:
     return str(error)
 
 
-def _fault(path: Path, error: Exception, hint: str) -> Fault:
-    return Fault(str(path), 0, "", f"cannot be used: {reason(error)}", hint)
+def _fault(path: Path, error: Exception, advice: Text) -> Fault:
+    if isinstance(error, _NotRsa):
+        said = Text.of("certificate.not_rsa")
+    else:
+        said = Text.of("certificate.unusable", why=reason(error))
+    return Fault(str(path), 0, "", said, advice)
 
 
 class TrustedCertificates:
@@ -146,8 +155,8 @@ class TrustedCertificates:
             self._changed = self._folder.stat().st_mtime_ns
             files = sorted(path for path in self._folder.iterdir() if path.is_file())
         except OSError as error:
-            hint = "trusted_dir is a folder with the certificates of the clients"
-            raise FileFaults([Fault(str(self._folder), 0, "", reason(error), hint)]) from error
+            said, advice = Text.plain(reason(error)), Text.of("certificate.trusted_dir_advice")
+            raise FileFaults([Fault(str(self._folder), 0, "", said, advice)]) from error
         known: set[bytes] = set()
         for path in files:
             try:

@@ -13,6 +13,7 @@ from bridge.northbound.certificatefiles import check_validity, placed
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.server_identity import server_identity
 from bridge.northbound.passwords import check_users
+from bridge.text import Text
 
 
 def check_opcua(settings: OpcUaTable, state_dir: Path, site: Path) -> None:
@@ -24,8 +25,8 @@ def check_opcua(settings: OpcUaTable, state_dir: Path, site: Path) -> None:
         if settings.trusted_dir:
             TrustedCertificates(Path(settings.trusted_dir))
         if settings.certificate:
-            hint = "renew it, or leave out certificate and private_key: the bridge makes its own"
-            check_validity(settings.certificate, own.certificate, hint)
+            advice = Text.of("certificate.renew_opcua_advice")
+            check_validity(settings.certificate, own.certificate, advice)
     except FileFaults as error:
         keys = {
             settings.certificate: "opcua.certificate",

@@ -25,6 +25,7 @@ from bridge.northbound.opcua.certificates import (
     write_private,
 )
 from bridge.northbound.opcua.ownnames import addresses_of, missing_in, names_of
+from bridge.text import Text
 
 _log = logging.getLogger(__name__)
 
@@ -51,8 +52,8 @@ def server_identity(settings: OpcUaTable, folder: Path) -> ServerIdentity:
     certificate, key = settings.certificate, settings.private_key
     if bool(certificate) is not bool(key):
         missing = "private_key" if certificate else "certificate"
-        fault = Fault("site file", 0, f"opcua.{missing}", "is missing", "certificate and key go together")
-        raise FileFaults([fault])
+        said, advice = Text.of("toml.missing"), Text.of("certificate.pair_advice")
+        raise FileFaults([Fault("site file", 0, f"opcua.{missing}", said, advice)])
     try:
         if certificate and key:
             own, file = load_own(Path(certificate), Path(key)), certificate
@@ -73,8 +74,8 @@ def _kept_or_new(settings: OpcUaTable, folder: Path) -> OwnCertificate:
         try:
             return load_own(certificate, key)
         except FileFaults as error:
-            hint = f"take {CERTIFICATE} and {KEY} away: new ones are made, which clients have to trust anew"
-            raise FileFaults([replace(fault, advice=hint) for fault in error.faults]) from None
+            advice = Text.of("certificate.take_away_advice", certificate=CERTIFICATE, key=KEY)
+            raise FileFaults([replace(fault, advice=advice) for fault in error.faults]) from None
     uri = settings.application_uri or _kept_uri(folder) or _first_uri()
     own = new_own(certificate, key, uri, names_of(settings.listen, settings.names))
     if not settings.application_uri:
@@ -99,9 +100,9 @@ def _uri_of(certificate: x509.Certificate, file: str, settings: OpcUaTable, fold
     FileFaults where the site file names another one."""
     held, wanted = uris_of(certificate), settings.application_uri
     if wanted and held and wanted not in held:
-        hint = f"leave it out, or take {file} away: another one is made, which clients have to trust anew"
-        message = f"{wanted!r} is not that of {file}, {held[0]!r}"
-        raise FileFaults([Fault("site file", 0, "opcua.application_uri", message, hint)])
+        said = Text.of("certificate.other_uri", wanted=wanted, file=file, held=held[0])
+        advice = Text.of("certificate.other_uri_advice", file=file)
+        raise FileFaults([Fault("site file", 0, "opcua.application_uri", said, advice)])
     return wanted or (held[0] if held else _kept_uri(folder) or _first_uri())
 
 

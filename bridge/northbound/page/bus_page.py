@@ -13,7 +13,9 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
 from bridge.base.errors import OperationFailed
+from bridge.northbound.page.refused import refused
 from bridge.northbound.page.sessions import PageSession
+from bridge.text import Text
 
 LONGEST_S: Final = 60
 _MOST_AT_ONCE: Final = 4
@@ -61,7 +63,7 @@ class BusPage:
         if self._session_of(request) is None:
             return JSONResponse({"error": "login"}, 401)
         if request.path_params["bus"] not in self._layouts:
-            return JSONResponse({"error": f"there is {', '.join(self._layouts)}"}, 404)
+            return refused(404, Text.of("page.there_is", known=tuple(self._layouts)))
         return None
 
     async def _layout(self, request: Request) -> Response:
@@ -80,16 +82,16 @@ class BusPage:
         form = request.query_params.get("format", "candump")
         seconds = _seconds(request.query_params.get("seconds", ""))
         if form not in _MEDIA or not 1 <= seconds <= LONGEST_S:
-            allowed = f"seconds = 1…{LONGEST_S}, format = {' or '.join(_MEDIA)}"
-            return JSONResponse({"error": allowed}, 422)
+            allowed = Text.of("page.capture_bounds", longest_s=LONGEST_S, formats=tuple(_MEDIA))
+            return refused(422, allowed)
         if len(self._capturing) >= _MOST_AT_ONCE or session in self._capturing:
-            return JSONResponse({"error": "too many captures at a time"}, 429)
+            return refused(429, Text.of("page.capture_busy"))
         bus = request.path_params["bus"]
         self._capturing.append(session)
         try:
             captured = await self._capture(bus, seconds, form, request.is_disconnected)
         except OperationFailed as error:
-            return JSONResponse({"error": str(error)}, 503)
+            return refused(503, error.said)
         finally:
             self._capturing.remove(session)
         return self._file(captured, bus, _MEDIA[form])

@@ -14,6 +14,8 @@ from starlette.routing import Route
 
 from bridge.base.errors import OperationFailed
 from bridge.config import Site
+from bridge.northbound.page.refused import refused
+from bridge.text import Text
 
 Export = Callable[[], str]
 """Makes the text of a file; raises ``OperationFailed`` where a library that it needs is not installed."""
@@ -54,12 +56,12 @@ class Integration:
         name = request.path_params["name"]
         export = self._exports.get(name)
         if export is None:
-            return JSONResponse({"error": f"there is {', '.join(self._exports)}"}, 404)
+            return refused(404, Text.of("page.there_is", known=tuple(self._exports)))
         if name not in self._made:
             try:
                 self._made[name] = await asyncio.to_thread(export)
             except OperationFailed as error:
-                return JSONResponse({"error": str(error)}, 503)
+                return refused(503, error.said)
         ending = name.rpartition(".")[2]
         headers = {"content-disposition": f'attachment; filename="{self._site_name}-{name}"'}
         return Response(self._made[name], headers=headers, media_type=_MEDIA[ending])

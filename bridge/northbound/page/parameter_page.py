@@ -23,20 +23,23 @@ from bridge.config import NodeTable
 from bridge.image import Value
 from bridge.mapping import Family
 from bridge.northbound.page.guards import MOST_FILE
+from bridge.northbound.page.refused import BodyTooLong, refused
 from bridge.parameter import Names, ParameterEntry, backups
 from bridge.parameter.backup_file import BackupFile
 from bridge.parameter.factory import DESCRIPTIONS, factory
 from bridge.parameter.set_file import read_set
-from bridge.text import as_json
+from bridge.text import Text, as_json
 
 Counts = Callable[[], Mapping[tuple[str, str], int]]
 """Writes to the EEPROM, by the drive's or node's name and the object."""
 ReadBody = Callable[[Request, int], Awaitable[bytes]]
-"""Reads the body of a request, of so many bytes at most; raises ``ValueError`` or ``TimeoutError``."""
+"""Reads the body of a request, of so many bytes at most; raises ``BodyTooLong`` or ``TimeoutError``."""
 
 _log = logging.getLogger(__name__)
 
 _SETS: Final = (".toml", *DESCRIPTIONS)
+_MOST_FAULTS: Final = 20
+"""Most faults of a file in one answer."""
 _encode = msgspec.json.Encoder().encode
 
 
@@ -105,7 +108,7 @@ class ParameterPage:
         if request.method == "POST" and not self._has_token(request):
             return JSONResponse({"error": "token"}, 403)
         if request.path_params["holder"] not in self._holders:
-            return JSONResponse({"error": f"there is {', '.join(self._holders)}"}, 404)
+            return refused(404, Text.of("page.there_is", known=tuple(self._holders)))
         return None
 
     async def _list(self, request: Request) -> Response:
@@ -137,8 +140,10 @@ class ParameterPage:
         holder = self._holders[request.path_params["holder"]]
         try:
             read = _decode_set(await self._read_body(request, MOST_FILE))
+        except BodyTooLong as error:
+            return refused(400, error.said)
         except (msgspec.DecodeError, TimeoutError, ValueError) as error:
-            return JSONResponse({"error": str(error)}, 400)
+            return refused(400, str(error))
         text = backup_of(holder, read.values, read.missing, read.unreadable, read.identity)
         name = f"{holder.name.replace('/', '-')}.toml"
         headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
@@ -151,16 +156,18 @@ class ParameterPage:
         holder = self._holders[request.path_params["holder"]]
         name = PurePath(request.query_params.get("name", "").replace("\\", "/")).name or "file.toml"
         if PurePath(name).suffix.lower() not in _SETS:
-            return JSONResponse({"error": f"{name[:80]}: a file that ends with {', '.join(_SETS)}"}, 422)
+            return refused(422, Text.of("page.set_ending", name=name[:80], endings=_SETS))
         try:
             content = await self._read_body(request, MOST_FILE)
-        except (TimeoutError, ValueError) as error:
-            return JSONResponse({"error": str(error)}, 400)
+        except BodyTooLong as error:
+            return refused(400, error.said)
+        except TimeoutError as error:
+            return refused(400, str(error))
         async with self._reading:
             try:
                 found = await asyncio.to_thread(_read, content, name, holder)
             except FileFaults as error:
-                return JSONResponse({"error": "\n".join(map(str, error.faults[:20]))}, 422)
+                return refused(422, FileFaults(error.faults[:_MOST_FAULTS]).said)
         return Response(_encode(found), headers={"cache-control": "no-store"}, media_type="application/json")
 
 

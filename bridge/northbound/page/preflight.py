@@ -11,8 +11,9 @@ from cryptography import x509
 from bridge.base.errors import Fault, FileFaults
 from bridge.config import PageTable
 from bridge.northbound.certificatefiles import check_validity, placed
+from bridge.text import Text
 
-_PEM: Final = "a PEM file; of a certificate with those between it and its authority behind it"
+_PEM: Final = Text.of("certificate.pem_chain_advice")
 
 
 def check_page(table: PageTable, site: Path) -> None:
@@ -36,20 +37,19 @@ def _check_pair(certificate: str, private_key: str) -> None:
             contents.append(Path(file).read_bytes())
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
-            raise FileFaults([Fault(file, 0, "", f"cannot be used: {reason}", _PEM)]) from None
+            said = Text.of("certificate.unusable", why=reason)
+            raise FileFaults([Fault(file, 0, "", said, _PEM)]) from None
     try:
         loaded = x509.load_pem_x509_certificate(contents[0])
     except ValueError:
-        raise FileFaults(
-            [Fault(certificate, 0, "", "cannot be used: it holds no certificate", _PEM)]
-        ) from None
+        said = Text.of("certificate.holds_none")
+        raise FileFaults([Fault(certificate, 0, "", said, _PEM)]) from None
     try:
         ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, private_key, password="")
     except ssl.SSLError as error:
         if error.reason == "KEY_VALUES_MISMATCH":
-            message = f"is not the key of {certificate}"
+            said = Text.of("certificate.not_its_key", certificate=certificate)
         else:
-            message = "cannot be used: it holds no private key without a password"
-        raise FileFaults([Fault(private_key, 0, "", message, "a PEM file")]) from None
-    hint = "renew it, or leave out certificate and private_key and serve the page on loopback"
-    check_validity(certificate, loaded, hint)
+            said = Text.of("certificate.holds_no_key")
+        raise FileFaults([Fault(private_key, 0, "", said, Text.of("certificate.pem_advice"))]) from None
+    check_validity(certificate, loaded, Text.of("certificate.renew_page_advice"))

@@ -15,6 +15,7 @@ from starlette.routing import Route
 from bridge.base.guard import Guard
 from bridge.command import Role
 from bridge.northbound.page.sessions import PageSession
+from bridge.text import Text, Words, as_json, render
 
 MOST_LINES = 500
 """Most lines of the audit log in one answer."""
@@ -39,7 +40,7 @@ class UnreadablePart:
     ``text`` is the reason."""
 
     of: str
-    text: str
+    text: Words
 
 
 class SystemFacts(Protocol):
@@ -101,7 +102,8 @@ class System:
         )
         faults += [one for one in certificates if isinstance(one, UnreadablePart)]
         readable = [one for one in certificates if isinstance(one, CertificateFacts)]
-        told: dict[str, Any] = {"versions": versions, "certificates": readable, "faults": faults}
+        told: dict[str, Any] = {"versions": versions, "certificates": readable}
+        told["faults"] = [_shown(one) for one in faults]
         told["clients"] = {protocol: len(addresses) for protocol, addresses in connections.items()}
         if session.role >= Role.ENGINEER:
             told |= {"connections": connections, "tabs": self._tabs()}
@@ -114,8 +116,7 @@ class System:
         async with self._checking:
             file = await self._asked(self._facts.site_file, {"path": "", "text": ""}, faults)
             findings = await self._asked(self._facts.check, [], faults)
-        failed = [{"severity": "error", "line": 0, "message": f"{one.of}: {one.text}"} for one in faults]
-        return _fresh(file | {"findings": failed + findings})
+        return _fresh(file | {"findings": [*map(_as_finding, faults), *findings]})
 
     async def _audit(self, request: Request) -> Response:
         if refusal := self._for_engineers(request):
@@ -130,7 +131,7 @@ class System:
         still shown."""
         with self._guard:
             return await asyncio.to_thread(ask)
-        faults.append(UnreadablePart(ask.__name__, "this failed: the log of the service has more"))
+        faults.append(UnreadablePart(ask.__name__, Text.of("page.part_failed")))
         return nothing
 
     def _for_engineers(self, request: Request) -> Response | None:
@@ -140,6 +141,15 @@ class System:
         if session.role < Role.ENGINEER:
             return JSONResponse({"error": "engineer"}, 403)
         return None
+
+
+def _shown(part: UnreadablePart) -> dict[str, Any]:
+    return {"of": part.of, "message": render(part.text), "text": as_json(part.text)}
+
+
+def _as_finding(part: UnreadablePart) -> dict[str, Any]:
+    said = Text.of("page.part", of=part.of, why=Text.plain(part.text))
+    return {"severity": "error", "line": 0, "message": render(said), "text": as_json(said)}
 
 
 def _fresh(body: object) -> Response:

@@ -4,7 +4,7 @@ Sans-IO.
 Each frame is decoded once for all tabs. A tab that asks for all of a busy bus gets the first of each beat,
 and how many were left out. Messages are JSON: ``{"heard": bus, "lost": n, "frames": [[time in ms since 1970,
 identifier, data, kind, node, label, text], …], "more": n}``, or ``"identifiers"`` in place of the frames, or
-``"failure"`` with the reason why nothing is heard.
+``"failure"`` with the reason why nothing is heard, and ``"text"``, its code with facts.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Annotated, Any, Final, Protocol
 import msgspec
 
 from bridge.base.errors import OperationFailed
+from bridge.text import Words, as_json, render
 
 MOST_ROWS: Final = 100
 """Frames in one message."""
@@ -91,7 +92,7 @@ class TrafficView:
         self._bitrate = bitrate
         self._tap = tap
         self._is_open = False
-        self._failure = ""
+        self._failure: Words = ""
         self._retry_at = float("-inf")
         self._counts: dict[str, _TrafficCount] = {}
         self._measured = 0.0
@@ -113,7 +114,7 @@ class TrafficView:
             self._failure = ""
         except OperationFailed as error:
             self.close()
-            self._failure = str(error)
+            self._failure = error.said
             self._retry_at = now + _RETRY_S
         for frame in self._new:
             self._count(frame)
@@ -134,7 +135,7 @@ class TrafficView:
     def frames_for(self, filter_: TrafficFilter) -> bytes | None:
         """JSON message with the new frames for this tab; None where there are none."""
         if self._failure:
-            return self._told({"failure": self._failure})
+            return self._told({"failure": render(self._failure), "text": as_json(self._failure)})
         wanted = [frame for frame in self._new if filter_.takes(frame)]
         if not wanted:
             return None
@@ -145,7 +146,7 @@ class TrafficView:
         """JSON message with a row for each identifier so far: identifier, label, frames, frames a second,
         load in percent, shortest and longest gap in ms, newest data and its text."""
         if self._failure:
-            return self._told({"failure": self._failure})
+            return self._told({"failure": render(self._failure), "text": as_json(self._failure)})
         rows = [
             [
                 key,

@@ -31,6 +31,7 @@ from bridge.northbound.page.bus_page import BusPage, Capture
 from bridge.northbound.page.guards import MOST_BODY, Guards
 from bridge.northbound.page.integration import Export, Integration
 from bridge.northbound.page.parameter_page import Counts, ParameterPage, holders_of
+from bridge.northbound.page.refused import BodyTooLong
 from bridge.northbound.page.sessionfile import SessionFile, credential_of
 from bridge.northbound.page.sessions import PageSession, PageSessions
 from bridge.northbound.page.site_description import described
@@ -314,12 +315,12 @@ async def _index(request: Request) -> Response:
 
 
 async def body_of(request: Request, most: int) -> bytes:
-    """Body of a request. Raises ``TimeoutError`` for one that comes too slowly, ``ValueError`` for one of
+    """Body of a request. Raises ``TimeoutError`` for one that comes too slowly, ``BodyTooLong`` for one of
     more than ``most`` bytes."""
     body = bytearray()
     async with asyncio.timeout(_BODY_S):
         async for chunk in request.stream():
             body += chunk
             if len(body) > most:
-                raise ValueError("too long")
+                raise BodyTooLong
     return bytes(body)

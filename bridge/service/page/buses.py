@@ -23,6 +23,7 @@ from bridge.northbound.page.bus_page import Captured, IsGone
 from bridge.northbound.page.traffic import BusTap, ShownFrame
 from bridge.project import Project
 from bridge.service.page.capture import CaptureFile
+from bridge.text import Text
 
 _IDENTIFIER: Final = 0x1FFF_FFFF
 _PERIOD_S: Final = 0.1
@@ -76,7 +77,7 @@ class Buses:
         finally:
             listener.close()
         if listener.failure:
-            raise OperationFailed(f"{bus}: {listener.failure}")
+            raise OperationFailed(Text.of("page.bus_ended", bus=bus, why=listener.failure))
         return Captured(await asyncio.to_thread(file.content), is_cut)
 
     def _tap(self, table: BusTable) -> BusTap:
@@ -135,7 +136,7 @@ class _ListenerTap:
             return []
         heard = [self._say(frame) for frame in listener.take()]
         if listener.failure and not heard:
-            raise OperationFailed(f"{self._table.name}: {listener.failure}")
+            raise OperationFailed(Text.of("page.bus_ended", bus=self._table.name, why=listener.failure))
         return heard
 
     def _say(self, frame: Frame) -> ShownFrame:
@@ -158,7 +159,7 @@ def _open(listener: Listener, table: BusTable) -> None:
         listener.open()
     except OSError as error:
         reason = error.strerror or str(error)
-        raise OperationFailed(f"{table.name} cannot be listened to: {reason.lower()}") from None
+        raise OperationFailed(Text.of("page.bus_deaf", bus=table.name, why=reason.lower())) from None
 
 
 def _identifier(frame: Frame) -> str:

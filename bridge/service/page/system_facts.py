@@ -21,7 +21,7 @@ from bridge.config import ListeningTable, Site
 from bridge.lint import Severity, lint
 from bridge.northbound.page.system import CertificateFacts, UnreadablePart
 from bridge.project import Project, load_project
-from bridge.text import as_json
+from bridge.text import Text, as_json
 
 _LIBRARIES: Final = ("asyncua", "pymodbus", "eclipse-zenoh", "python-can", "canopen", "starlette", "uvicorn")
 _SECRETS: Final = (
@@ -85,7 +85,7 @@ class SystemOf:
         except FileFaults as error:
             return [_shown("error", one) for one in error.faults]
         except BridgeError as error:
-            return [{"severity": "error", "line": 0, "message": str(error)}]
+            return [{"severity": "error", "line": 0, "message": str(error), "text": as_json(error.said)}]
         findings = [
             (severity, one.fault)
             for severity in (Severity.ERROR, Severity.WARNING)
@@ -214,7 +214,7 @@ def _certificate(of: str, file: Path) -> Iterator[CertificateFacts | UnreadableP
     except OSError as error:
         yield UnreadablePart(of, error.strerror or str(error))
     except _MALFORMED as error:
-        yield UnreadablePart(of, f"no certificate: {error}")
+        yield UnreadablePart(of, Text.of("page.no_certificate", why=str(error)))
     else:
         yield CertificateFacts(of, subject, until, print_)
 

@@ -15,7 +15,8 @@ from pydantic import Field, field_validator, model_validator
 from bridge.base.errors import OperationFailed
 from bridge.config.field_types import RegularExpression
 from bridge.config.model import Table
-from bridge.tomlfile import TomlFile
+from bridge.text import Text
+from bridge.tomlfile import TomlFile, Unfit
 
 FrameKind = Literal["request", "answer", "error_control", "emcy", "tpdo"]
 """Frames of a node: SDO requests to it and answers of its first SDO server, its heartbeats, boot-up messages
@@ -51,17 +52,17 @@ class Rule(Table):
     @classmethod
     def _is_bytes(cls, value: str) -> str:
         if value and not _TEMPLATE.fullmatch(value):
-            raise ValueError('is no frame: up to eight bytes as "42 .. 10", where ".." leaves one as it is')
+            raise Unfit(Text.of("habit_file.no_frame"))
         return value
 
     @model_validator(mode="after")
     def _fits_its_frames(self) -> Rule:
         if not self.model_fields_set & set(_DEEDS):
-            raise ValueError(f"does nothing: give one of {', '.join(_DEEDS)}")
+            raise Unfit(Text.of("habit_file.no_deed", deeds=_DEEDS))
         if self.abort is not None and self.frames not in ("request", "answer"):
-            raise ValueError("abort ends an SDO transfer: frames is request or answer")
+            raise Unfit(Text.of("habit_file.abort_frames"))
         if self.delay_ms and self.frames == "request":
-            raise ValueError("delay_ms is for what the node sends: delay the answer")
+            raise Unfit(Text.of("habit_file.delayed_request"))
         return self
 
 

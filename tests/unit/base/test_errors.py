@@ -7,6 +7,7 @@ import errno
 import pytest
 
 from bridge.base.errors import BridgeError, Fault, FileFaults, OperationFailed, Unavailable, is_exhausted
+from bridge.text import Text, render
 
 
 @pytest.mark.parametrize(
@@ -30,6 +31,13 @@ def test_all_faults_of_a_file_are_told_and_can_be_asked_for() -> None:
     error = FileFaults(faults)
     assert str(error) == "a.toml:1: one\na.toml:2: two"
     assert error.faults == tuple(faults)
+    assert isinstance(error.said, Text)
+
+
+def test_an_error_keeps_the_text_that_it_tells_in_english() -> None:
+    error = OperationFailed(Text.of("page.bus_deaf", bus="can0", why="no such device"))
+    assert str(error) == "can0 cannot be listened to: no such device"
+    assert render(error.said, "de") == "can0 lässt sich nicht mithören: no such device"
 
 
 @pytest.mark.parametrize(

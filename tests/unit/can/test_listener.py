@@ -97,7 +97,7 @@ async def test_a_listener_is_told_that_the_bus_process_has_ended(tmp_path: Path)
     async with tapped(path) as (ours, _):
         listener = await listening(path, ours)
     await until(lambda: bool(listener.failure))
-    assert "ended" in listener.failure
+    assert str(listener.failure) == "the process that has the bus has ended"
     listener.close()
 
 

@@ -6,6 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.errors import FileFaults
+from bridge.config import load_site
+from bridge.text import as_json, render
 from tests.support.small_site import faults
 
 BROKEN = """\
@@ -93,6 +96,23 @@ def test_every_fault_of_a_file_is_told_in_one_run_with_its_line(tmp_path: Path):
         'not "127.0.0.1:7447"',
         '44: zenoh.prefix: must be words of letters, digits and _ . - with / between them, not "a/*"',
     ]
+
+
+def test_every_fault_of_a_file_is_a_text_with_a_code(tmp_path: Path):
+    path = tmp_path / "site.toml"
+    path.write_text(BROKEN, encoding="utf-8")
+    with pytest.raises(FileFaults) as caught:
+        load_site(path)
+    assert all(as_json(fault.said) for fault in caught.value.faults)
+    german = {fault.line: render(fault.text, "de").partition(": ")[2] for fault in caught.value.faults}
+    assert german[5] == (
+        "bus[0]: die Schnittstelle 'socketcan' braucht einen Kanal (etwa channel = \"can0\")"
+    )
+    assert german[24] == "bus[0].node[0].drive[1].slot: Slot 'fu1' ist doppelt vergeben (zuerst in Zeile 18)"
+    assert german[44] == (
+        "zenoh.prefix: muss aus Wörtern mit / dazwischen bestehen, jedes aus Buchstaben, Ziffern und _ . -, "
+        'nicht "a/*"'
+    )
 
 
 @pytest.mark.parametrize(

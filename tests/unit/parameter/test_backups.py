@@ -464,16 +464,6 @@ def test_every_name_that_a_scan_gives_leads_back_to_its_object() -> None:
     assert names.at(ObjectRef(0x2078, 2)).name == "2078:02", "P120 has no parameter sets"
 
 
-def test_a_set_is_of_a_drive_with_the_same_vendor_and_product() -> None:
-    of_file = {"vendor": 0x38, "product": 2, "serial": 1}
-    assert not backups.why_another(of_file, {"vendor": 0x38, "product": 2, "serial": 9})
-    assert not backups.why_another({}, {"vendor": 0x38})
-    name, why = backups.why_another(of_file, {"vendor": 0x38, "product": 3}) or ("", "")
-    assert (name, "product 00000002h" in why) == ("product", True)
-    name, why = backups.why_another(of_file, {"vendor": 0x38}) or ("", "")
-    assert (name, "not told" in why) == ("product", True)
-
-
 def test_another_device_that_answers_after_a_break_is_noticed(workshop: Workshop) -> None:
     identity: dict[str, int] = {}
     assert workshop.run(lambda now: backups.identify(identity)) is None

@@ -10,7 +10,7 @@ from bridge.base.errors import FileFaults
 from bridge.image import Value
 from bridge.parameter import Names
 from bridge.parameter.backup_file import BackupFile
-from bridge.parameter.set_file import read_set
+from bridge.parameter.set_file import read_set, why_another
 from tests.support import sites
 from tests.support.invented_eds import U16, eds, var
 
@@ -63,3 +63,13 @@ def test_a_description_gives_the_factory_settings_of_what_it_lists(tmp_path: Pat
     found = read(path)
     assert found.objects == {"3FF0:00": 7}
     assert (found.mapping, found.drive) == (NORD, "conveyor/fu1")
+
+
+def test_a_set_is_of_a_drive_with_the_same_vendor_and_product() -> None:
+    of_file = {"vendor": 0x38, "product": 2, "serial": 1}
+    assert not why_another(of_file, {"vendor": 0x38, "product": 2, "serial": 9})
+    assert not why_another({}, {"vendor": 0x38})
+    name, why = why_another(of_file, {"vendor": 0x38, "product": 3}) or ("", "")
+    assert (name, "product 00000002h, and this one's is 00000003h" in str(why)) == ("product", True)
+    name, why = why_another(of_file, {"vendor": 0x38}) or ("", "")
+    assert (name, "not told" in str(why)) == ("product", True)

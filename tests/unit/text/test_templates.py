@@ -140,7 +140,7 @@ def test_all_formats_of_the_templates_are_known_to_the_page() -> None:
         for language in LANGUAGES
         for parts in templates(language).values()
         for part in parts
-        if part.format and not part.format.endswith(" ")
+        if part.format and not part.format[-1].isspace()
     }
     assert used <= set(FORMATS)
 

@@ -47,6 +47,10 @@ async def content(answer: Response) -> bytes:
     return b"".join([bytes(cast("bytes", part)) async for part in answer.body_iterator])
 
 
+def told(answer: Response) -> str:
+    return json.loads(bytes(answer.body))["error"]
+
+
 async def test_who_is_not_logged_in_gets_nothing() -> None:
     case = Case()
     case.session = None
@@ -59,7 +63,7 @@ async def test_a_layout_is_that_of_its_bus() -> None:
     case = Case()
     assert json.loads(bytes((await case.get("/api/bus/{bus}")).body)) == {"nodes": []}
     answer = await case.get("/api/bus/{bus}", "can7")
-    assert (answer.status_code, json.loads(bytes(answer.body))) == (404, {"error": "there is can0"})
+    assert (answer.status_code, told(answer)) == (404, "there is can0")
 
 
 async def test_a_capture_is_a_file_named_by_site_and_bus() -> None:
@@ -88,7 +92,7 @@ async def test_bounds_of_a_capture_are_told(query: str) -> None:
     case = Case()
     answer = await case.capture(query)
     assert answer.status_code == 422
-    assert json.loads(bytes(answer.body)) == {"error": "seconds = 1…60, format = candump or asc"}
+    assert told(answer) == "seconds = 1…60, format = candump or asc"
     assert case.asked == []
 
 
@@ -113,4 +117,4 @@ async def test_a_bus_that_cannot_be_heard_says_why_and_makes_room() -> None:
     for _ in range(5):
         case.captured = OperationFailed("nobody drives can0")
         answer = await case.capture()
-        assert (answer.status_code, json.loads(bytes(answer.body))) == (503, {"error": "nobody drives can0"})
+        assert (answer.status_code, told(answer)) == (503, "nobody drives can0")

@@ -14,6 +14,7 @@ from cryptography.x509.oid import NameOID
 from bridge.base.errors import FileFaults
 from bridge.config import PageTable
 from bridge.northbound.page.preflight import check_page
+from bridge.text import render
 
 NOW = datetime.datetime.now(datetime.UTC)
 DAY = datetime.timedelta(1)
@@ -31,7 +32,7 @@ def pair(folder: Path, name: str, ends: datetime.datetime = NOW + DAY) -> tuple[
     return files
 
 
-def told(folder: Path, certificate: Path, key: Path) -> str:
+def told(folder: Path, certificate: Path, key: Path, language: str = "en") -> str:
     """The fault, at the line of its key; empty where there is none."""
     site = folder / "site.toml"
     site.write_text(f'[page]\ncertificate = "{certificate}"\nprivate_key = "{key}"\n')
@@ -42,7 +43,7 @@ def told(folder: Path, certificate: Path, key: Path) -> str:
         (fault,) = error.faults
         assert fault.file == str(site)
         assert site.read_text().splitlines()[fault.line - 1].startswith(fault.key.removeprefix("page."))
-        return f"{fault.key}: {fault.message.removeprefix(f'{folder}/')}"
+        return f"{fault.key}: {render(fault.said, language).removeprefix(f'{folder}/')}"
     return ""
 
 
@@ -60,6 +61,8 @@ def test_one_that_has_run_out_is_named(tmp_path: Path) -> None:
     ended = NOW - DAY
     found = told(tmp_path, *pair(tmp_path, "a", ended))
     assert found == f"page.certificate: a.crt was valid until {ended:%Y-%m-%d}"
+    found = told(tmp_path, *pair(tmp_path, "a", ended), "de")
+    assert found == f"page.certificate: a.crt war gültig bis {ended:%Y-%m-%d}"
 
 
 @pytest.mark.parametrize("which", ["certificate", "key"])

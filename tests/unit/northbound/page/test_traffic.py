@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from bridge.base.errors import OperationFailed
 from bridge.northbound.page.traffic import MOST_ROWS, ShownFrame, TrafficFilter, TrafficViews
+from bridge.text import Text, Words
 
 BUS = "can0"
 
@@ -24,7 +25,7 @@ class BusTap:
         self.waiting: list[ShownFrame] = []
         self.openings = self.lost = self.tries = 0
         self.is_open = False
-        self.failure = ""
+        self.failure: Words = ""
 
     def open(self) -> None:
         self.tries += 1
@@ -149,6 +150,14 @@ def test_a_bus_that_cannot_be_heard_says_why_and_is_tried_again() -> None:
     bench.tap.failure = "the process that has the bus has ended"
     assert bench.beat(TrafficFilter(BUS))[0][0]["failure"] == bench.tap.failure
     assert not bench.tap.is_open
+
+
+def test_the_reason_comes_with_its_code() -> None:
+    bench = Bench()
+    bench.tap.failure = Text.of("page.bus_deaf", bus="can0", why="no such device")
+    ((message,),) = bench.beat(TrafficFilter(BUS))
+    assert message["failure"] == "can0 cannot be listened to: no such device"
+    assert message["text"]["code"] == "page.bus_deaf"
 
 
 def test_a_bus_that_cannot_be_heard_is_tried_once_a_second() -> None:

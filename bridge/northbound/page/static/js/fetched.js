@@ -1,7 +1,7 @@
 // Requests to the server: each gives a value or a failure, never neither.
 
 import { html, useEffect, useRef, useState } from "./ui.js";
-import { maybe, t } from "./texts.js";
+import { maybe, onceWorded, t } from "./texts.js";
 
 const LIMIT_MS = 30_000;
 
@@ -19,8 +19,8 @@ export async function fetched(address, { limitMs = LIMIT_MS, read = (answer) => 
 }
 
 async function reasonOf(answer) {
-  const { error } = await answer.json().catch(() => ({}));
-  return maybe(`refusal.${error}`) || error || t("fetched.status", { status: answer.status });
+  const { error, text } = await answer.json().catch(() => ({}));
+  return maybe(`refusal.${error}`) || (await onceWorded(text, error)) || t("fetched.status", { status: answer.status });
 }
 
 /** {value, failure, isBusy, again} for the resource at `address`; requested again by `again`, and every `everyMs`. When a

@@ -63,12 +63,21 @@ export function inWords(text) {
   return "";
 }
 
-const loading = new Set();
+/** Like `worded`, for what is shown once: it waits for the templates. */
+export async function onceWorded(text, english) {
+  if (language.value !== "en" && text) await load(language.value, "texts", templates);
+  return worded(text, english);
+}
 
-async function load(wanted, what, into) {
+const loading = new Map();
+
+function load(wanted, what, into) {
   const address = `api/${what}/${wanted}`;
-  if (loading.has(address)) return;
-  loading.add(address);
+  if (!loading.has(address)) loading.set(address, loaded(address, wanted, into));
+  return loading.get(address);
+}
+
+async function loaded(address, wanted, into) {
   try {
     const answer = await fetch(address);
     if (answer.ok) into.value = { ...into.value, [wanted]: await answer.json() };

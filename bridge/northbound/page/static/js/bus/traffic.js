@@ -3,7 +3,7 @@
 import { html, useEffect, useRef, useState } from "../ui.js";
 import { hear } from "../live.js";
 import { number } from "../format.js";
-import { t } from "../texts.js";
+import { t, worded } from "../texts.js";
 
 const KINDS = ["nmt", "sync", "time", "emcy", "pdo", "sdo", "heartbeat", "lss", "other"];
 const KEPT = 200;
@@ -53,7 +53,7 @@ export function Traffic({ bus, nodes }) {
       <fieldset class="kinds"><legend>${t("traffic.kinds")}</legend>
         ${KINDS.map((kind) => html`<label><input type="checkbox" checked=${kinds.includes(kind)} onChange=${() => toggle(kind)} /> ${t(`kind.${kind}`)}</label>`)}
       </fieldset>
-      ${heard.failure && html`<p class="failure" role="alert">${heard.failure}</p>`}
+      ${heard.failure && html`<p class="failure" role="alert">${worded(heard.text, heard.failure)}</p>`}
       ${view === "frames" ? html`<${Frames} rows=${heard.rows} />` : html`<${Identifiers} rows=${heard.identifiers ?? []} />`}
     </section>
   `;
@@ -61,7 +61,7 @@ export function Traffic({ bus, nodes }) {
 
 // The newest first.
 function taken(kept, message) {
-  if (message.failure) return { ...kept, failure: message.failure };
+  if (message.failure) return { ...kept, failure: message.failure, text: message.text };
   if (message.identifiers) return { ...kept, identifiers: message.identifiers, lost: message.lost, failure: "" };
   const rows = [...message.frames.reverse(), ...kept.rows].slice(0, KEPT);
   return { ...kept, rows, lost: message.lost, more: kept.more + message.more, failure: "" };

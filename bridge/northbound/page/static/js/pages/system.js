@@ -49,7 +49,7 @@ function Versions({ versions }) {
 // Facts that could not be read; the rest of the page stands.
 function Unreadable({ faults }) {
   return html`<ul class="findings">${faults.map((one) => html`<li class="is-warning"><${Icon} name="warning" />
-    <span>${maybe(`system.${one.of}`) || one.of}: ${one.text}</span></li>`)}</ul>`;
+    <span>${maybe(`system.${one.of}`) || one.of}: ${worded(one.text, one.message)}</span></li>`)}</ul>`;
 }
 
 function Health() {

@@ -5,7 +5,8 @@ Gives the frames that are to be sent once; repetitions are made from its nodes (
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -23,7 +24,7 @@ from bridge.config import BusTable
 from bridge.config.download import Download
 from bridge.master.bus_points import BusPoints
 from bridge.master.farewell import Farewell
-from bridge.master.intruders import Intruders
+from bridge.master.intruders import Intruders, NmtStop, Taker
 from bridge.master.mastership import BusMastership
 from bridge.master.reach import Reach
 from bridge.master.schedule import Schedule
@@ -67,8 +68,8 @@ class Network:
         self.farewell = Farewell(self.nodes)
         self._reach = Reach(self.nodes, self.mastership, self.farewell)
         self._reach.on_bus(side.began)
-        self._watch = BusWatch(bus.name, own_id, self.mastership.acts, known, side)
-        self._intruders = Intruders(bus, self.nodes, side.events, self.mastership.acts, self._stop_nodes)
+        self._watch = BusWatch(bus.name, own_id, self.mastership, known, side)
+        self._intruders = Intruders(bus, self.nodes, side.events, self.mastership)
         self.ours: frozenset[int] = frozenset()
         """Identifiers of what we repeat, on which nobody else may send; updated by ``take_routes``."""
         self._has_booted = False
@@ -103,7 +104,7 @@ class Network:
                 self._watch.on_own_id(now)
             if self._intruders.is_sign(frame, acts=self.mastership.acts()):
                 self._on_other_bridge(self._intruders.name(frame), now)
-            self._intruders.on_frame(frame)
+            self._stop_nodes(self._intruders.on_frame(frame))
         self._pump(now)
 
     def _on_other_bridge(self, sign: Text, now: float) -> None:
@@ -169,12 +170,17 @@ class Network:
         """Note that the bridge was away for longer than its bursts last."""
         self.mastership.came_back(now)
 
-    def _stop_nodes(self, nodes: Sequence[NodeCore], why: Text, now: float) -> None:
-        are_all = len(nodes) == len(self.nodes) > 1 and not self._takes_over(nodes)
-        for node in nodes:
-            node.carry_out_command(Action.STOP_NODE, why, now, send=not are_all)
-        if are_all:
-            self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
+    def _on_single(self, take: Taker, frame: Frame) -> None:
+        """Take a frame of somebody else on an identifier on which we send single frames."""
+        self._stop_nodes(take(frame))
+
+    def _stop_nodes(self, stops: Iterator[NmtStop]) -> None:
+        for nodes, why, at in stops:
+            are_all = len(nodes) == len(self.nodes) > 1 and not self._takes_over(nodes)
+            for node in nodes:
+                node.carry_out_command(Action.STOP_NODE, why, at, send=not are_all)
+            if are_all:
+                self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
 
     @staticmethod
     def _takes_over(nodes: Sequence[NodeCore]) -> bool:
@@ -324,7 +330,8 @@ class Network:
         for node in self.nodes:
             self._routes.update(node.wire.take_routes())
         self.ours = self._intruders.watched(self._routes)
-        self._routes |= self._intruders.routes(self._routes)
+        singles = self._intruders.routes(self._routes)
+        self._routes |= {can_id: partial(self._on_single, take) for can_id, take in singles.items()}
         if self._window:
             self._judge_by_window(self._window)
         return list(self._routes)

@@ -237,7 +237,7 @@ class Network:
         for node in self.nodes:
             for who in node.node.members:
                 if who.name == request.target:
-                    node.parameters.submit(request, who, now, reply)
+                    node.ask(request, who, now, reply)
                     return True
         return False
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from bridge.base.habit_texts import text_of_habit
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.command import Action, BusSide
+from bridge.command import Action, BusSide, ParameterHolder, Reply, Request
 from bridge.command.drive_link import NodeState
 from bridge.command.node import Node
 from bridge.config.download import Download
@@ -21,7 +21,6 @@ from bridge.node.leaving import Leaving
 from bridge.node.neighbours import Neighbours
 from bridge.node.node_view import NodeView
 from bridge.node.parameters.service import NodeParameters
-from bridge.node.places.sdo_channels import SdoChannels
 from bridge.node.process.stop_words import StopWords
 from bridge.node.put_off import CANCELS_WORDS
 from bridge.node.wire import NodeWire, WireEvents
@@ -58,10 +57,10 @@ class NodeCore:
         self._memory = boot.BootMemory(count_write=self._count_write)
         configured = (*downloads, *(entry.download for entry in table.configure))
         self.wire = NodeWire(node, side, listener, StopWords(node, configured, self._memory))
-        self.leaving = Leaving(node, self.wire, self._memory, self._takes_words)
+        self.leaving = Leaving(node, self.wire, self._memory)
         self.error_control = self.wire.error_control
         self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
-        self.parameters = NodeParameters(node, side, lambda: self.sdo)
+        self.parameters = NodeParameters(node, side, self.wire.sdo)
         self.boot_at: float | None = 0.0
         self.has_concluded = False
         """Whether a boot-up has ended, well or not, since the bus came up."""
@@ -159,12 +158,6 @@ class NodeCore:
     def _soon(self, now: float) -> float:
         """Earliest time to boot a node that is there, counted from the boot-up before."""
         return max(now, self._last_boot + self._back_off.between_boots_s)
-
-    @property
-    def sdo(self) -> SdoChannels:
-        """SDO channels, for a new transfer: the node's deadlines are looked at in the next round."""
-        self._touch()
-        return self.wire.sdo
 
     def boot_next(self, at: float | None) -> None:
         """Schedule the next boot-up, at once if ``at`` is past; None: only on request."""
@@ -417,15 +410,13 @@ class NodeCore:
         if state is self.state:
             return
         self.state = state
+        self.leaving.on_node(state)
         self._view.is_in(state, now)
         self.node.on_state(state, now)
         if not self._back_off.is_flapping:
             self._view.went(state, now)
         self.parameters.on_node(state, now)
         self._show(now)
-
-    def _takes_words(self) -> bool:
-        return self.state is not NodeState.STOPPED or self.error_control.state is NmtState.OPERATIONAL
 
     @property
     def is_operational(self) -> bool:
@@ -449,6 +440,12 @@ class NodeCore:
         cycles = eeprom.cycles if eeprom else None
         ledger.check((owner, address), name, self._last_boot, cycles)
         return ledger.count((owner, address), name, cycles, self._last_boot)
+
+    def ask(self, request: Request, holder: ParameterHolder, now: float, reply: Reply) -> None:
+        """Carry out a request for a parameter of a drive or of the device; ``reply`` is called once, when it
+        has answered."""
+        self.parameters.submit(request, holder, now, reply)
+        self._touch()
 
     def carry_out_command(
         self, action: Action, who: Words, now: float, *, send: bool = True, at_once: bool = False

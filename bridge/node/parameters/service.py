@@ -69,9 +69,9 @@ Waiting = list[Callable[[ParameterReading | ParameterError], None]]
 
 
 class NodeParameters:
-    """Parameter access for one node. ``sdo`` gives the channels, and has the node's deadlines looked at."""
+    """Parameter access for one node."""
 
-    def __init__(self, node: Node, side: BusSide, sdo: Callable[[], SdoChannels]) -> None:
+    def __init__(self, node: Node, side: BusSide, sdo: SdoChannels) -> None:
         self._node = node
         self._events = side.events
         self._sdo = sdo
@@ -233,7 +233,7 @@ class NodeParameters:
     ) -> None:
         def channel_for(transfer: Transfer) -> SdoChannel:
             number = None if transfer.of_node else self._channels[drive.name]
-            return self._sdo()[number or FIRST]
+            return self._sdo[number or FIRST]
 
         run(procedure, channel_for, lambda: self._now, done, priority=priority)
 

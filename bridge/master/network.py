@@ -32,6 +32,7 @@ from bridge.master.standby import Standby
 from bridge.master.startup import StartGate
 from bridge.master.watch import BusWatch
 from bridge.node import nmt_commands as node_commands
+from bridge.node.identifiers import BusIdentifiers
 from bridge.node.neighbours import Neighbour
 from bridge.node.node_core import BUS_IS_DOWN, NodeCore
 from bridge.node.wire import Handler
@@ -59,7 +60,12 @@ class Network:
         self.bus = bus
         self._image = side.image
         self._events = side.events
-        self.nodes = [NodeCore(node, side, self, downloads.get(node.name, ())) for node in side.nodes]
+        identifiers = BusIdentifiers()
+        self.nodes = [
+            NodeCore(node, side, self, identifiers, downloads.get(node.name, ())) for node in side.nodes
+        ]
+        for node in self.nodes:
+            identifiers.add(node.wire)
         self._gate = StartGate(bus.mandatory_missing, self.nodes)
         self._schedule = Schedule(self.nodes)
         own_id = bus.master_node_id if bus.heartbeat_ms else None
@@ -279,20 +285,6 @@ class Network:
     def duplicate(self, node: Neighbour, sign: DuplicateSign, now: float) -> None:
         self._watch.on_duplicate(node.table.id, sign, now)
 
-    def is_taken(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether another node of the bus uses this identifier, for a PDO or anything else."""
-        return any(
-            cob_id in other.wire.routes
-            or any(cob_id == rpdo.cob_id for pdos in other.wire.pdos for rpdo in pdos.rpdos)
-            for other in self.nodes
-            if other is not node
-        )
-
-    def is_foreign(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether this identifier is another node's, or will be by the site's files."""
-        others = (other for other in self.nodes if other is not node)
-        return self.is_taken(node, cob_id) or any(cob_id in one.wire.stop_words.given_ids for one in others)
-
     # sending
 
     @property
@@ -328,7 +320,7 @@ class Network:
         self.routings += 1
         self._routes = self._watch.routes()
         for node in self.nodes:
-            self._routes.update(node.wire.take_routes())
+            self._routes.update(node.take_routes())
         self.ours = self._intruders.watched(self._routes)
         singles = self._intruders.routes(self._routes)
         self._routes |= {can_id: partial(self._on_single, take) for can_id, take in singles.items()}

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Final
 
 from bridge.base.habit_texts import text_of_habit
+from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.command import Action, BusSide, ParameterHolder, Reply, Request
 from bridge.command.drive_link import NodeState
@@ -17,13 +18,14 @@ from bridge.node import nmt_commands as node_commands
 from bridge.node.backoff import BETWEEN_BOOTS_S, BackOff
 from bridge.node.booting import Booting
 from bridge.node.error_control import Sign
+from bridge.node.identifiers import BusIdentifiers
 from bridge.node.leaving import Leaving
 from bridge.node.neighbours import Neighbours
 from bridge.node.node_view import NodeView
 from bridge.node.parameters.service import NodeParameters
 from bridge.node.process.stop_words import StopWords
 from bridge.node.put_off import CANCELS_WORDS
-from bridge.node.wire import NodeWire, WireEvents
+from bridge.node.wire import Handler, NodeWire, Service
 from bridge.text import Said, Text, Words
 
 _SETTLE_S: Final = 2.0
@@ -38,7 +40,12 @@ class NodeCore:
     """Boots one node, keeps it in operation and reacts to its loss."""
 
     def __init__(
-        self, node: Node, side: BusSide, neighbours: Neighbours, downloads: Sequence[Download] = ()
+        self,
+        node: Node,
+        side: BusSide,
+        neighbours: Neighbours,
+        identifiers: BusIdentifiers,
+        downloads: Sequence[Download] = (),
     ) -> None:
         self.node = node
         self._ledger = side.eeprom_writes
@@ -47,16 +54,9 @@ class NodeCore:
         self.state = NodeState.ABSENT
         self._view = NodeView(node, side)
         self._touch = partial(neighbours.touched, self)
-        listener = WireEvents(
-            self._on_sign,
-            self._touch,
-            partial(neighbours.duplicate, self),
-            partial(neighbours.is_taken, self),
-            partial(neighbours.is_foreign, self),
-        )
         self._memory = boot.BootMemory(count_write=self._count_write)
         configured = (*downloads, *(entry.download for entry in table.configure))
-        self.wire = NodeWire(node, side, listener, StopWords(node, configured, self._memory))
+        self.wire = NodeWire(node, side, identifiers, StopWords(node, configured, self._memory))
         self.leaving = Leaving(node, self.wire, self._memory)
         self.error_control = self.wire.error_control
         self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
@@ -80,6 +80,24 @@ class NodeCore:
             self.set_state(NodeState.DISABLED, side.began)
         self.say(Text.of("node.waiting"), side.began)
         self._show(side.began)
+
+    def take_routes(self) -> dict[int, Handler]:
+        """Handlers by COB-ID; marks them as taken until they change."""
+        wire = self.wire
+        services = {cob_id: partial(self._on_service, service) for cob_id, service in wire.services.items()}
+        return {**wire.requests, **services, **wire.take_routes()}
+
+    def _on_service(self, service: Service, frame: Frame) -> None:
+        """Take a frame that is no process data: frames to be sent and deadlines may change by it."""
+        sign = service(frame)
+        duplicate = self.error_control.duplicate
+        if duplicate is not None:
+            self.error_control.duplicate = None
+            self._neighbours.duplicate(self, duplicate, frame.time)
+        if sign is None:
+            self._touch()
+        elif sign is not Sign.MALFORMED:
+            self._on_sign(sign, frame.time)
 
     def _on_sign(self, sign: Sign, now: float) -> None:
         """Take an error control message."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
 from bridge.base.sdo_texts import text_of_learned
 from bridge.canopen import cobid, nmt
-from bridge.canopen.duplicate import DuplicateSign
 from bridge.canopen.frame import Frame
 from bridge.canopen.habits import HabitCounter, Odd
 from bridge.canopen.nmt import NmtCommand
@@ -21,6 +19,7 @@ from bridge.node import boot
 from bridge.node.emergencies import Concerned, Emergencies
 from bridge.node.error_control import ErrorControl, Sign
 from bridge.node.fault_reading import FaultReading
+from bridge.node.identifiers import BusIdentifiers
 from bridge.node.meaning_watch import MeaningWatch
 from bridge.node.places.sdo_channels import SdoChannels
 from bridge.node.process.inputs import connect_inputs
@@ -34,34 +33,22 @@ from bridge.node.read_back import ReadBack
 from bridge.text import Said, Text
 
 Handler = Callable[[Frame], None]
+Service = Callable[[Frame], Sign | None]
+"""Taker of a frame by which more than process data may change. It gives the content of an error control
+message, None for any other frame."""
 _SDO_BYTES: Final = 8
 _EMCY_BYTES: Final = 8
-
-
-@dataclass(frozen=True, slots=True)
-class WireEvents:
-    """Receivers of what one node sends, and what its network knows of the other nodes."""
-
-    on_sign: Callable[[Sign, float], None]
-    """Takes an error control message and the time at which it came."""
-    touch: Callable[[], None]
-    """Notes a frame that may change frames to be sent or deadlines."""
-    on_duplicate: Callable[[DuplicateSign, float], None]
-    """Takes a sign that two devices have this node id, and its time."""
-    is_taken: Callable[[int], bool]
-    is_foreign: Callable[[int], bool]
-    """Whether an identifier is another node's, as in ``Neighbours``."""
 
 
 class NodeWire:
     """Frames from and to one node. ``rejected`` counts those that do not fit what the node says it sends."""
 
-    def __init__(self, node: Node, side: BusSide, listener: WireEvents, stop_words: StopWords) -> None:
+    def __init__(self, node: Node, side: BusSide, identifiers: BusIdentifiers, stop_words: StopWords) -> None:
         self._node = node
         self.stop_words = stop_words
         self._image = side.image
         self._events = side.events
-        self._listener = listener
+        self._identifiers = identifiers
         self.sdo = SdoChannels(node)
         self.rejected = 0
         self.habits = HabitCounter()
@@ -81,22 +68,37 @@ class NodeWire:
         self._no_rpdo: dict[str, Said] = {one.name: Text.of("unsent.no_rpdo") for one in outputs}
         self._left_out = self._no_rpdo
         self._emcy_id: int | None = cobid.EMCY + node.table.id
-        self.routes: dict[int, Handler] = self._basic_routes()
+        self.requests: dict[int, Handler] = {
+            channel.request_id: self.error_control.on_foreign_request for channel in self.sdo
+        }
+        """Handlers of other clients' SDO requests, by COB-ID: what we send does not come back."""
+        self.services = self._services()
+        """Takers of SDO answers, error control and emergency messages, by COB-ID."""
+        self.routes: dict[int, Handler] = {}
+        """Handlers of process data, by COB-ID."""
         self.routes_changed = True
         self._frames: list[Frame] = []
         self.put_off = PutOff()
         """NMT command that waits until stopped words are taken over; these go on until then."""
 
-    def _basic_routes(self) -> dict[int, Handler]:
-        routes: dict[int, Handler] = {
+    def _services(self) -> dict[int, Service]:
+        services: dict[int, Service] = {
             **{channel.reply_id: partial(self._on_sdo, channel) for channel in self.sdo},
-            # What we send does not come back.
-            **{channel.request_id: self.error_control.on_foreign_request for channel in self.sdo},
             cobid.ERROR_CONTROL + self._node.table.id: self._on_error_control,
         }
         if self._emcy_id is not None:
-            routes[self._emcy_id] = self._on_emcy
-        return routes
+            services[self._emcy_id] = self._on_emcy
+        return services
+
+    @property
+    def given_ids(self) -> frozenset[int]:
+        """COB-IDs that the site's files give to PDOs of the node."""
+        return self.stop_words.given_ids
+
+    def uses(self, cob_id: int) -> bool:
+        """Whether the node uses this COB-ID at present, for a PDO or anything else."""
+        is_received = cob_id in self.routes or cob_id in self.services or cob_id in self.requests
+        return is_received or any(cob_id == rpdo.cob_id for pdos in self.pdos for rpdo in pdos.rpdos)
 
     def carries(self, one: Commanded) -> bool:
         """Whether the boot-up has found RPDOs that command ``one``."""
@@ -112,7 +114,7 @@ class NodeWire:
         return self._left_out.get(one.name) or Text.of("unsent.no_pdos")
 
     def take_routes(self) -> dict[int, Handler]:
-        """Handlers by COB-ID; marks them as taken until they change."""
+        """Handlers of process data by COB-ID; marks all COB-IDs as taken until they change."""
         self.routes_changed = False
         return self.routes
 
@@ -149,10 +151,11 @@ class NodeWire:
                 raise AssertionError(f"{action} waits for an answer")
 
     def send_stopped(self) -> None:
-        self._frames += self.stop_words.frames(self.drives, self._listener.is_foreign)
+        is_foreign = partial(self._identifiers.is_foreign, self)
+        self._frames += self.stop_words.frames(self.drives, is_foreign)
         for pdos in self.output_pdos.values():
             frames = pdos.frames_with_stop()
-            self._frames += [frame for frame in frames if not self._listener.is_foreign(frame.can_id)]
+            self._frames += [frame for frame in frames if not is_foreign(frame.can_id)]
 
     def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
         unmatched, late = channel.unmatched, channel.late
@@ -164,12 +167,10 @@ class NodeWire:
             self.habits.note(Odd.SDO_LENGTH, len(frame.data), _SDO_BYTES)
         if channel.late == late:
             self.error_control.on_reply(frame, matched=channel.unmatched == unmatched)
-            self._tell_duplicate(frame.time)
         else:
             late_ms, timeout_ms = round(1000 * channel.lateness_s), round(1000 * channel.timeout_s)
             self.habits.note(Odd.SDO_LATE, late_ms, timeout_ms)
         self._tell_learned(frame.time)
-        self._listener.touch()
 
     def _on_emcy(self, frame: Frame) -> None:
         concerned = self._emergencies.on_frame(frame)
@@ -177,24 +178,17 @@ class NodeWire:
             self.reject(frame, Text.of("frame.emergency_length"))
         else:
             self._look_for_faults(concerned)
-        self._listener.touch()
 
     def _look_for_faults(self, concerned: Sequence[Concerned]) -> None:
         for one in concerned:
             self.faults.on_emcy(one.drive, one.at)
 
-    def _on_error_control(self, frame: Frame) -> None:
+    def _on_error_control(self, frame: Frame) -> Sign:
         sign = self.error_control.on_frame(frame)
-        self._tell_duplicate(frame.time)
         if sign is Sign.MALFORMED:
             self.habits.note(Odd.HEARTBEAT_LENGTH, len(frame.data), 1)
             self.reject(frame, Text.of("frame.error_control_length"))
-        else:
-            self._listener.on_sign(sign, frame.time)
-
-    def _tell_duplicate(self, at: float) -> None:
-        if self.error_control.duplicate is not None:
-            self._listener.on_duplicate(self.error_control.duplicate, at)
+        return sign
 
     def reject(self, frame: Frame, why: Text) -> None:
         """Count and report a frame that does not fit, at most once a minute; it changes nothing."""
@@ -257,14 +251,16 @@ class NodeWire:
         self.error_control.produces_every(result.heartbeat_ms / 1000 or None)
         self._emcy_id = self._usable_emcy_id(result)
         self._image.put(f"{self._node.name}/node/software_version", result.software_version, now)
-        self.drives = connect(self._node, result, self.reject, self._listener.is_taken, now)
+        is_taken = partial(self._identifiers.is_taken, self)
+        self.drives = connect(self._node, result, self.reject, is_taken, now)
         self._left_out = self._no_rpdo | {
             name: Text.of("unsent.no_pdos_because", why=plan.problem)
             for name, plan in result.drives.items()
             if plan.problem
         }
         self._mapped_bytes = {pdo.cob_id: pdo.codec.length for pdo in _tpdos(result)}
-        self.routes = self._basic_routes()
+        self.services = self._services()
+        self.routes = {}
         for pdos in self.drives.values():
             self.routes |= pdos.handlers
         sync_ms = self._node.bus.sync_period_ms
@@ -278,14 +274,15 @@ class NodeWire:
         device.identification = result.identification
         self.routes |= connect_inputs(device, plan.tpdos, sync_ms, self.reject, now)
         for outputs in device.commanded:
-            pdos = connect_outputs(outputs, plan.rpdos, result, self._listener.is_taken, now)
+            is_taken = partial(self._identifiers.is_taken, self)
+            pdos = connect_outputs(outputs, plan.rpdos, result, is_taken, now)
             self.output_pdos = {outputs.name: pdos} if pdos else {}
 
     def _usable_emcy_id(self, result: boot.BootResult) -> int | None:
         """COB-ID of the emergency messages; the default one where the node's own belongs to another node."""
         default = cobid.EMCY + self._node.table.id
         wanted = result.emcy_id
-        if wanted in (None, default) or not self._listener.is_taken(wanted):
+        if wanted in (None, default) or not self._identifiers.is_taken(self, wanted):
             return wanted
         result.notes.append(Text.of("boot.emergency_id_taken", id=f"{wanted:03X}h"))
         return default

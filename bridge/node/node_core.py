@@ -48,18 +48,19 @@ class NodeCore:
         downloads: Sequence[Download] = (),
     ) -> None:
         self.node = node
-        self._ledger = side.eeprom_writes
         self._neighbours = neighbours
+        self._downloads = downloads
         table = self.table = node.table
         self.state = NodeState.ABSENT
         self._view = NodeView(node, side)
         self._touch = partial(neighbours.touched, self)
-        self._memory = boot.BootMemory(count_write=self._count_write)
+        cycles = node.family.eeprom.cycles if node.family.eeprom else None
+        self._memory = boot.BootMemory(ledger=side.eeprom_writes, cycles=cycles)
         configured = (*downloads, *(entry.download for entry in table.configure))
         self.wire = NodeWire(node, side, identifiers, StopWords(node, configured, self._memory))
         self.leaving = Leaving(node, self.wire, self._memory)
         self.error_control = self.wire.error_control
-        self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
+        self.booting = Booting(self, self.wire.sdo)
         self.parameters = NodeParameters(node, side, self.wire.sdo)
         self.boot_at: float | None = 0.0
         self.has_concluded = False
@@ -215,12 +216,12 @@ class NodeCore:
         self.booting.on_time(now, self.error_control.state)
         if self.boot_at is not None and now >= self.boot_at and not self._is_busy:
             self.boot_at = None
-            self._last_boot = now
+            self._last_boot = self._memory.began_at = now
             self.leaving.forget()
             # A stopped node answers no SDO: it has to be woken before it is asked.
             if self.told is NmtCommand.STOP or self.error_control.state is NmtState.STOPPED:
                 self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
-            self.booting.begin(now)
+            self.booting.begin(boot.boot(self.node, self._downloads, self._memory), now)
         self.wire.polling.on_time(now)
         self.parameters.on_time(now)
 
@@ -451,13 +452,6 @@ class NodeCore:
 
     def _show(self, now: float) -> None:
         self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
-
-    def _count_write(self, owner: str, address: str, name: str) -> Said:
-        """Count a boot-up's write to an EEPROM, as of its beginning; returns a warning or an empty text."""
-        ledger, eeprom = self._ledger, self.node.family.eeprom
-        cycles = eeprom.cycles if eeprom else None
-        ledger.check((owner, address), name, self._last_boot, cycles)
-        return ledger.count((owner, address), name, cycles, self._last_boot)
 
     def ask(self, request: Request, holder: ParameterHolder, now: float, reply: Reply) -> None:
         """Carry out a request for a parameter of a drive or of the device; ``reply`` is called once, when it

@@ -28,6 +28,7 @@ from bridge.node.process.polling import Polling
 from bridge.node.process.process_data import DrivePdos, connect
 from bridge.node.process.stop_words import StopWords
 from bridge.node.process.tpdo import node_tpdos
+from bridge.node.process.unfit_frames import UnfitFrames
 from bridge.node.put_off import PutOff
 from bridge.node.read_back import ReadBack
 from bridge.text import Said, Text
@@ -37,11 +38,10 @@ Service = Callable[[Frame], Sign | None]
 """Taker of a frame by which more than process data may change. It gives the content of an error control
 message, None for any other frame."""
 _SDO_BYTES: Final = 8
-_EMCY_BYTES: Final = 8
 
 
 class NodeWire:
-    """Frames from and to one node. ``rejected`` counts those that do not fit what the node says it sends."""
+    """Frames from and to one node."""
 
     def __init__(self, node: Node, side: BusSide, identifiers: BusIdentifiers, stop_words: StopWords) -> None:
         self._node = node
@@ -50,10 +50,8 @@ class NodeWire:
         self._events = side.events
         self._identifiers = identifiers
         self.sdo = SdoChannels(node)
-        self.rejected = 0
         self.habits = HabitCounter()
-        self._mapped_bytes: dict[int, int] = {}
-        """Length of each TPDO in bytes, by COB-ID."""
+        self.unfit = UnfitFrames(node.name, side.events, self.habits, cobid.EMCY + node.table.id)
         self.faults = FaultReading(node, self.sdo)
         self.meanings = MeaningWatch(node, self.sdo)
         outputs = [one for device in node.devices for one in device.commanded]
@@ -67,7 +65,6 @@ class NodeWire:
         """PDOs of outputs, by output name; ``drives`` has those of drives."""
         self._no_rpdo: dict[str, Said] = {one.name: Text.of("unsent.no_rpdo") for one in outputs}
         self._left_out = self._no_rpdo
-        self._emcy_id: int | None = cobid.EMCY + node.table.id
         self.requests: dict[int, Handler] = {
             channel.request_id: self.error_control.on_foreign_request for channel in self.sdo
         }
@@ -86,8 +83,8 @@ class NodeWire:
             **{channel.reply_id: partial(self._on_sdo, channel) for channel in self.sdo},
             cobid.ERROR_CONTROL + self._node.table.id: self._on_error_control,
         }
-        if self._emcy_id is not None:
-            services[self._emcy_id] = self._on_emcy
+        if self.unfit.emcy_id is not None:
+            services[self.unfit.emcy_id] = self._on_emcy
         return services
 
     @property
@@ -175,7 +172,7 @@ class NodeWire:
     def _on_emcy(self, frame: Frame) -> None:
         concerned = self._emergencies.on_frame(frame)
         if concerned is None:
-            self.reject(frame, Text.of("frame.emergency_length"))
+            self.unfit.reject(frame, Text.of("frame.emergency_length"))
         else:
             self._look_for_faults(concerned)
 
@@ -187,19 +184,8 @@ class NodeWire:
         sign = self.error_control.on_frame(frame)
         if sign is Sign.MALFORMED:
             self.habits.note(Odd.HEARTBEAT_LENGTH, len(frame.data), 1)
-            self.reject(frame, Text.of("frame.error_control_length"))
+            self.unfit.reject(frame, Text.of("frame.error_control_length"))
         return sign
-
-    def reject(self, frame: Frame, why: Text) -> None:
-        """Count and report a frame that does not fit, at most once a minute; it changes nothing."""
-        self.rejected += 1
-        due = self._mapped_bytes.get(frame.can_id, len(frame.data))
-        if due != len(frame.data):
-            self.habits.note(Odd.TPDO_LENGTH, len(frame.data), due)
-        elif frame.can_id == self._emcy_id and len(frame.data) != _EMCY_BYTES:
-            self.habits.note(Odd.EMCY_LENGTH, len(frame.data), _EMCY_BYTES)
-        said = Text.of("node.frame_does_not_fit", frame=repr(frame), why=why)
-        self._events.report(Event(frame.time, EventKind.CONFIGURATION, self._node.name, 300, said))
 
     def on_time(self, now: float) -> None:
         self._look_for_faults(self._emergencies.on_time(now))
@@ -249,22 +235,22 @@ class NodeWire:
     def connect(self, result: boot.BootResult, now: float) -> None:
         """Take over what the boot-up found."""
         self.error_control.produces_every(result.heartbeat_ms / 1000 or None)
-        self._emcy_id = self._usable_emcy_id(result)
+        self.unfit.emcy_id = self._usable_emcy_id(result)
         self._image.put(f"{self._node.name}/node/software_version", result.software_version, now)
         is_taken = partial(self._identifiers.is_taken, self)
-        self.drives = connect(self._node, result, self.reject, is_taken, now)
+        self.drives = connect(self._node, result, self.unfit, is_taken, now)
         self._left_out = self._no_rpdo | {
             name: Text.of("unsent.no_pdos_because", why=plan.problem)
             for name, plan in result.drives.items()
             if plan.problem
         }
-        self._mapped_bytes = {pdo.cob_id: pdo.codec.length for pdo in _tpdos(result)}
+        self.unfit.mapped_bytes = {pdo.cob_id: pdo.codec.length for pdo in _tpdos(result)}
         self.services = self._services()
         self.routes = {}
         for pdos in self.drives.values():
             self.routes |= pdos.handlers
         sync_ms = self._node.bus.sync_period_ms
-        self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
+        self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling, self.unfit)
         for device in self._node.devices:
             self._connect_device(device, result, now)
         self.routes_changed = True
@@ -272,7 +258,7 @@ class NodeWire:
     def _connect_device(self, device: Device, result: boot.BootResult, now: float) -> None:
         plan, sync_ms = result.devices[device.name], self._node.bus.sync_period_ms
         device.identification = result.identification
-        self.routes |= connect_inputs(device, plan.tpdos, sync_ms, self.reject, now)
+        self.routes |= connect_inputs(device, plan.tpdos, sync_ms, self.unfit, now)
         for outputs in device.commanded:
             is_taken = partial(self._identifiers.is_taken, self)
             pdos = connect_outputs(outputs, plan.rpdos, result, is_taken, now)
@@ -288,7 +274,8 @@ class NodeWire:
         return default
 
     def refresh(self, now: float) -> None:
-        self._image.put(f"{self._node.name}/node/rejected_frames", self.rejected + self.sdo.unmatched, now)
+        rejected = self.unfit.count + self.sdo.unmatched
+        self._image.put(f"{self._node.name}/node/rejected_frames", rejected, now)
         self._emergencies.refresh(now)
 
 

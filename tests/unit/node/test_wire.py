@@ -68,7 +68,7 @@ def test_an_emergency_message_that_is_too_short_is_rejected_with_the_reason(tmp_
     quick = Quick(quick_site(tmp_path, 1))
     wire = quick.core(1).wire
     wire.services[0x081](Frame(0x081, b"\x10\x23", 1.0))
-    assert wire.rejected == 1
+    assert wire.unfit.count == 1
     (event,) = quick.plant.events.take()
     assert event.message.endswith(": an emergency message has 8 bytes")
 

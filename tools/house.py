@@ -22,6 +22,7 @@ _PHRASES: Final = "bridge/northbound/page/static/js/texts/said-*.json"
 _OWN_FILES: Final = ("__init__", "__main__")
 _LOOKED_FOR: Final = frozenset(("device", "outputs", "is_device"))
 _TELLS: Final = ("set", "report", "count")
+_CORES: Final = ("bridge.command", "bridge.node", "bridge.master")
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ class House:
         yield Row("sentences matched to be translated, with slots", f"{phrases[0]}, {phrases[1]}", "0")
         yield Row("attributes of the stop check of a drive", _shown(self.attributes("DriveStopCheck")), "5")
         yield Row("calls node and master → plant", f"{self.calls_of_plant()}", "0")
+        yield Row("callables given to constructors of cores", f"{len(self.callables_taken())}", "at most 19")
         yield Row("files that name Plant", f"{len(self.naming('Plant'))}", "at most 12")
         yield Row("parameters of Drive.__init__", _shown(self.parameters("Drive")), "at most 6")
         yield Row("lines of Plant.__init__", _shown(self.lines("Plant")), "at most 30")
@@ -99,6 +101,19 @@ class House:
 
         below = (name for name in self._trees if name.startswith(("bridge.node", "bridge.master")))
         return sum(is_call(node) for name in below for node in ast.walk(self._trees[name]))
+
+    def callables_taken(self) -> list[str]:
+        """Parameters by which constructors in command, node and master take something to be called, as
+        ``Class.parameter``; fields of data classes and named tuples count."""
+        trees = [tree for name, tree in self._trees.items() if name.startswith(_CORES)]
+        names = {"Callable", *(alias for tree in trees for alias in _callable_aliases(tree))}
+        classes = [node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)]
+        return sorted(
+            f"{one.name}.{parameter}"
+            for one in classes
+            for parameter, kind in _constructed_with(one)
+            if any(isinstance(node, ast.Name) and node.id in names for node in ast.walk(kind))
+        )
 
     def naming(self, word: str) -> list[str]:
         """Modules in which a name stands."""
@@ -170,10 +185,31 @@ class House:
         return next((one for one in nodes if isinstance(one, ast.ClassDef) and one.name == name), None)
 
     def _init(self, name: str) -> ast.FunctionDef | None:
-        body = found.body if (found := self._class(name)) else []
-        return next(
-            (one for one in body if isinstance(one, ast.FunctionDef) and one.name == "__init__"), None
-        )
+        found = self._class(name)
+        return None if found is None else _init_of(found)
+
+
+def _init_of(found: ast.ClassDef) -> ast.FunctionDef | None:
+    functions = (one for one in found.body if isinstance(one, ast.FunctionDef))
+    return next((one for one in functions if one.name == "__init__"), None)
+
+
+def _constructed_with(found: ast.ClassDef) -> Iterator[tuple[str, ast.expr]]:
+    """Parameters of a constructor with their annotations, written or made from fields."""
+    made = _init_of(found)
+    if made is not None:
+        parameters = (*made.args.args, *made.args.kwonlyargs)
+        yield from ((one.arg, one.annotation) for one in parameters if one.annotation is not None)
+    elif found.decorator_list or any(ast.unparse(base) == "NamedTuple" for base in found.bases):
+        fields = (one for one in found.body if isinstance(one, ast.AnnAssign))
+        yield from ((ast.unparse(one.target), one.annotation) for one in fields)
+
+
+def _callable_aliases(tree: ast.Module) -> Iterator[str]:
+    """Names that a module gives to kinds of callables."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.value).startswith("Callable["):
+            yield from (ast.unparse(target) for target in node.targets)
 
 
 def circles(needs: Mapping[str, set[str]]) -> list[set[str]]:

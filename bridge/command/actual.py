@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from bridge.command.drive_channel import DriveChannel
 from bridge.command.drive_link import FurtherTpdo
+from bridge.command.meaning_news import MeaningNews
 from bridge.command.stop_check.drive_check import DriveStopCheck
 from bridge.drive import DriveState, Lack, ParameterSet, ValueCodec, codecs
 from bridge.image import Image, Quality, Value
@@ -57,11 +58,11 @@ class ActualData:
         slot: Slot,
         stop_check: DriveStopCheck,
         image: Image,
-        on_code: Callable[[Meaning, int, float], None],
+        news: MeaningNews,
     ) -> None:
-        """Process data of one drive. ``on_code`` gets the code of a word's meaning from a TPDO."""
+        """Process data of one drive. ``news`` gets the codes of words' meanings that a TPDO tells."""
         drive, family = channel.name, channel.family
-        self._on_code = on_code
+        self._news = news
         told = [(one, family.told_by(slot, one)) for one in _meanings(channel, slot)]
         self._can_tell = [(family.process.tpdo.index(word), one) for one, word in told if word]
         self._telling: list[tuple[int, Meaning]] = []
@@ -110,7 +111,7 @@ class ActualData:
             return
         self._codes_told = told
         for (_, meaning), word in zip(tuple(self._telling), told, strict=True):
-            self._on_code(meaning, word - 0x1_0000 if word & 0x8000 else word, now)
+            self._news.on_told(meaning, word - 0x1_0000 if word & 0x8000 else word, now)
 
     def _compiled(self, in_set: int) -> _Compiled:
         found = [self._channel.meanings.codec(codec, in_set) for codec in self._codecs]

@@ -23,7 +23,6 @@ from bridge.command.worst_case import StopTime, Wire, stop_time
 from bridge.drive import MOVING, Codes, Lack, OwnJudgement, OwnVerdict, ParameterSet, ValueCodec, codecs
 from bridge.drive.own_judgement import why_silence_does_not_stop
 from bridge.image import Image, Quality, Value
-from bridge.mapping.model import Meaning
 from bridge.text import Said, Text
 
 _IDENTITY: Final = ("vendor", "product", "revision", "serial", "device_name")
@@ -88,14 +87,14 @@ class Drive(WordTiming):
         self.given_parameters = table.parameters
         self._shown_for: tuple[int, int, Wire, float | None] | None = None
         self._set = ParameterSet(family.control_word.parameter_set_bits)
-        self._actual = ActualData(self.channel, self.slot, self.stop_check, image, self._on_code)
+        self.news = MeaningNews(self, effects.events)
+        self._actual = ActualData(self.channel, self.slot, self.stop_check, image, self.news)
         # Forwarded unchanged from the node.
         self.on_process_data = self._actual.on_process_data
         self.on_unchanged_data = self._actual.on_unchanged_data
         self.on_further_data = self._actual.on_further_data
         self._image = image
         self._find_points()
-        self.news = MeaningNews(self, effects.events)
 
     def _find_points(self) -> None:
         """Look up its points in the image."""
@@ -177,11 +176,6 @@ class Drive(WordTiming):
     def told_by_tpdo(self) -> frozenset[str]:
         """Leaves of the words whose meaning its TPDOs tell, so that it need not be asked."""
         return self._actual.told_by_tpdo
-
-    def _on_code(self, meaning: Meaning, code: int, now: float) -> None:
-        """Take over the code of a word's meaning from a TPDO, and have what depends on it asked at once."""
-        self.news.is_to_be_asked = True
-        self.news.on_code(meaning, code, now)
 
     def in_force(self) -> dict[str, InForce]:
         """Scaled commands that are served under the control word in force, by their names."""

@@ -47,19 +47,12 @@ class DriveChannel(Channel):
         words = family.process.rpdo[1:]
         self._places = {word: place for place, word in enumerate(words)}
         self._status = DriveStatus(family)
-        decode = TelegramDecoder(
-            name, family, slot, self.meanings, self.unserved, lambda: self._reported_word
-        ).decode
+        decode = TelegramDecoder(name, family, slot, self.meanings, self.unserved, self._status).decode
         link = DriveLink(settings.telegram_downtime_s, hold_ms)
         of_leg = leg_settings(family, settings, decode)
         super().__init__(name, of_leg, link, effects, settled)
 
     # what others may see
-
-    @property
-    def _reported_word(self) -> int | None:
-        """Status word of the drive; None while it is not heard."""
-        return self._status.word if self.leg.way.is_heard else None
 
     @property
     def control_word(self) -> int:

@@ -79,6 +79,11 @@ class MeaningNews:
         affected = [Text.of("meaning.other", leaf=meaning.leaf)]
         self._tell((meaning.parameter, in_set), code, had, affected, now)
 
+    def on_told(self, meaning: Meaning, code: int, now: float) -> None:
+        """Take over the code of a word's meaning from a TPDO, and have what depends on it asked at once."""
+        self.is_to_be_asked = True
+        self.on_code(meaning, code, now)
+
     def on_overdue(self, overdue: frozenset[Key], now: float) -> None:
         """Take over the settings that decide the meaning of words and have not been read again in time."""
         if self._drive.channel.meanings.on_overdue(overdue):

@@ -82,7 +82,7 @@ class OutputChannel(Channel):
         self.output_words = words
         of_leg = LegSettings(
             words=ControlWords(_CONTROL_WORD),
-            decode=words.decode,
+            decode=lambda values, before, held, is_heard: words.decode(values, before, held),
             setpoints=words.count,
             control=settings.control,
             reaction=REACTIONS["disable_voltage"],

@@ -6,10 +6,10 @@ servers of its nodes. Where it sends no SYNC or TIME, somebody else may produce 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridge.base.nmt_texts import text_of_command, text_of_state
 from bridge.base.ratelimit import Pauses
@@ -22,6 +22,7 @@ from bridge.command import Drive, Event, EventKind, EventQueue
 from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.master.answers import Answers
+from bridge.master.mastership import BusMastership
 from bridge.node.node_core import NodeCore
 from bridge.node.process.command_frames import CommandFrame, commands_of
 from bridge.node.process.process_data import DrivePdos
@@ -44,8 +45,17 @@ _NMT_BYTES: Final = 2
 _SEVERE: Final = 900
 _HARMLESS: Final = 500
 
-Stop = Callable[[Sequence[NodeCore], Text, float], None]
-"""Stops nodes: the nodes, the reason, the time."""
+
+class NmtStop(NamedTuple):
+    """NMT stop of nodes at a monotonic time in seconds, because of an intruder."""
+
+    nodes: Sequence[NodeCore]
+    why: Text
+    at: float
+
+
+Taker = Callable[[Frame], Iterator[NmtStop]]
+"""Taker of a frame. It gives the stops that are due by it: carry each out before the next is taken."""
 
 
 class Intruders:
@@ -57,17 +67,16 @@ class Intruders:
         bus: BusTable,
         nodes: Sequence[NodeCore],
         events: EventQueue,
-        acts: Callable[[], bool],
-        stop: Stop,
+        mastership: BusMastership,
     ) -> None:
-        """``acts`` tells whether this bridge is in charge: while another one is, nobody is an intruder."""
+        """``mastership`` tells whether this bridge is in charge: while another one is, nobody is an
+        intruder."""
         self.count = 0
         self.last: Said = ""
         self._bus = bus
         self._nodes = nodes
         self._events = events
-        self._acts = acts
-        self._stop = stop
+        self._mastership = mastership
         self._commands: dict[int, tuple[NodeCore, CommandFrame]] = {}
         self._heartbeat_id = cobid.ERROR_CONTROL + bus.master_node_id if bus.heartbeat_ms else None
         self._sdo: dict[int, SdoListener] = {}
@@ -111,10 +120,10 @@ class Intruders:
             known = self._known[node.table.id] = connected, commands
         return known[1]
 
-    def routes(self, others: Mapping[int, Handler]) -> dict[int, Handler]:
-        """Handlers of identifiers on which we send single frames, which do not come back to us: NMT, TIME and
+    def routes(self, others: Mapping[int, Handler]) -> dict[int, Taker]:
+        """Takers of identifiers on which we send single frames, which do not come back to us: NMT, TIME and
         SDO requests."""
-        routes: dict[int, Handler] = {cobid.NMT: partial(self._on_nmt, others.get(cobid.NMT))}
+        routes: dict[int, Taker] = {cobid.NMT: partial(self._on_nmt, others.get(cobid.NMT))}
         if self._bus.time_period_s:
             routes[cobid.TIME] = self._on_time
         for node in self._nodes:
@@ -142,23 +151,25 @@ class Intruders:
 
     # what comes
 
-    def on_frame(self, frame: Frame) -> None:
-        """Take a frame of somebody else on a watched identifier."""
+    def on_frame(self, frame: Frame) -> Iterator[NmtStop]:
+        """Take a frame of somebody else on a watched identifier, as a ``Taker``."""
         if frame.can_id in self._commands:
             node, command = self._commands[frame.can_id]
             enables = command.enables(frame.data)
             said = partial(self._said_command, frame, command)
-            self._meet(frame, [node], said, enables, brings_back=enables)
-        elif frame.can_id == cobid.SYNC:
-            self._meet(frame, [node for node in self._nodes if _follows_sync(node)], lambda: self.name(frame))
-        else:
-            said = partial(_state_said, frame)
-            self._meet(frame, self._nodes, lambda: Text.of("frame.says", frame=self.name(frame), said=said()))
+            return self._meet(frame, [node], said, enables, brings_back=enables)
+        if frame.can_id == cobid.SYNC:
+            followers = [node for node in self._nodes if _follows_sync(node)]
+            return self._meet(frame, followers, lambda: self.name(frame))
+        return self._meet(frame, self._nodes, partial(self._said_heartbeat, frame))
 
     def _said_command(self, frame: Frame, command: CommandFrame) -> Text:
         return Text.of("frame.says", frame=self.name(frame), said=command.said(frame.data))
 
-    def _on_nmt(self, then: Handler | None, frame: Frame) -> None:
+    def _said_heartbeat(self, frame: Frame) -> Text:
+        return Text.of("frame.says", frame=self.name(frame), said=_state_said(frame))
+
+    def _on_nmt(self, then: Handler | None, frame: Frame) -> Iterator[NmtStop]:
         """Take an NMT command of somebody else: our own do not come back. A node in operation loses it by
         some of them, which is noticed; one that is held stopped must not come back."""
         if then:
@@ -167,10 +178,9 @@ class Intruders:
         held = [node for node in addressed if node.is_held]
         if command == NmtCommand.STOP and len(held) == len(addressed):
             # Another bridge that stops what is stopped is not answered: it would answer in its turn.
-            self._meet(frame, None, partial(_nmt_said, frame))
-            return
+            return self._meet(frame, None, partial(_nmt_said, frame))
         back = [node for node in held if command in (NmtCommand.START, NmtCommand.ENTER_PRE_OPERATIONAL)]
-        self._meet(frame, back, partial(_nmt_said, frame), bool(back), brings_back=bool(back))
+        return self._meet(frame, back, partial(_nmt_said, frame), bool(back), brings_back=bool(back))
 
     def _addressed(self, data: bytes) -> tuple[int | None, Sequence[NodeCore]]:
         """NMT command and the nodes that it is for; no nodes where it is none."""
@@ -179,16 +189,17 @@ class Intruders:
         command, node_id = data[:_NMT_BYTES]
         return command, [node for node in self._nodes if node_id in (0, node.table.id)]
 
-    def _on_time(self, frame: Frame) -> None:
-        self._meet(frame, [], lambda: _named(frame, "TIME"))
+    def _on_time(self, frame: Frame) -> Iterator[NmtStop]:
+        return self._meet(frame, [], lambda: _named(frame, "TIME"))
 
-    def _on_sdo(self, node: NodeCore, then: Handler | None, frame: Frame) -> None:
+    def _on_sdo(self, node: NodeCore, then: Handler | None, frame: Frame) -> Iterator[NmtStop]:
         """Take an SDO request of somebody else. Reading has no consequences: a tool may look."""
         if then:
             then(frame)
         said = self._sdo.setdefault(frame.can_id, SdoListener()).request(frame.data)
         writes = ("operation", "write") in said.values
-        self._meet(frame, [node] if writes else None, partial(_request_said, frame, node, said), writes)
+        told = partial(_request_said, frame, node, said)
+        return self._meet(frame, [node] if writes else None, told, writes)
 
     def _meet(
         self,
@@ -198,12 +209,12 @@ class Intruders:
         is_worse: bool = False,
         *,
         brings_back: bool = False,
-    ) -> None:
+    ) -> Iterator[NmtStop]:
         """Count a frame, answer it, and report it, though not every one: each that stops a node.
         ``affected``: None if it changes nothing. ``is_worse``: report it even if another one on this
         identifier has just been reported. ``brings_back``: drives of a node that is held stopped may run by
         it."""
-        if not self._acts():
+        if not self._mastership.acts():
             return
         self.count += 1
         # Frames of others come by a way of their own, and later than the boot-up message of a node that has
@@ -220,7 +231,7 @@ class Intruders:
         due = [node for node in stopped if self._is_due(node, frame.time, brings_back=brings_back)]
         running = [node for node in due if not node.is_held]
         if running:
-            self._stop(running, Text.of("stopped_by.intruder", frame=said()), frame.time)
+            yield NmtStop(running, Text.of("stopped_by.intruder", frame=said()), frame.time)
         for node in due:
             self._stopped[node.table.id] = frame.time + _STOP_AGAIN_S
             if node not in running:

@@ -5,7 +5,8 @@ Gives the frames that are to be sent once; repetitions are made from its nodes (
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 from typing import Final
 
@@ -23,7 +24,7 @@ from bridge.config import BusTable
 from bridge.config.download import Download
 from bridge.master.bus_points import BusPoints
 from bridge.master.farewell import Farewell
-from bridge.master.intruders import Intruders
+from bridge.master.intruders import Intruders, NmtStop, Taker
 from bridge.master.mastership import BusMastership
 from bridge.master.reach import Reach
 from bridge.master.schedule import Schedule
@@ -31,6 +32,7 @@ from bridge.master.standby import Standby
 from bridge.master.startup import StartGate
 from bridge.master.watch import BusWatch
 from bridge.node import nmt_commands as node_commands
+from bridge.node.identifiers import BusIdentifiers
 from bridge.node.neighbours import Neighbour
 from bridge.node.node_core import BUS_IS_DOWN, NodeCore
 from bridge.node.wire import Handler
@@ -58,7 +60,12 @@ class Network:
         self.bus = bus
         self._image = side.image
         self._events = side.events
-        self.nodes = [NodeCore(node, side, self, downloads.get(node.name, ())) for node in side.nodes]
+        identifiers = BusIdentifiers()
+        self.nodes = [
+            NodeCore(node, side, self, identifiers, downloads.get(node.name, ())) for node in side.nodes
+        ]
+        for node in self.nodes:
+            identifiers.add(node.wire)
         self._gate = StartGate(bus.mandatory_missing, self.nodes)
         self._schedule = Schedule(self.nodes)
         own_id = bus.master_node_id if bus.heartbeat_ms else None
@@ -67,8 +74,8 @@ class Network:
         self.farewell = Farewell(self.nodes)
         self._reach = Reach(self.nodes, self.mastership, self.farewell)
         self._reach.on_bus(side.began)
-        self._watch = BusWatch(bus.name, own_id, self.mastership.acts, known, side)
-        self._intruders = Intruders(bus, self.nodes, side.events, self.mastership.acts, self._stop_nodes)
+        self._watch = BusWatch(bus.name, own_id, self.mastership, known, side)
+        self._intruders = Intruders(bus, self.nodes, side.events, self.mastership)
         self.ours: frozenset[int] = frozenset()
         """Identifiers of what we repeat, on which nobody else may send; updated by ``take_routes``."""
         self._has_booted = False
@@ -103,7 +110,7 @@ class Network:
                 self._watch.on_own_id(now)
             if self._intruders.is_sign(frame, acts=self.mastership.acts()):
                 self._on_other_bridge(self._intruders.name(frame), now)
-            self._intruders.on_frame(frame)
+            self._stop_nodes(self._intruders.on_frame(frame))
         self._pump(now)
 
     def _on_other_bridge(self, sign: Text, now: float) -> None:
@@ -169,12 +176,17 @@ class Network:
         """Note that the bridge was away for longer than its bursts last."""
         self.mastership.came_back(now)
 
-    def _stop_nodes(self, nodes: Sequence[NodeCore], why: Text, now: float) -> None:
-        are_all = len(nodes) == len(self.nodes) > 1 and not self._takes_over(nodes)
-        for node in nodes:
-            node.carry_out_command(Action.STOP_NODE, why, now, send=not are_all)
-        if are_all:
-            self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
+    def _on_single(self, take: Taker, frame: Frame) -> None:
+        """Take a frame of somebody else on an identifier on which we send single frames."""
+        self._stop_nodes(take(frame))
+
+    def _stop_nodes(self, stops: Iterator[NmtStop]) -> None:
+        for nodes, why, at in stops:
+            are_all = len(nodes) == len(self.nodes) > 1 and not self._takes_over(nodes)
+            for node in nodes:
+                node.carry_out_command(Action.STOP_NODE, why, at, send=not are_all)
+            if are_all:
+                self._nmt_for_all = nmt.command(NmtCommand.STOP, 0)
 
     @staticmethod
     def _takes_over(nodes: Sequence[NodeCore]) -> bool:
@@ -231,7 +243,7 @@ class Network:
         for node in self.nodes:
             for who in node.node.members:
                 if who.name == request.target:
-                    node.parameters.submit(request, who, now, reply)
+                    node.ask(request, who, now, reply)
                     return True
         return False
 
@@ -273,20 +285,6 @@ class Network:
     def duplicate(self, node: Neighbour, sign: DuplicateSign, now: float) -> None:
         self._watch.on_duplicate(node.table.id, sign, now)
 
-    def is_taken(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether another node of the bus uses this identifier, for a PDO or anything else."""
-        return any(
-            cob_id in other.wire.routes
-            or any(cob_id == rpdo.cob_id for pdos in other.wire.pdos for rpdo in pdos.rpdos)
-            for other in self.nodes
-            if other is not node
-        )
-
-    def is_foreign(self, node: Neighbour, cob_id: int) -> bool:
-        """Whether this identifier is another node's, or will be by the site's files."""
-        others = (other for other in self.nodes if other is not node)
-        return self.is_taken(node, cob_id) or any(cob_id in one.wire.stop_words.given_ids for one in others)
-
     # sending
 
     @property
@@ -322,9 +320,10 @@ class Network:
         self.routings += 1
         self._routes = self._watch.routes()
         for node in self.nodes:
-            self._routes.update(node.wire.take_routes())
+            self._routes.update(node.take_routes())
         self.ours = self._intruders.watched(self._routes)
-        self._routes |= self._intruders.routes(self._routes)
+        singles = self._intruders.routes(self._routes)
+        self._routes |= {can_id: partial(self._on_single, take) for can_id, take in singles.items()}
         if self._window:
             self._judge_by_window(self._window)
         return list(self._routes)

@@ -11,6 +11,7 @@ from bridge.canopen import cobid
 from bridge.canopen.duplicate import DuplicateSign, StateChanges, TooManyHeartbeats
 from bridge.canopen.frame import Frame
 from bridge.command import BusSide, Event, EventKind
+from bridge.master.mastership import BusMastership
 from bridge.text import Text
 
 _NODES: Final = range(1, 128)
@@ -25,15 +26,16 @@ class BusWatch:
         self,
         bus: str,
         own_id: int | None,
-        acts: Callable[[], bool],
+        mastership: BusMastership,
         known: dict[int, str],
         side: BusSide,
     ) -> None:
-        """``own_id`` is the bridge's own node id where it produces a heartbeat; where the bridge does not
-        act, another one is the NMT master. ``known`` has the names of the configured nodes, by id."""
+        """``own_id`` is the bridge's own node id where it produces a heartbeat; where the bridge does not act
+        by its ``mastership``, another one is the NMT master. ``known`` has the names of the configured nodes,
+        by id."""
         self._bus = bus
         self._own_id = own_id
-        self._acts = acts
+        self._mastership = mastership
         self._known = known
         self._image = side.image
         self._events = side.events
@@ -53,7 +55,7 @@ class BusWatch:
 
     def _on_nmt(self, frame: Frame) -> None:
         """Report an NMT command that we did not send: our own do not come back."""
-        if not self._acts():
+        if not self._mastership.acts():
             return
         self._master_at = frame.time
         self._tell(

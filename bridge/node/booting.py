@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -41,9 +40,8 @@ class Booting:
     """Runner of one boot-up at a time. Answers are kept until ``pump``: the generator never runs inside the
     channel's own bookkeeping."""
 
-    def __init__(self, node: Booted, make: Callable[[], boot.Boot], sdo: SdoChannels) -> None:
+    def __init__(self, node: Booted, sdo: SdoChannels) -> None:
         self._node = node
-        self._make = make
         self._sdo = sdo
         self._dialogue: _Dialogue | None = None
         self._awaited: _Awaited | None = None
@@ -56,9 +54,9 @@ class Booting:
     def is_running(self) -> bool:
         return self._dialogue is not None
 
-    def begin(self, now: float) -> None:
+    def begin(self, procedure: boot.Boot, now: float) -> None:
         self.cancel(now)
-        self._dialogue = Dialogue(self._make(), self._waits, self._end, (SdoError, boot.BootError))
+        self._dialogue = Dialogue(procedure, self._waits, self._end, (SdoError, boot.BootError))
         self._go_on(None, now)
 
     def cancel(self, now: float) -> None:

@@ -35,7 +35,7 @@ class ErrorControl:
         self._table = table
         self._duplicates = DuplicateCheck()
         self.duplicate: DuplicateSign | None = None
-        """Sign in the latest frame that two devices have this node id."""
+        """Sign that two devices have this node id; whoever takes the frame that brings it clears it."""
         self.boot_loop = BootLoop()
         self.state = NmtState.UNKNOWN
         self._toggle_errors_before = 0
@@ -62,7 +62,6 @@ class ErrorControl:
         return self._supervisor.toggle_errors if isinstance(self._supervisor, NodeGuard) else 0
 
     def on_frame(self, frame: Frame) -> Sign:
-        self.duplicate = None
         if len(frame.data) != 1:
             return Sign.MALFORMED
         state = nmt.state_of(frame.data[0])

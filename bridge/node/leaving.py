@@ -7,9 +7,8 @@ reported (``command/stop_check/step.py``).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from bridge.canopen.nmt import NmtCommand, NmtState
+from bridge.command.drive_link import NodeState
 from bridge.command.node import Node
 from bridge.command.worst_case import takeover_ms
 from bridge.node.boot import BootMemory
@@ -18,16 +17,13 @@ from bridge.node.wire import NodeWire
 
 
 class Leaving:
-    """Exit of one node from operation. ``takes_words``: whether it may be in Operational, as far as is
-    known."""
+    """Exit of one node from operation."""
 
-    def __init__(
-        self, node: Node, wire: NodeWire, memory: BootMemory, takes_words: Callable[[], bool]
-    ) -> None:
+    def __init__(self, node: Node, wire: NodeWire, memory: BootMemory) -> None:
         self._node = node
         self._wire = wire
         self._memory = memory
-        self._takes_words = takes_words
+        self._state = NodeState.ABSENT
         self.owed = OwedStop(node)
 
     @property
@@ -45,6 +41,11 @@ class Leaving:
         """Longest time in seconds that stopped words take from the bus to the drives: 0 where they wait for
         no SYNC, or where the node no longer takes any."""
         return self._sync_s if self._takes_words() else 0.0
+
+    def _takes_words(self) -> bool:
+        """Whether the node may be in Operational, as far as is known."""
+        is_operational = self._wire.error_control.state is NmtState.OPERATIONAL
+        return self._state is not NodeState.STOPPED or is_operational
 
     @property
     def _sync_s(self) -> float:
@@ -74,6 +75,10 @@ class Leaving:
                 drive.on_cut_off(now)
 
     # what happens to the node
+
+    def on_node(self, state: NodeState) -> None:
+        """Take over the node's state."""
+        self._state = state
 
     def on_state(self, state: NmtState, now: float) -> None:
         """Take a state that the node has reported."""

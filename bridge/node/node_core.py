@@ -7,8 +7,9 @@ from functools import partial
 from typing import Final
 
 from bridge.base.habit_texts import text_of_habit
+from bridge.canopen.frame import Frame
 from bridge.canopen.nmt import NmtCommand, NmtState
-from bridge.command import Action, BusSide
+from bridge.command import Action, BusSide, ParameterHolder, Reply, Request
 from bridge.command.drive_link import NodeState
 from bridge.command.node import Node
 from bridge.config.download import Download
@@ -17,14 +18,14 @@ from bridge.node import nmt_commands as node_commands
 from bridge.node.backoff import BETWEEN_BOOTS_S, BackOff
 from bridge.node.booting import Booting
 from bridge.node.error_control import Sign
+from bridge.node.identifiers import BusIdentifiers
 from bridge.node.leaving import Leaving
 from bridge.node.neighbours import Neighbours
 from bridge.node.node_view import NodeView
 from bridge.node.parameters.service import NodeParameters
-from bridge.node.places.sdo_channels import SdoChannels
 from bridge.node.process.stop_words import StopWords
 from bridge.node.put_off import CANCELS_WORDS
-from bridge.node.wire import NodeWire, WireEvents
+from bridge.node.wire import Handler, NodeWire, Service
 from bridge.text import Said, Text, Words
 
 _SETTLE_S: Final = 2.0
@@ -39,29 +40,28 @@ class NodeCore:
     """Boots one node, keeps it in operation and reacts to its loss."""
 
     def __init__(
-        self, node: Node, side: BusSide, neighbours: Neighbours, downloads: Sequence[Download] = ()
+        self,
+        node: Node,
+        side: BusSide,
+        neighbours: Neighbours,
+        identifiers: BusIdentifiers,
+        downloads: Sequence[Download] = (),
     ) -> None:
         self.node = node
-        self._ledger = side.eeprom_writes
         self._neighbours = neighbours
+        self._downloads = downloads
         table = self.table = node.table
         self.state = NodeState.ABSENT
         self._view = NodeView(node, side)
         self._touch = partial(neighbours.touched, self)
-        listener = WireEvents(
-            self._on_sign,
-            self._touch,
-            partial(neighbours.duplicate, self),
-            partial(neighbours.is_taken, self),
-            partial(neighbours.is_foreign, self),
-        )
-        self._memory = boot.BootMemory(count_write=self._count_write)
+        cycles = node.family.eeprom.cycles if node.family.eeprom else None
+        self._memory = boot.BootMemory(ledger=side.eeprom_writes, cycles=cycles)
         configured = (*downloads, *(entry.download for entry in table.configure))
-        self.wire = NodeWire(node, side, listener, StopWords(node, configured, self._memory))
-        self.leaving = Leaving(node, self.wire, self._memory, self._takes_words)
+        self.wire = NodeWire(node, side, identifiers, StopWords(node, configured, self._memory))
+        self.leaving = Leaving(node, self.wire, self._memory)
         self.error_control = self.wire.error_control
-        self.booting = Booting(self, partial(boot.boot, node, downloads, self._memory), self.wire.sdo)
-        self.parameters = NodeParameters(node, side, lambda: self.sdo)
+        self.booting = Booting(self, self.wire.sdo)
+        self.parameters = NodeParameters(node, side, self.wire.sdo)
         self.boot_at: float | None = 0.0
         self.has_concluded = False
         """Whether a boot-up has ended, well or not, since the bus came up."""
@@ -81,6 +81,24 @@ class NodeCore:
             self.set_state(NodeState.DISABLED, side.began)
         self.say(Text.of("node.waiting"), side.began)
         self._show(side.began)
+
+    def take_routes(self) -> dict[int, Handler]:
+        """Handlers by COB-ID; marks them as taken until they change."""
+        wire = self.wire
+        services = {cob_id: partial(self._on_service, service) for cob_id, service in wire.services.items()}
+        return {**wire.requests, **services, **wire.take_routes()}
+
+    def _on_service(self, service: Service, frame: Frame) -> None:
+        """Take a frame that is no process data: frames to be sent and deadlines may change by it."""
+        sign = service(frame)
+        duplicate = self.error_control.duplicate
+        if duplicate is not None:
+            self.error_control.duplicate = None
+            self._neighbours.duplicate(self, duplicate, frame.time)
+        if sign is None:
+            self._touch()
+        elif sign is not Sign.MALFORMED:
+            self._on_sign(sign, frame.time)
 
     def _on_sign(self, sign: Sign, now: float) -> None:
         """Take an error control message."""
@@ -160,12 +178,6 @@ class NodeCore:
         """Earliest time to boot a node that is there, counted from the boot-up before."""
         return max(now, self._last_boot + self._back_off.between_boots_s)
 
-    @property
-    def sdo(self) -> SdoChannels:
-        """SDO channels, for a new transfer: the node's deadlines are looked at in the next round."""
-        self._touch()
-        return self.wire.sdo
-
     def boot_next(self, at: float | None) -> None:
         """Schedule the next boot-up, at once if ``at`` is past; None: only on request."""
         self.boot_at = at
@@ -204,12 +216,12 @@ class NodeCore:
         self.booting.on_time(now, self.error_control.state)
         if self.boot_at is not None and now >= self.boot_at and not self._is_busy:
             self.boot_at = None
-            self._last_boot = now
+            self._last_boot = self._memory.began_at = now
             self.leaving.forget()
             # A stopped node answers no SDO: it has to be woken before it is asked.
             if self.told is NmtCommand.STOP or self.error_control.state is NmtState.STOPPED:
                 self.wire.send_nmt(NmtCommand.ENTER_PRE_OPERATIONAL)
-            self.booting.begin(now)
+            self.booting.begin(boot.boot(self.node, self._downloads, self._memory), now)
         self.wire.polling.on_time(now)
         self.parameters.on_time(now)
 
@@ -417,15 +429,13 @@ class NodeCore:
         if state is self.state:
             return
         self.state = state
+        self.leaving.on_node(state)
         self._view.is_in(state, now)
         self.node.on_state(state, now)
         if not self._back_off.is_flapping:
             self._view.went(state, now)
         self.parameters.on_node(state, now)
         self._show(now)
-
-    def _takes_words(self) -> bool:
-        return self.state is not NodeState.STOPPED or self.error_control.state is NmtState.OPERATIONAL
 
     @property
     def is_operational(self) -> bool:
@@ -443,12 +453,11 @@ class NodeCore:
     def _show(self, now: float) -> None:
         self._view.show(self.error_control.state, self.state, self.error_control.toggle_errors, now)
 
-    def _count_write(self, owner: str, address: str, name: str) -> Said:
-        """Count a boot-up's write to an EEPROM, as of its beginning; returns a warning or an empty text."""
-        ledger, eeprom = self._ledger, self.node.family.eeprom
-        cycles = eeprom.cycles if eeprom else None
-        ledger.check((owner, address), name, self._last_boot, cycles)
-        return ledger.count((owner, address), name, cycles, self._last_boot)
+    def ask(self, request: Request, holder: ParameterHolder, now: float, reply: Reply) -> None:
+        """Carry out a request for a parameter of a drive or of the device; ``reply`` is called once, when it
+        has answered."""
+        self.parameters.submit(request, holder, now, reply)
+        self._touch()
 
     def carry_out_command(
         self, action: Action, who: Words, now: float, *, send: bool = True, at_once: bool = False

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
 from bridge.base.sdo_texts import text_of_learned
 from bridge.canopen import cobid, nmt
-from bridge.canopen.duplicate import DuplicateSign
 from bridge.canopen.frame import Frame
 from bridge.canopen.habits import HabitCounter, Odd
 from bridge.canopen.nmt import NmtCommand
@@ -21,6 +19,7 @@ from bridge.node import boot
 from bridge.node.emergencies import Concerned, Emergencies
 from bridge.node.error_control import ErrorControl, Sign
 from bridge.node.fault_reading import FaultReading
+from bridge.node.identifiers import BusIdentifiers
 from bridge.node.meaning_watch import MeaningWatch
 from bridge.node.places.sdo_channels import SdoChannels
 from bridge.node.process.inputs import connect_inputs
@@ -29,44 +28,30 @@ from bridge.node.process.polling import Polling
 from bridge.node.process.process_data import DrivePdos, connect
 from bridge.node.process.stop_words import StopWords
 from bridge.node.process.tpdo import node_tpdos
+from bridge.node.process.unfit_frames import UnfitFrames
 from bridge.node.put_off import PutOff
 from bridge.node.read_back import ReadBack
 from bridge.text import Said, Text
 
 Handler = Callable[[Frame], None]
+Service = Callable[[Frame], Sign | None]
+"""Taker of a frame by which more than process data may change. It gives the content of an error control
+message, None for any other frame."""
 _SDO_BYTES: Final = 8
-_EMCY_BYTES: Final = 8
-
-
-@dataclass(frozen=True, slots=True)
-class WireEvents:
-    """Receivers of what one node sends, and what its network knows of the other nodes."""
-
-    on_sign: Callable[[Sign, float], None]
-    """Takes an error control message and the time at which it came."""
-    touch: Callable[[], None]
-    """Notes a frame that may change frames to be sent or deadlines."""
-    on_duplicate: Callable[[DuplicateSign, float], None]
-    """Takes a sign that two devices have this node id, and its time."""
-    is_taken: Callable[[int], bool]
-    is_foreign: Callable[[int], bool]
-    """Whether an identifier is another node's, as in ``Neighbours``."""
 
 
 class NodeWire:
-    """Frames from and to one node. ``rejected`` counts those that do not fit what the node says it sends."""
+    """Frames from and to one node."""
 
-    def __init__(self, node: Node, side: BusSide, listener: WireEvents, stop_words: StopWords) -> None:
+    def __init__(self, node: Node, side: BusSide, identifiers: BusIdentifiers, stop_words: StopWords) -> None:
         self._node = node
         self.stop_words = stop_words
         self._image = side.image
         self._events = side.events
-        self._listener = listener
+        self._identifiers = identifiers
         self.sdo = SdoChannels(node)
-        self.rejected = 0
         self.habits = HabitCounter()
-        self._mapped_bytes: dict[int, int] = {}
-        """Length of each TPDO in bytes, by COB-ID."""
+        self.unfit = UnfitFrames(node.name, side.events, self.habits, cobid.EMCY + node.table.id)
         self.faults = FaultReading(node, self.sdo)
         self.meanings = MeaningWatch(node, self.sdo)
         outputs = [one for device in node.devices for one in device.commanded]
@@ -80,23 +65,37 @@ class NodeWire:
         """PDOs of outputs, by output name; ``drives`` has those of drives."""
         self._no_rpdo: dict[str, Said] = {one.name: Text.of("unsent.no_rpdo") for one in outputs}
         self._left_out = self._no_rpdo
-        self._emcy_id: int | None = cobid.EMCY + node.table.id
-        self.routes: dict[int, Handler] = self._basic_routes()
+        self.requests: dict[int, Handler] = {
+            channel.request_id: self.error_control.on_foreign_request for channel in self.sdo
+        }
+        """Handlers of other clients' SDO requests, by COB-ID: what we send does not come back."""
+        self.services = self._services()
+        """Takers of SDO answers, error control and emergency messages, by COB-ID."""
+        self.routes: dict[int, Handler] = {}
+        """Handlers of process data, by COB-ID."""
         self.routes_changed = True
         self._frames: list[Frame] = []
         self.put_off = PutOff()
         """NMT command that waits until stopped words are taken over; these go on until then."""
 
-    def _basic_routes(self) -> dict[int, Handler]:
-        routes: dict[int, Handler] = {
+    def _services(self) -> dict[int, Service]:
+        services: dict[int, Service] = {
             **{channel.reply_id: partial(self._on_sdo, channel) for channel in self.sdo},
-            # What we send does not come back.
-            **{channel.request_id: self.error_control.on_foreign_request for channel in self.sdo},
             cobid.ERROR_CONTROL + self._node.table.id: self._on_error_control,
         }
-        if self._emcy_id is not None:
-            routes[self._emcy_id] = self._on_emcy
-        return routes
+        if self.unfit.emcy_id is not None:
+            services[self.unfit.emcy_id] = self._on_emcy
+        return services
+
+    @property
+    def given_ids(self) -> frozenset[int]:
+        """COB-IDs that the site's files give to PDOs of the node."""
+        return self.stop_words.given_ids
+
+    def uses(self, cob_id: int) -> bool:
+        """Whether the node uses this COB-ID at present, for a PDO or anything else."""
+        is_received = cob_id in self.routes or cob_id in self.services or cob_id in self.requests
+        return is_received or any(cob_id == rpdo.cob_id for pdos in self.pdos for rpdo in pdos.rpdos)
 
     def carries(self, one: Commanded) -> bool:
         """Whether the boot-up has found RPDOs that command ``one``."""
@@ -112,7 +111,7 @@ class NodeWire:
         return self._left_out.get(one.name) or Text.of("unsent.no_pdos")
 
     def take_routes(self) -> dict[int, Handler]:
-        """Handlers by COB-ID; marks them as taken until they change."""
+        """Handlers of process data by COB-ID; marks all COB-IDs as taken until they change."""
         self.routes_changed = False
         return self.routes
 
@@ -149,10 +148,11 @@ class NodeWire:
                 raise AssertionError(f"{action} waits for an answer")
 
     def send_stopped(self) -> None:
-        self._frames += self.stop_words.frames(self.drives, self._listener.is_foreign)
+        is_foreign = partial(self._identifiers.is_foreign, self)
+        self._frames += self.stop_words.frames(self.drives, is_foreign)
         for pdos in self.output_pdos.values():
             frames = pdos.frames_with_stop()
-            self._frames += [frame for frame in frames if not self._listener.is_foreign(frame.can_id)]
+            self._frames += [frame for frame in frames if not is_foreign(frame.can_id)]
 
     def _on_sdo(self, channel: SdoChannel, frame: Frame) -> None:
         unmatched, late = channel.unmatched, channel.late
@@ -164,48 +164,28 @@ class NodeWire:
             self.habits.note(Odd.SDO_LENGTH, len(frame.data), _SDO_BYTES)
         if channel.late == late:
             self.error_control.on_reply(frame, matched=channel.unmatched == unmatched)
-            self._tell_duplicate(frame.time)
         else:
             late_ms, timeout_ms = round(1000 * channel.lateness_s), round(1000 * channel.timeout_s)
             self.habits.note(Odd.SDO_LATE, late_ms, timeout_ms)
         self._tell_learned(frame.time)
-        self._listener.touch()
 
     def _on_emcy(self, frame: Frame) -> None:
         concerned = self._emergencies.on_frame(frame)
         if concerned is None:
-            self.reject(frame, Text.of("frame.emergency_length"))
+            self.unfit.reject(frame, Text.of("frame.emergency_length"))
         else:
             self._look_for_faults(concerned)
-        self._listener.touch()
 
     def _look_for_faults(self, concerned: Sequence[Concerned]) -> None:
         for one in concerned:
             self.faults.on_emcy(one.drive, one.at)
 
-    def _on_error_control(self, frame: Frame) -> None:
+    def _on_error_control(self, frame: Frame) -> Sign:
         sign = self.error_control.on_frame(frame)
-        self._tell_duplicate(frame.time)
         if sign is Sign.MALFORMED:
             self.habits.note(Odd.HEARTBEAT_LENGTH, len(frame.data), 1)
-            self.reject(frame, Text.of("frame.error_control_length"))
-        else:
-            self._listener.on_sign(sign, frame.time)
-
-    def _tell_duplicate(self, at: float) -> None:
-        if self.error_control.duplicate is not None:
-            self._listener.on_duplicate(self.error_control.duplicate, at)
-
-    def reject(self, frame: Frame, why: Text) -> None:
-        """Count and report a frame that does not fit, at most once a minute; it changes nothing."""
-        self.rejected += 1
-        due = self._mapped_bytes.get(frame.can_id, len(frame.data))
-        if due != len(frame.data):
-            self.habits.note(Odd.TPDO_LENGTH, len(frame.data), due)
-        elif frame.can_id == self._emcy_id and len(frame.data) != _EMCY_BYTES:
-            self.habits.note(Odd.EMCY_LENGTH, len(frame.data), _EMCY_BYTES)
-        said = Text.of("node.frame_does_not_fit", frame=repr(frame), why=why)
-        self._events.report(Event(frame.time, EventKind.CONFIGURATION, self._node.name, 300, said))
+            self.unfit.reject(frame, Text.of("frame.error_control_length"))
+        return sign
 
     def on_time(self, now: float) -> None:
         self._look_for_faults(self._emergencies.on_time(now))
@@ -255,20 +235,22 @@ class NodeWire:
     def connect(self, result: boot.BootResult, now: float) -> None:
         """Take over what the boot-up found."""
         self.error_control.produces_every(result.heartbeat_ms / 1000 or None)
-        self._emcy_id = self._usable_emcy_id(result)
+        self.unfit.emcy_id = self._usable_emcy_id(result)
         self._image.put(f"{self._node.name}/node/software_version", result.software_version, now)
-        self.drives = connect(self._node, result, self.reject, self._listener.is_taken, now)
+        is_taken = partial(self._identifiers.is_taken, self)
+        self.drives = connect(self._node, result, self.unfit, is_taken, now)
         self._left_out = self._no_rpdo | {
             name: Text.of("unsent.no_pdos_because", why=plan.problem)
             for name, plan in result.drives.items()
             if plan.problem
         }
-        self._mapped_bytes = {pdo.cob_id: pdo.codec.length for pdo in _tpdos(result)}
-        self.routes = self._basic_routes()
+        self.unfit.mapped_bytes = {pdo.cob_id: pdo.codec.length for pdo in _tpdos(result)}
+        self.services = self._services()
+        self.routes = {}
         for pdos in self.drives.values():
             self.routes |= pdos.handlers
         sync_ms = self._node.bus.sync_period_ms
-        self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling.on_pdo, self.reject)
+        self.routes |= node_tpdos(result.node_tpdos, sync_ms, self.polling, self.unfit)
         for device in self._node.devices:
             self._connect_device(device, result, now)
         self.routes_changed = True
@@ -276,22 +258,24 @@ class NodeWire:
     def _connect_device(self, device: Device, result: boot.BootResult, now: float) -> None:
         plan, sync_ms = result.devices[device.name], self._node.bus.sync_period_ms
         device.identification = result.identification
-        self.routes |= connect_inputs(device, plan.tpdos, sync_ms, self.reject, now)
+        self.routes |= connect_inputs(device, plan.tpdos, sync_ms, self.unfit, now)
         for outputs in device.commanded:
-            pdos = connect_outputs(outputs, plan.rpdos, result, self._listener.is_taken, now)
+            is_taken = partial(self._identifiers.is_taken, self)
+            pdos = connect_outputs(outputs, plan.rpdos, result, is_taken, now)
             self.output_pdos = {outputs.name: pdos} if pdos else {}
 
     def _usable_emcy_id(self, result: boot.BootResult) -> int | None:
         """COB-ID of the emergency messages; the default one where the node's own belongs to another node."""
         default = cobid.EMCY + self._node.table.id
         wanted = result.emcy_id
-        if wanted in (None, default) or not self._listener.is_taken(wanted):
+        if wanted in (None, default) or not self._identifiers.is_taken(self, wanted):
             return wanted
         result.notes.append(Text.of("boot.emergency_id_taken", id=f"{wanted:03X}h"))
         return default
 
     def refresh(self, now: float) -> None:
-        self._image.put(f"{self._node.name}/node/rejected_frames", self.rejected + self.sdo.unmatched, now)
+        rejected = self.unfit.count + self.sdo.unmatched
+        self._image.put(f"{self._node.name}/node/rejected_frames", rejected, now)
         self._emergencies.refresh(now)
 
 

@@ -10,11 +10,13 @@ import canopen
 from canopen.objectdictionary import UNSIGNED16
 
 from bridge.canopen.frame import Frame
+from bridge.canopen.habits import HabitCounter
 from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.command.drive_link import NodeState
 from bridge.node.boot import PdoPlan
 from bridge.node.places.word_map import WordPlace
 from bridge.node.process.process_data import DrivePdos
+from bridge.node.process.unfit_frames import UnfitFrames
 from tests.bench.figures import cpu_us, milliseconds, show
 from tests.peers.foreign_slave import variable
 from tests.support.bench import Bench, write_site
@@ -35,7 +37,8 @@ def test_a_pdo_from_frame_to_image(tmp_path: Path) -> None:
     node_goes(bench.plant, bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
     entries = tuple(PdoEntry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
     plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), tuple(WordPlace(n) for n in range(4)))
-    (tpdo,) = DrivePdos(drive, [plan], [plan], lambda frame, why: None).tpdos
+    unfit = UnfitFrames("conveyor", bench.plant.events, HabitCounter(), None)
+    (tpdo,) = DrivePdos(drive, [plan], [plan], unfit).tpdos
     changing, same = frames(COUNT), [Frame(0x185, bytes(8), 1.0)] * COUNT
 
     def ours(list_of: list[Frame]) -> None:

@@ -14,6 +14,7 @@ from bridge.command.leg.state import WANTS_STOP_WORD, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.messages.life_sign import LifeSign
 from bridge.command.messages.telegram import TelegramDecoder
+from bridge.command.status import DriveStatus
 from bridge.config import DriveTable
 from bridge.drive import DriveState, Meanings
 from bridge.image import Value
@@ -35,7 +36,7 @@ def settings_of(mapping: str, **given: object) -> LegSettings:
     table = DriveTable.model_validate(keys)
     meanings = Meanings(family, family.slot[0], {})
     meanings.take_defaults()
-    decode = TelegramDecoder("n/d", family, family.slot[0], meanings, {}).decode
+    decode = TelegramDecoder("n/d", family, family.slot[0], meanings, {}, DriveStatus(family)).decode
     return leg_settings(family, table, decode, TOKENS)
 
 

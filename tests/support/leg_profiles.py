@@ -13,6 +13,7 @@ from bridge.command.leg.state import Stage, Way
 from bridge.command.leg.step import initial, step
 from bridge.command.leg.table import Stimulus
 from bridge.command.messages.telegram import TelegramDecoder
+from bridge.command.status import DriveStatus
 from bridge.config import DriveTable, Reaction
 from bridge.drive import DriveState, Meanings
 from bridge.mapping import load_family
@@ -211,7 +212,7 @@ def space(
     table = DriveTable.model_validate(settings)
     meanings = Meanings(family, family.slot[0], {})
     meanings.take_defaults()
-    decode = TelegramDecoder(f"n/{name}", family, family.slot[0], meanings, {}).decode
+    decode = TelegramDecoder(f"n/{name}", family, family.slot[0], meanings, {}, DriveStatus(family)).decode
     drive = leg_settings(family, table, decode, LIFE)
     leg = initial(drive)
     for event in (NodeBack(), Way(True, "", "", True), StatusReport(DriveState.READY, False, "")):

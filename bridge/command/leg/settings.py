@@ -12,9 +12,9 @@ from bridge.drive import ControlWords, ValueCodec
 from bridge.image import Value
 from bridge.mapping.model import Family, Slot
 
-Decode = Callable[[Mapping[str, Value], tuple[int, ...], int], Telegram]
-"""Values that are written, over these setpoints, with this control word where none is written. Raises
-``Refusal``."""
+Decode = Callable[[Mapping[str, Value], tuple[int, ...], int, bool], Telegram]
+"""Values that are written, over these setpoints, with this control word where none is written, and whether
+the drive is heard. Raises ``Refusal``."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -198,7 +198,7 @@ def _write(draft: Draft, request: Request, values: Mapping[str, Value]) -> None:
     alive_until = alive.read(draft, request.identity, values.get(LIFE_SIGN))
     if LIFE_SIGN in values:
         values = {name: value for name, value in values.items() if name != LIFE_SIGN}
-    telegram = draft.settings.decode(values, kept, control_word(words, draft))
+    telegram = draft.settings.decode(values, kept, control_word(words, draft), draft.way.is_heard)
     word = telegram.control_word
     if word is not None and not words.is_valid(word):
         why = Refusal(Code.NOT_VALID, Text.of("request.data_not_valid", word=word))

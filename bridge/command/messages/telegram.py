@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from bridge.command.messages.request import Code
+from bridge.command.status import DriveStatus
 from bridge.drive import ControlWords, MaskedBits, Meanings, ParameterSet, ValueCodec, codecs
 from bridge.image import Value
 from bridge.image.limits import ValueNotTaken
@@ -68,8 +69,8 @@ class _Setpoints:
 
 class TelegramDecoder:
     """Decoder of one drive's command group. ``meanings`` and ``unserved``, which has the reason for each word
-    or value that the node cannot take, are read at each write: they fill at boot-up. ``reported`` gives the
-    drive's status word, None while the drive is not heard."""
+    or value that the node cannot take, are read at each write: they fill at boot-up. So is the drive's
+    ``status``."""
 
     def __init__(
         self,
@@ -78,12 +79,12 @@ class TelegramDecoder:
         slot: Slot,
         meanings: Meanings,
         unserved: Mapping[str, Text],
-        reported: Callable[[], int | None] = lambda: None,
+        status: DriveStatus,
     ) -> None:
         self._name = name
         self._meanings = meanings
         self._unserved = unserved
-        self._reported = reported
+        self._status = status
         self._words = ControlWords(family.control_word)
         self._names = words = family.process.rpdo[1:]
         carried = family.carried(slot)[0]
@@ -101,9 +102,12 @@ class TelegramDecoder:
         """The places of words whose meaning or scale depends on the parameter set."""
         self._reported_set = ParameterSet(family.status_word.parameter_set_bits)
 
-    def decode(self, values: Mapping[str, Value], before: tuple[int, ...], held: int) -> Telegram:
+    def decode(
+        self, values: Mapping[str, Value], before: tuple[int, ...], held: int, is_heard: bool
+    ) -> Telegram:
         """The words to be sent; setpoints that are not written stay as ``before``. ``held`` is the control
-        word that counts where none is written. Raises ``Refusal``."""
+        word that counts where none is written. ``is_heard``: the drive's status is of now. Raises
+        ``Refusal``."""
         control_word = _as_word("control_word", values["control_word"]) if "control_word" in values else None
         word = held if control_word is None else control_word
         in_set, was = self._set.of(word), self._set.of(held)
@@ -115,7 +119,7 @@ class TelegramDecoder:
                 continue
             try:
                 written = self._written(leaf, value, in_set)
-                if in_set == was:
+                if in_set == was and is_heard:
                     written = self._as_reported(leaf, value, word, written)
                 setpoints.put(leaf, written)
             except Refusal:
@@ -160,8 +164,7 @@ class TelegramDecoder:
         """Bits of a scaled value as the parameter set has it that the control word asks for. A drive in
         another set would take the same words for something else: a word that enables is refused, and with any
         other, which may be a stop, it gets zero. Raises ``Refusal``."""
-        in_set, status = self._set.of(word), self._reported()
-        reported = in_set if status is None else self._reported_set.of(status)
+        in_set, reported = self._set.of(word), self._reported_set.of(self._status.word)
         if reported == in_set:
             return written
         try:

@@ -3,7 +3,7 @@ reaches it wherever it listens."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -11,6 +11,7 @@ from bridge.canopen.sync import LAST_SYNCHRONOUS
 from bridge.config.download import COMMANDS
 from bridge.mapping.aliases import COMMUNICATION
 from bridge.node.boot.pdo_plan import PdoPlan
+from bridge.parameter import Ledger
 from bridge.text import Said
 
 _RPDOS: Final = 2
@@ -18,16 +19,6 @@ _RPDOS: Final = 2
 
 _RESETS: Final = 3
 """Errors in a row for which a node that does not start is reset: one with ever new errors is left alone."""
-
-
-CountWrite = Callable[[str, str, str], Said]
-"""Counts one more write to an EEPROM: owner, object, name. Returns a warning or an empty text, and raises
-``ParameterError`` where it is one too many (``parameter.ledger``)."""
-
-
-def _not_counted(owner: str, address: str, name: str) -> Said:
-    del owner, address, name
-    return ""
 
 
 @dataclass(slots=True)
@@ -46,11 +37,23 @@ class BootMemory:
     unsaved: bool = False
     """True if something was written that has not been stored (1010h) yet."""
     unanswered_stores: int = 0
-    count_write: CountWrite = _not_counted
+    ledger: Ledger = field(default_factory=Ledger)
+    """Count of the writes to its EEPROM."""
+    cycles: int | None = None
+    """Number of writes that its EEPROM endures; None where it has none, or nobody says it."""
+    began_at: float = float("-inf")
+    """Monotonic time in seconds at which the last boot-up began."""
     _not_kept: dict[tuple[int, int], bytes] = field(default_factory=dict[tuple[int, int], bytes])
     _commands: set[tuple[int, int, bytes]] = field(default_factory=set[tuple[int, int, bytes]])
     _resets: set[tuple[int, int]] = field(default_factory=set[tuple[int, int]])
     _rpdos: dict[tuple[str, int], list[PdoPlan]] = field(default_factory=dict[tuple[str, int], list[PdoPlan]])
+
+    def count_write(self, owner: str, address: str, name: str) -> Said:
+        """Count one more write to an EEPROM, as of the boot-up's beginning: of the object ``address`` of
+        ``owner``, called ``name``. Returns a warning or an empty text. Raises ``ParameterError`` where it is
+        one too many (``parameter.ledger``)."""
+        self.ledger.check((owner, address), name, self.began_at, self.cycles)
+        return self.ledger.count((owner, address), name, self.cycles, self.began_at)
 
     def start_anew(self) -> None:
         self.unanswered_stores = 0

@@ -7,9 +7,9 @@ one at a time; if more are due than the budget allows, all are read less often.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from enum import Enum
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridge.command import ParameterHolder
 from bridge.command.node import Node
@@ -34,16 +34,23 @@ class Came(Enum):
     """The drive does not have the parameter."""
 
 
-Ask = Callable[[ParameterHolder, ParameterEntry, Callable[[Came], None]], None]
+class PointRead(NamedTuple):
+    """Read of a point that is due: whose it is, and the monotonic time in seconds at which it is begun.
+    ``turn`` tells reads of an earlier operation of the node apart."""
+
+    holder: ParameterHolder
+    entry: ParameterEntry
+    at: float
+    place: int
+    turn: int
 
 
 class ParameterPolling:
-    """Polls of one node's parameter points. ``ask`` reads one and reports its result; ``nodes`` share the
-    budget."""
+    """Polls of one node's parameter points: it says which is to be read, and is told what came of it.
+    ``nodes`` share the budget."""
 
-    def __init__(self, node: Node, nodes: int, ask: Ask) -> None:
+    def __init__(self, node: Node, nodes: int) -> None:
         self._node = node
-        self._ask = ask
         share = BUS_SHARE * node.bus.bitrate / _BITS / max(nodes, 1)
         self.pause_s = 1.0 / min(MOST_PER_S, share)
         """Time between two reads, in seconds."""
@@ -72,24 +79,25 @@ class ParameterPolling:
             return None
         return max(self._due[0][0], self._next_at)
 
-    def on_time(self, now: float) -> None:
+    def take_due(self, now: float) -> PointRead | None:
+        """Read that is to be begun now; None where there is none. ``on_result`` is told what came of it."""
         deadline = self.next_deadline()
         if deadline is None or now < deadline:
-            return
+            return None
         _, place = heapq.heappop(self._due)
         self._next_at = now + self.pause_s
         self._asked = True
         drive, entry = self._places[place]
-        this_round = self._round
+        return PointRead(drive, entry, now, place, self._round)
 
-        def done(came: Came) -> None:
-            if this_round != self._round:
-                return  # the node was lost meanwhile
-            self._asked = False
-            every_s = entry.definition.every_ms / 1000 if entry.definition else 0.0
-            if came is Came.FAILED:
-                heapq.heappush(self._due, (now + max(every_s, _PATIENCE_S), place))
-            elif came is Came.READ and every_s:
-                heapq.heappush(self._due, (now + every_s, place))
-
-        self._ask(drive, entry, done)
+    def on_result(self, read: PointRead, came: Came) -> None:
+        """Take over what came of a read that was due; nothing where the node was lost meanwhile."""
+        if read.turn != self._round:
+            return
+        self._asked = False
+        definition = read.entry.definition
+        every_s = definition.every_ms / 1000 if definition else 0.0
+        if came is Came.FAILED:
+            heapq.heappush(self._due, (read.at + max(every_s, _PATIENCE_S), read.place))
+        elif came is Came.READ and every_s:
+            heapq.heappush(self._due, (read.at + every_s, read.place))

@@ -32,7 +32,7 @@ from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import refused
 from bridge.command.node import Node
 from bridge.node.parameters.own_watch import OwnWatch
-from bridge.node.parameters.parameter_polling import Came, ParameterPolling
+from bridge.node.parameters.parameter_polling import Came, ParameterPolling, PointRead
 from bridge.node.parameters.parameter_view import NO_CHANNEL, ParameterView
 from bridge.node.parameters.run import Procedure, run
 from bridge.node.places.sdo_channels import FIRST, SdoChannels
@@ -69,9 +69,9 @@ Waiting = list[Callable[[ParameterReading | ParameterError], None]]
 
 
 class NodeParameters:
-    """Parameter access for one node. ``sdo`` gives the channels, and has the node's deadlines looked at."""
+    """Parameter access for one node."""
 
-    def __init__(self, node: Node, side: BusSide, sdo: Callable[[], SdoChannels]) -> None:
+    def __init__(self, node: Node, side: BusSide, sdo: SdoChannels) -> None:
         self._node = node
         self._events = side.events
         self._sdo = sdo
@@ -91,7 +91,7 @@ class NodeParameters:
         self._channels = {one.name: one.spec.sdo_channel for one in node.members}
         self._own_watch = OwnWatch(node)
         self._view = ParameterView(node, side.image)
-        self._polling = ParameterPolling(node, len(side.nodes), self._poll)
+        self._polling = ParameterPolling(node, len(side.nodes))
         self._deciding = {
             name
             for value in node.family.value
@@ -119,7 +119,9 @@ class NodeParameters:
 
     def on_time(self, now: float) -> None:
         self._now = max(now, self._now)
-        self._polling.on_time(now)
+        due = self._polling.take_due(now)
+        if due is not None:
+            self._poll(due)
         self._view.on_time(now)
 
     def next_deadline(self) -> float | None:
@@ -233,7 +235,7 @@ class NodeParameters:
     ) -> None:
         def channel_for(transfer: Transfer) -> SdoChannel:
             number = None if transfer.of_node else self._channels[drive.name]
-            return self._sdo()[number or FIRST]
+            return self._sdo[number or FIRST]
 
         run(procedure, channel_for, lambda: self._now, done, priority=priority)
 
@@ -322,16 +324,16 @@ class NodeParameters:
 
     # points
 
-    def _poll(self, drive: ParameterHolder, entry: ParameterEntry, done: Callable[[Came], None]) -> None:
-        """Read a point, and report its result to ``done``."""
+    def _poll(self, due: PointRead) -> None:
+        """Read a point."""
 
         def on_result(result: ParameterReading | ParameterError) -> None:
+            came = Came.READ
             if isinstance(result, ParameterError):
-                done(Came.NEVER if self._view.is_final(result) else Came.FAILED)
-            else:
-                done(Came.READ)
+                came = Came.NEVER if self._view.is_final(result) else Came.FAILED
+            self._polling.on_result(due, came)
 
-        self._read(drive, entry, 0.0, on_result, Priority.POLL)
+        self._read(due.holder, due.entry, 0.0, on_result, Priority.POLL)
 
     def _show(
         self, drive: ParameterHolder, entry: ParameterEntry, result: ParameterReading | ParameterError

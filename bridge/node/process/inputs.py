@@ -10,18 +10,17 @@ from bridge.canopen.sync import tpdo_deadline_s
 from bridge.command.device import Device, InputPdo
 from bridge.mapping.entry_types import ObjectRef
 from bridge.node.boot import PdoPlan, SignalPlan
+from bridge.node.process.unfit_frames import UnfitFrames
 from bridge.text import Text
-
-Reject = Callable[[Frame, Text], None]
 
 
 def connect_inputs(
-    device: Device, plan: SignalPlan, sync_period_ms: int, reject: Reject, now: float
+    device: Device, plan: SignalPlan, sync_period_ms: int, unfit: UnfitFrames, now: float
 ) -> dict[int, Callable[[Frame], None]]:
     """Tell ``device`` what the boot-up has found; returns the handlers of its TPDOs, by COB-ID."""
     device.on_pdos([_input_pdo(tpdo, sync_period_ms) for tpdo in plan.pdos], plan.unserved, now)
     return {
-        tpdo.cob_id: partial(_on_frame, device, place, tpdo, reject) for place, tpdo in enumerate(plan.pdos)
+        tpdo.cob_id: partial(_on_frame, device, place, tpdo, unfit) for place, tpdo in enumerate(plan.pdos)
     }
 
 
@@ -33,10 +32,10 @@ def _input_pdo(tpdo: PdoPlan, sync_period_ms: int) -> InputPdo:
     return InputPdo(tpdo.name, objects, deadline_s)
 
 
-def _on_frame(device: Device, place: int, tpdo: PdoPlan, reject: Reject, frame: Frame) -> None:
+def _on_frame(device: Device, place: int, tpdo: PdoPlan, unfit: UnfitFrames, frame: Frame) -> None:
     length = tpdo.codec.length
     if len(frame.data) != length:
-        reject(frame, Text.of("frame.bytes_mapped", length=length))
+        unfit.reject(frame, Text.of("frame.bytes_mapped", length=length))
         if len(frame.data) < length:
             return
     device.on_data(place, tpdo.codec.unpack(frame.data[:length]), frame.time)

@@ -19,9 +19,8 @@ from bridge.image import Quality
 from bridge.node.boot import BootResult, PdoPlan
 from bridge.node.places.word_map import WordMap
 from bridge.node.process.held import held_s
+from bridge.node.process.unfit_frames import UnfitFrames
 from bridge.text import Text
-
-Reject = Callable[[Frame, Text], None]
 
 
 class Repetition(NamedTuple):
@@ -60,9 +59,9 @@ class DriveTpdo:
     """One TPDO of a drive, unpacked into the drive's words. ``further`` is None for the one with the status
     word, by which the drive's freshness is judged."""
 
-    def __init__(self, drive: Drive, plan: PdoPlan, further: FurtherTpdo | None, reject: Reject) -> None:
+    def __init__(self, drive: Drive, plan: PdoPlan, further: FurtherTpdo | None, unfit: UnfitFrames) -> None:
         self._drive = drive
-        self._reject = reject
+        self._unfit = unfit
         self.plan = plan
         self.further = further
         self.cob_id = plan.cob_id
@@ -115,7 +114,7 @@ class DriveTpdo:
         data = frame.data
         length = self._length
         if len(data) != length:
-            self._reject(frame, Text.of("frame.bytes_mapped", length=length))
+            self._unfit.reject(frame, Text.of("frame.bytes_mapped", length=length))
             if len(data) < length:
                 return None
             # CiA 301 §7.2.2.5: of a PDO that is too long the mapped bytes count.
@@ -181,7 +180,7 @@ class DrivePdos:
     word the last of ``rpdos``: setpoints are there when an enable comes."""
 
     def __init__(
-        self, drive: Drive, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan], reject: Reject
+        self, drive: Drive, rpdos: Sequence[PdoPlan], tpdos: Sequence[PdoPlan], unfit: UnfitFrames
     ) -> None:
         self._drive = drive
         words = len(drive.family.process.rpdo)
@@ -193,8 +192,8 @@ class DrivePdos:
         """Whether a stop takes effect with SYNC only."""
         main, *others = tpdos
         self.tpdos = (
-            DriveTpdo(drive, main, None, reject),
-            *(DriveTpdo(drive, plan, _further(drive, plan), reject) for plan in others),
+            DriveTpdo(drive, main, None, unfit),
+            *(DriveTpdo(drive, plan, _further(drive, plan), unfit) for plan in others),
         )
 
     @property
@@ -246,7 +245,7 @@ def _deadline_s(drive: Drive, tpdo: PdoPlan) -> float | None:
 def connect(
     node: Node,
     result: BootResult,
-    reject: Reject,
+    unfit: UnfitFrames,
     is_taken: Callable[[int], bool],
     now: float,
 ) -> dict[str, DrivePdos]:
@@ -270,7 +269,7 @@ def connect(
             plan.leave_out(why)
             result.notes.append(_of(drive, why))
             continue
-        pdos = connected[drive.name] = DrivePdos(drive, plan.rpdos, plan.tpdos, reject)
+        pdos = connected[drive.name] = DrivePdos(drive, plan.rpdos, plan.tpdos, unfit)
         drive.on_pdos(
             plan.unserved,
             pdos.further,

@@ -12,11 +12,13 @@ from pathlib import Path
 import canopen
 
 from bridge.can.socketcan import SocketCanBus
+from bridge.canopen.habits import HabitCounter
 from bridge.canopen.pdo import PdoCodec, PdoEntry
 from bridge.command.drive_link import NodeState
 from bridge.node.boot import PdoPlan
 from bridge.node.places.word_map import WordPlace
 from bridge.node.process.process_data import DrivePdos
+from bridge.node.process.unfit_frames import UnfitFrames
 from tests.bench.canopen_node import with_four_words
 from tests.bench.figures import show
 from tests.support.bench import Bench, write_site
@@ -47,7 +49,8 @@ async def measure_ours(folder: Path) -> float:
     node_goes(bench.plant, bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, time.monotonic())
     entries = tuple(PdoEntry(0x3001 if n == 0 else 0x3003, max(n, 1), 16) for n in range(4))
     plan = PdoPlan(0x185, 255, 250, PdoCodec(entries), tuple(WordPlace(n) for n in range(4)))
-    pdos = DrivePdos(drive, (plan,), (plan,), lambda frame, why: None)
+    unfit = UnfitFrames("conveyor", bench.plant.events, HabitCounter(), None)
+    pdos = DrivePdos(drive, (plan,), (plan,), unfit)
     routes = pdos.handlers
     bus = SocketCanBus("can0", "vcan0")
     received = 0

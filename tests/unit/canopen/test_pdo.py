@@ -9,8 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge.canopen.frame import REMOTE, Frame
+from bridge.canopen.habits import HabitCounter
 from bridge.canopen.pdo import MappingError, PdoCodec, PdoEntry
 from bridge.canopen.sync import burst_length, tpdo_deadline_s
+from bridge.command import EventQueue
 from bridge.command.drive_link import NodeState
 from bridge.image import Quality
 from bridge.mapping import load_family
@@ -19,6 +21,7 @@ from bridge.node.boot import PdoPlan, factory_entries, layouts, match_words
 from bridge.node.places.word_map import WordPlace
 from bridge.node.process.process_data import DrivePdos
 from bridge.node.process.remote_polling import RemotePolling
+from bridge.node.process.unfit_frames import UnfitFrames
 from tests.support.bench import Bench, write_site
 from tests.support.node_states import node_goes
 
@@ -124,10 +127,13 @@ class Words:
     def __init__(self, bench: Bench, tpdo: PdoPlan, rpdo: PdoPlan | None = None) -> None:
         self.drive = bench.plant.drives["conveyor/fu1"]
         node_goes(bench.plant, bench.plant.nodes["conveyor"], NodeState.OPERATIONAL, 1.0)
-        self.told: list[str] = []
-        self.pdos = DrivePdos(
-            self.drive, [rpdo or tpdo], [tpdo], lambda frame, why: self.told.append(str(why))
-        )
+        self._events = EventQueue()
+        unfit = UnfitFrames("conveyor", self._events, HabitCounter(), None)
+        self.pdos = DrivePdos(self.drive, [rpdo or tpdo], [tpdo], unfit)
+
+    @property
+    def told(self) -> list[str]:
+        return [event.message.rpartition(": ")[2] for event in self._events.waiting]
 
     def receive(self, data: str) -> list[int]:
         self.pdos.tpdos[0].on_frame(Frame(0x185, bytes.fromhex(data), 2.0))

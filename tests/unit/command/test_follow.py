@@ -19,7 +19,7 @@ SHUTDOWN, RUN, STOP = 0x0006, 0x000F, 0x0007
 AT, ELSEWHERE = (0x1111, 0x0001), (0x2222, 0x0002)
 
 
-def telegram(values: Mapping[str, Any], kept: tuple[int, ...], control_word: int) -> Telegram:
+def telegram(values: Mapping[str, Any], kept: tuple[int, ...], control_word: int, is_heard: bool) -> Telegram:
     """Decoded: all setpoints at once."""
     return Telegram(values.get("control_word"), values["setpoints"])
 

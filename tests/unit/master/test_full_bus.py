@@ -71,7 +71,9 @@ def test_where_the_others_frames_are_less_urgent_everything_goes_on(bench: BusyB
     assert bench.bus.status.frames_expired == 0
     assert any(moves(frame) for frame in bench.sent(RPDO1))
     results: list[Result] = []
-    bench.network.nodes[0].sdo[1].read(0x1018, 1, bench.now, results.append)
+    core = bench.network.nodes[0]
+    core.wire.sdo[1].read(0x1018, 1, bench.now, results.append)
+    bench.network.touched(core)
     bench.run(0.1)
     assert isinstance(results[0], bytes)
 
@@ -119,7 +121,9 @@ def test_where_nothing_gets_through_commands_end_with_a_time_out(tmp_path: Path)
     bench.run(0.05)
     results: list[Result] = []
     began = bench.now
-    bench.network.nodes[0].sdo[1].read(0x1018, 1, bench.now, results.append)
+    core = bench.network.nodes[0]
+    core.wire.sdo[1].read(0x1018, 1, bench.now, results.append)
+    bench.network.touched(core)
     while not results and bench.now < began + 10:
         bench.run(0.01)
     assert isinstance(results[0], SdoError)

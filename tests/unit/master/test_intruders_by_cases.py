@@ -5,7 +5,7 @@ The nodes are played: what the whole bridge does is in ``test_intruders.py`` and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any, Final, cast
 
@@ -16,7 +16,8 @@ from bridge.command import EventQueue
 from bridge.config import BusTable
 from bridge.drive import DriveState
 from bridge.master import intruders
-from bridge.master.intruders import Intruders
+from bridge.master.intruders import Intruders, NmtStop
+from bridge.master.mastership import BusMastership
 from bridge.node.node_core import NodeCore
 from bridge.text import render
 
@@ -105,25 +106,27 @@ class Bus:
         self.events = queue.waiting
         self.stopped: list[tuple[list[str], str]] = []
         cores = [cast(NodeCore, node) for node in nodes]
-        self.core = Intruders(table, cores, queue, lambda: self.acts, self._stop)
+        mastership = cast(BusMastership, SimpleNamespace(acts=lambda: self.acts))
+        self.core = Intruders(table, cores, queue, mastership)
         self.taken = {one: lambda frame: None for one in taken}
         self.watched = self.core.watched(cast(Any, self.taken))
         self.passed: list[Frame] = []
 
-    def _stop(self, nodes: Sequence[NodeCore], why: str, now: float) -> None:
-        self.stopped.append(([node.node.name for node in nodes], why))
-        for node in nodes:
-            cast(Any, node).is_held = True
+    def carry_out(self, stops: Iterator[NmtStop]) -> None:
+        for nodes, why, _ in stops:
+            self.stopped.append(([node.node.name for node in nodes], why))
+            for node in nodes:
+                cast(Any, node).is_held = True
 
     def routes(self, *others: int) -> dict[int, Any]:
         return self.core.routes(dict.fromkeys(others, self.passed.append))
 
     def sees(self, can_id: int, data: bytes = b"", at: float = 10.0) -> None:
-        self.core.on_frame(Frame(can_id, data, time=at))
+        self.carry_out(self.core.on_frame(Frame(can_id, data, time=at)))
 
     def hears(self, can_id: int, data: bytes = b"", at: float = 10.0) -> None:
         """A single frame, such as NMT or an SDO request."""
-        self.routes(0)[can_id](Frame(can_id, data, time=at))
+        self.carry_out(self.routes(0)[can_id](Frame(can_id, data, time=at)))
 
     @property
     def whom(self) -> list[list[str]]:
@@ -204,13 +207,13 @@ def test_a_further_sdo_server_is_looked_at_where_nobody_else_has_its_identifier(
 
 def test_a_server_that_is_used_keeps_who_hears_it(make: Any) -> None:
     bus = make(Node(5, servers=[0x600]))
-    bus.routes(0x605)[0x605](Frame(0x605, READ))
+    bus.carry_out(bus.routes(0x605)[0x605](Frame(0x605, READ)))
     assert len(bus.passed) == 1
 
 
 def test_a_server_of_one_node_that_is_used_by_another_is_the_others(make: Any) -> None:
     bus = make(Node(5, servers=[0x601]), Node(6))
-    bus.routes()[0x606](Frame(0x606, WRITE, time=10.0))
+    bus.carry_out(bus.routes()[0x606](Frame(0x606, WRITE, time=10.0)))
     assert bus.whom == [["n6"]]
 
 

@@ -154,7 +154,7 @@ class MasterMachine(RuleBasedStateMachine):
         network = self.quick.network
         for core in network.nodes:
             assert all(channel.waiting <= 64 for channel in core.wire.sdo)
-            assert len(core.wire.routes) <= 16
+            assert len(core.wire.routes) + len(core.wire.services) <= 16
         assert network.waiting <= 100, "plans and frames that wait"
         self.quick.log.clear()
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import pytest
 
 from bridge.canopen.duplicate import AnsweredTwice, StateChanges, TooManyHeartbeats
 from bridge.canopen.frame import Frame
 from bridge.command import Event
+from bridge.master.mastership import BusMastership
 from bridge.master.watch import BusWatch
 from tests.support import sites
 
@@ -16,9 +20,9 @@ class Case:
         text = sites.site(sites.bus(sites.node(sites.drive("fu1", "none", 0))))
         self.plant = sites.plant_of(text)
         self.acts = True
-        self.watch = BusWatch(
-            "can0", own_id, lambda: self.acts, {5: "conveyor"}, self.plant.side_of(self.plant.site.bus[0])
-        )
+        mastership = cast(BusMastership, SimpleNamespace(acts=lambda: self.acts))
+        side = self.plant.side_of(self.plant.site.bus[0])
+        self.watch = BusWatch("can0", own_id, mastership, {5: "conveyor"}, side)
         self.routes = self.watch.routes()
 
     def comes(self, can_id: int, data: bytes, time: float) -> None:

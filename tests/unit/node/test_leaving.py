@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import cast
 
 import pytest
 
 from bridge.canopen.nmt import NmtCommand, NmtState
 from bridge.command import Action, Drive
+from bridge.command.drive_link import NodeState
 from bridge.command.stop_check.state import LastStop
 from bridge.node.boot import BootMemory
 from bridge.node.leaving import Leaving
@@ -28,6 +30,7 @@ class Wire:
         self.put_off = PutOff()
         self.drives = {drive.name: object() for drive in line.plant.nodes["conveyor"].drives}
         self.sent: list[NmtCommand | str] = []
+        self.error_control = SimpleNamespace(state=NmtState.UNKNOWN)
 
     def carries(self, one: Drive) -> bool:
         return one.name in self.drives
@@ -46,9 +49,9 @@ class Node:
         self.line = JudgedPlant(words, *slots, rpdo_type=kind)
         self.wire = Wire(self.line)
         self.memory = BootMemory()
-        self.takes_words = takes_words
         node, wire = self.line.plant.nodes["conveyor"], cast(NodeWire, self.wire)
-        self.leaving = Leaving(node, wire, self.memory, lambda: self.takes_words)
+        self.leaving = Leaving(node, wire, self.memory)
+        self.leaving.on_node(NodeState.OPERATIONAL if takes_words else NodeState.STOPPED)
 
     @property
     def now(self) -> float:
@@ -74,6 +77,13 @@ def test_a_node_that_takes_no_words_is_not_waited_for() -> None:
     node = Node(takes_words=False)
     node.leaving.send(STOP, node.now)
     assert node.wire.sent == [STOP]
+
+
+def test_a_stopped_node_that_says_that_it_is_operational_is_waited_for() -> None:
+    node = Node(takes_words=False)
+    node.wire.error_control.state = NmtState.OPERATIONAL
+    node.leaving.send(STOP, node.now)
+    assert (node.wire.sent, node.leaving.is_due) == ([], True)
 
 
 def test_who_has_had_the_words_for_long_is_not_waited_for() -> None:

@@ -146,7 +146,7 @@ _WRONG = st.fixed_dictionaries(
 
 def test_a_refusal_says_why_also_to_whoever_only_prints_it(rig: Rig):
     with pytest.raises(Refusal, match=r"^control_word takes 0…65535, not -1$"):
-        rig.channel.leg_settings.decode({"control_word": -1}, (0, 0, 0, 0), 0)
+        rig.channel.leg_settings.decode({"control_word": -1}, (0, 0, 0, 0), 0, True)
 
 
 @given(values=_WRONG)

@@ -7,6 +7,7 @@ import pytest
 from bridge.canopen.pdo import PdoCodec
 from bridge.node.boot.memory import BootMemory
 from bridge.node.boot.pdo_plan import PdoPlan
+from bridge.parameter import ParameterError
 
 
 def rpdo(cob_id: int, kind: int = 255) -> PdoPlan:
@@ -17,7 +18,16 @@ def test_of_a_node_that_was_never_seen_drives_may_run_and_nothing_was_done() -> 
     memory = BootMemory()
     assert (memory.may_run, memory.is_at_rest, memory.did_not_start) == (True, False, False)
     assert (memory.unsaved, memory.unanswered_stores) == (False, 0)
-    assert memory.count_write("n", "1010:01", "save") == "", "nobody counts"
+    assert memory.count_write("n", "1010:01", "save") == "", "its first"
+
+
+def test_a_write_to_the_eeprom_is_counted_as_of_the_boot_up_until_it_is_one_too_many() -> None:
+    memory = BootMemory(cycles=2, began_at=100.0)
+    for _ in range(2):
+        memory.count_write("n", "1010:01", "save")
+    with pytest.raises(ParameterError):
+        memory.count_write("n", "1010:01", "save")
+    assert memory.ledger.writes(("n", "1010:01")) == 2
 
 
 def test_a_value_that_was_not_kept_is_known_by_its_bytes_until_the_node_starts_anew() -> None:

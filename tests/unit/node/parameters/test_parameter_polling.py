@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
 
-from bridge.command import ParameterHolder
-from bridge.node.parameters.parameter_polling import Came, ParameterPolling
-from bridge.parameter import ParameterEntry
+from bridge.node.parameters.parameter_polling import Came, ParameterPolling, PointRead
 from tests.support.nodes import node_of
 
 
@@ -17,23 +14,25 @@ class Case:
     def __init__(self, nodes: int = 1) -> None:
         self.node = node_of()
         self.asked: list[str] = []
-        self.done: list[Callable[[Came], None]] = []
-        self.polling = ParameterPolling(self.node, nodes, self._ask)
+        self.reads: list[PointRead] = []
+        self.polling = ParameterPolling(self.node, nodes)
         self.names = [entry.name for entry in self.node.drives[0].spec.names.points()]
 
-    def _ask(self, who: ParameterHolder, entry: ParameterEntry, done: Callable[[Came], None]) -> None:
-        self.asked.append(entry.name)
-        self.done.append(done)
+    def on_time(self, now: float) -> None:
+        read = self.polling.take_due(now)
+        if read is not None:
+            self.asked.append(read.entry.name)
+            self.reads.append(read)
 
     def runs(self, begin: float, end: float, came: Came = Came.READ) -> list[float]:
         """Every question until then is answered at once; when they were asked."""
         times: list[float] = []
         while (due := self.polling.next_deadline()) is not None and due < end:
             before = len(self.asked)
-            self.polling.on_time(max(due, begin))
+            self.on_time(max(due, begin))
             if len(self.asked) > before:
                 times.append(max(due, begin))
-                self.done[-1](came)
+                self.polling.on_result(self.reads[-1], came)
         return times
 
 
@@ -51,9 +50,9 @@ def test_every_point_is_read_once_after_the_boot_up(case: Case) -> None:
 
 
 def test_one_is_asked_at_a_time(case: Case) -> None:
-    case.polling.on_time(10.0)
+    case.on_time(10.0)
     assert case.polling.next_deadline() is None
-    case.polling.on_time(99.0)
+    case.on_time(99.0)
     assert len(case.asked) == 1
 
 
@@ -85,9 +84,9 @@ def test_what_the_drive_does_not_have_is_not_asked_again_and_what_failed_is_late
 
 
 def test_an_answer_for_a_node_that_was_lost_meanwhile_counts_for_nothing(case: Case) -> None:
-    case.polling.on_time(10.0)
+    case.on_time(10.0)
     case.polling.stop()
-    case.done[0](Came.READ)
+    case.polling.on_result(case.reads[0], Came.READ)
     assert case.polling.next_deadline() is None
     case.polling.start(case.node.drives, 20.0)
     assert case.polling.next_deadline() == 20.0

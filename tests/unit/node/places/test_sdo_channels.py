@@ -86,7 +86,8 @@ def test_both_channels_of_a_node_are_asked_at_the_same_time(tmp_path: Path) -> N
     results: list[Result] = []
     before = len(bench.log)
     for number in (1, 2):
-        core.sdo[number].read(0x2069, 1, bench.now, results.append)
+        core.wire.sdo[number].read(0x2069, 1, bench.now, results.append)
+    bench.network.touched(core)
     bench.master.pump()
     assert [frame.can_id for frame in bench.log[before : before + 2]] == [0x605, 0x345]
     bench.run(0.01)
@@ -99,7 +100,7 @@ def test_a_node_that_is_lost_ends_the_transfers_of_all_its_channels(tmp_path: Pa
     results: list[Result] = []
     bench.cut = True
     for number in (1, 2):
-        core.sdo[number].read(0x2069, 1, bench.now, results.append)
+        core.wire.sdo[number].read(0x2069, 1, bench.now, results.append)
     core.bus_is_gone(bench.now)
     assert [type(result) for result in results] == [SdoError, SdoError]
 
@@ -134,7 +135,9 @@ def test_retries_are_those_of_the_site_file(tmp_path: Path) -> None:
     results: list[Result] = []
     bench.cut = True
     before = len(bench.sent(0x605))
-    bench.network.nodes[0].sdo[1].read(0x2069, 1, bench.now, results.append)
+    core = bench.network.nodes[0]
+    core.wire.sdo[1].read(0x2069, 1, bench.now, results.append)
+    bench.network.touched(core)
     bench.run(0.2)
     asked = [frame for frame in bench.sent(0x605)[before:] if frame.data[:4].hex() == "40692001"]
     assert len(asked) == 3

@@ -7,11 +7,14 @@ from pathlib import Path
 import pytest
 
 from bridge.canopen.frame import Frame
+from bridge.canopen.habits import HabitCounter
 from bridge.canopen.pdo import PdoCodec, PdoEntry
+from bridge.command import EventQueue
 from bridge.command.drive_link import NodeState
 from bridge.image import Quality
 from bridge.node.boot import PdoPlan, SignalPlan
 from bridge.node.process.inputs import connect_inputs
+from bridge.node.process.unfit_frames import UnfitFrames
 from tests.support.devices import ENCODER
 from tests.support.nodes import device_plant
 
@@ -24,10 +27,14 @@ class Case:
         entries = (PdoEntry(0x6004, 0, 32), PdoEntry(0x0005, 0, 8))
         codec = PdoCodec(entries, {(0x6004, 0)})
         plan = PdoPlan(0x194, kind, event_ms, codec, (None, None), name="TPDO1")
-        self.rejected: list[str] = []
-        reject = lambda frame, why: self.rejected.append(str(why))  # noqa: E731
+        self._events = EventQueue()
+        unfit = UnfitFrames("shaft", self._events, HabitCounter(), None)
         self.device = device
-        self.routes = connect_inputs(device, SignalPlan([plan], {}), 10, reject, 9.0)
+        self.routes = connect_inputs(device, SignalPlan([plan], {}), 10, unfit, 9.0)
+
+    @property
+    def rejected(self) -> list[str]:
+        return [event.message.rpartition(": ")[2] for event in self._events.waiting]
 
     def comes(self, data: str, time: float = 10.0) -> None:
         self.routes[0x194](Frame(0x194, bytes.fromhex(data), time))

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import pytest
 
 from bridge.canopen.frame import Frame
+from bridge.canopen.habits import HabitCounter
 from bridge.canopen.pdo import PdoCodec, PdoEntry
+from bridge.command import EventQueue
 from bridge.node.boot import NodePdoPlan, PdoPlan
+from bridge.node.process.polling import Polling
 from bridge.node.process.tpdo import node_tpdos
-from bridge.text import Text
+from bridge.node.process.unfit_frames import UnfitFrames
 
 
 class Shown:
@@ -18,14 +24,17 @@ class Shown:
         codec = PdoCodec((PdoEntry(0x2000, 1, 16), PdoEntry(0x2000, 2, 8)))
         plan = PdoPlan(0x385, kind, event_ms, codec, (None, None))
         self.shown: list[tuple[str, int, float, float]] = []
-        self.rejected: list[str] = []
-        self.routes = node_tpdos([NodePdoPlan(plan, ("temperature", ""))], 10, self._show, self._reject)
+        self._events = EventQueue()
+        unfit = UnfitFrames("io", self._events, HabitCounter(), None)
+        polling = cast(Polling, SimpleNamespace(on_pdo=self._show))
+        self.routes = node_tpdos([NodePdoPlan(plan, ("temperature", ""))], 10, polling, unfit)
+
+    @property
+    def rejected(self) -> list[str]:
+        return [event.message.rpartition(": ")[2] for event in self._events.waiting]
 
     def _show(self, name: str, value: int, at: float, until: float) -> None:
         self.shown.append((name, value, at, until))
-
-    def _reject(self, frame: Frame, why: Text) -> None:
-        self.rejected.append(str(why))
 
     def comes(self, data: str) -> None:
         self.routes[0x385](Frame(0x385, bytes.fromhex(data), 10.0))

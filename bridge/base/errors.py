@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from bridge.text import Text, Words, render
+from bridge.text import Said, Text, Words, render
 
 _EXHAUSTED: Final = frozenset((errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM))
 
@@ -51,8 +51,8 @@ class Fault:
     file: str
     line: int
     key: str
-    said: Words
-    advice: Words = ""
+    said: Text
+    advice: Said = ""
 
     @property
     def message(self) -> str:
@@ -68,14 +68,15 @@ class Fault:
     def text(self) -> Text:
         """All of it in one."""
         place = f"{self.file}:{self.line}" if self.line else self.file
-        said, advice = Text.plain(self.said), Text.plain(self.advice)
         if self.key and self.advice:
-            return Text.of("file.key_advised", place=place, key=self.key, said=said, advice=advice)
+            return Text.of(
+                "file.key_advised", place=place, key=self.key, said=self.said, advice=self.advice
+            )
         if self.key:
-            return Text.of("file.key", place=place, key=self.key, said=said)
+            return Text.of("file.key", place=place, key=self.key, said=self.said)
         if self.advice:
-            return Text.of("file.at_advised", place=place, said=said, advice=advice)
-        return Text.of("file.at", place=place, said=said)
+            return Text.of("file.at_advised", place=place, said=self.said, advice=self.advice)
+        return Text.of("file.at", place=place, said=self.said)
 
     def __str__(self) -> str:
         return render(self.text)

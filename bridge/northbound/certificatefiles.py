@@ -36,7 +36,7 @@ def placed(fault: Fault, keys: Mapping[str | None, str], site: Path) -> Fault:
     """The fault at the line of the site file's key that it is about; ``keys`` are those that name files, by
     the files."""
     if fault.file in keys:
-        said = Text.of("certificate.of_file", file=fault.file, said=Text.plain(fault.said))
+        said = Text.of("certificate.of_file", file=fault.file, said=fault.said)
         fault = replace(fault, key=keys[fault.file], said=said)
     if not fault.key:
         return fault

@@ -14,7 +14,7 @@ from typing import Any, Final, TypeVar, cast
 from pydantic import BaseModel, ValidationError
 
 from bridge.base.errors import Fault, FileFaults
-from bridge.text import Said, Text, Words
+from bridge.text import Said, Text
 from bridge.tomlfile.lines import Key, key_lines
 from bridge.tomlfile.messages import explain
 
@@ -108,7 +108,7 @@ class TomlFile:
                 return line
         return 0
 
-    def fault(self, key: Sequence[int | str], said: Words, hint: Words = "") -> None:
+    def fault(self, key: Sequence[int | str], said: Text, hint: Said = "") -> None:
         """Note a fault; ``finish`` raises them all."""
         self.faults.append(Fault(str(self.path), self.line(key), dotted(key), said, hint))
 

@@ -69,9 +69,7 @@ class Fault:
         """All of it in one."""
         place = f"{self.file}:{self.line}" if self.line else self.file
         if self.key and self.advice:
-            return Text.of(
-                "file.key_advised", place=place, key=self.key, said=self.said, advice=self.advice
-            )
+            return Text.of("file.key_advised", place=place, key=self.key, said=self.said, advice=self.advice)
         if self.key:
             return Text.of("file.key", place=place, key=self.key, said=self.said)
         if self.advice:

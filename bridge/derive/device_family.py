@@ -8,9 +8,10 @@ from typing import Final
 from bridge.canopen.datatypes import INTEGERS, REALS
 from bridge.derive.parameter_tables import TYPES, entries_of, parameter_lines
 from bridge.derive.titles import name_of, title_of
-from bridge.derive.toml import one_line, string, strings, word
+from bridge.derive.toml import one_line, string, strings, word, wording
 from bridge.eds import Description, Entry
 from bridge.eds.pdos import pdos
+from bridge.text import Said
 
 GENERIC: Final = "generic/device"
 _PROFILE_IO: Final = 401
@@ -28,7 +29,7 @@ _SAVES_BY_ITSELF: Final = 2
 _DUMMIES: Final = range(0x0001, 0x0008)
 
 
-def device_lines(description: Description, source: str, read_only: str = "") -> Iterator[str]:
+def device_lines(description: Description, source: str, read_only: Said = "") -> Iterator[str]:
     """The mapping, line by line; ``read_only`` is why nothing is written into the device."""
     info = description.device_info
     inputs = dict(_signals(description, receives=False))
@@ -44,7 +45,7 @@ def device_lines(description: Description, source: str, read_only: str = "") -> 
     profile = _profile(description)
     yield f"profile = {profile}" if profile else "# profile = "
     if read_only:
-        yield f"read_only = {string(read_only)}"
+        yield f"read_only = {wording(read_only)}"
     yield ""
     yield from identity_lines(description)
     yield from _eeprom_lines(description)

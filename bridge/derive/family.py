@@ -19,7 +19,7 @@ from bridge.eds import Description, read_whole_device_file
 from bridge.mapping import Family
 from bridge.mapping.loader import family_of
 from bridge.mapping.process import MOST_WORDS
-from bridge.text import Said, Text, render
+from bridge.text import Said, Text
 
 _HAVE_OWN_WORDS: Final = (408,)
 """Profiles with a control and a status word of their own at 6040h and 6041h."""
@@ -58,7 +58,7 @@ def derive_family(description: Description, source: str, mode: str | None = None
     axes = axes_of(description)
     if not axes and mode is None and not _is_half_a_drive(description):
         read_only = _why_read_only(description)
-        text = "\n".join(device_lines(description, source, render(read_only)))
+        text = "\n".join(device_lines(description, source, read_only))
         return Derived(_name(description, source), GENERIC, text, read_only)
     if not axes:
         raise NotDerived(Text.of("derive.half_a_drive", source=source, why=_why_not(description)))

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from bridge.canopen.datatypes import Plain
+from bridge.text import LANGUAGES, Text, render
 
 _LETTERS: Final = {
     "ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "æ": "ae", "œ": "oe", "ø": "oe", "å": "aa", "đ": "d",
@@ -24,6 +25,11 @@ def one_line(text: str) -> str:
 
 def string(text: str) -> str:
     return json.dumps(one_line(text), ensure_ascii=False)
+
+
+def wording(said: Text) -> str:
+    """``said`` in each language, as the table of a sentence."""
+    return f"{{ {', '.join(f'{language} = {string(render(said, language))}' for language in LANGUAGES)} }}"
 
 
 def strings(texts: Sequence[str]) -> str:

@@ -77,7 +77,7 @@ def contents(path: Path) -> bytes:
             content = file.read(_MOST_BYTES + 1)
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or str(error)
-        raise FileFaults([Fault(str(path), 0, "", Text.of("eds.unreadable", why=str(why)))]) from error
+        raise FileFaults([Fault(str(path), 0, "", Text.of("toml.unreadable", why=str(why)))]) from error
     if len(content) > _MOST_BYTES:
         said = Text.of("eds.too_large", most_mib=_MOST_BYTES >> 20)
         raise FileFaults([Fault(str(path), 0, "", said)])

@@ -12,7 +12,7 @@ from bridge.lint.checked_bus import CheckedBus, CheckedNode, CheckedPdo
 from bridge.lint.interference import busy_bits, wire_of
 from bridge.lint.own import WorstCase
 from bridge.lint.report import LintReport
-from bridge.mapping.entry_types import ObjectRef
+from bridge.mapping.entry_types import ObjectRef, said_of
 from bridge.mapping.own_places import offline
 from bridge.node.boot.device_watch import keeps_outputs, why_not_safe
 from bridge.text import Text
@@ -62,7 +62,7 @@ def check_outputs(bus: CheckedBus, report: LintReport) -> None:
 def check_read_only(bus: CheckedBus, report: LintReport) -> None:
     """Report nodes that may be taken for drives and cannot be commanded."""
     for node in bus.nodes:
-        if why := node.family.family.read_only:
+        if why := said_of(node.family.family.read_only):
             told = Text.of("check.only_read", node=node.table.name, why=why)
             report.warning((*node.key, "mapping"), told)
 

@@ -118,7 +118,7 @@ def _check_polls(family: Family, file: MergedFile) -> None:
     for p, poll in enumerate(family.poll):
         if poll.name in NODE_POINTS:
             said = Text.of("mapping.name_of_node", name=poll.name)
-            file.fault(("poll", p, "name"), said, Text.of("mapping.name_of_node_advice"))
+            file.fault(("poll", p, "name"), said, Text.of("site.reserved_advice"))
         _check_integer(poll.data_type, ("poll", p, "data_type"), file)
 
 

@@ -105,7 +105,7 @@ def _check_pdo(family: Family, pdo: Pdo, process: list[str], key: Key, file: Mer
                 file.fault((*key, "objects", w, r), said, Text.of("mapping.object_long_advice"))
     bits = 16 * count
     if bits > _PDO_BITS:
-        file.fault((*key, "objects"), Text.of("mapping.pdo_long", bits=bits, most=_PDO_BITS))
+        file.fault((*key, "objects"), Text.of("site.pdo_bits", bits=bits, most=_PDO_BITS))
     check_cob_id(pdo.cob_id, family, (*key, "cob_id"), file)
     if pdo.static and pdo.write:
         file.fault((*key, "write"), Text.of("mapping.write_static"))

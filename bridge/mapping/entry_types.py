@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from bridge.config.field_types import Name as Name
 from bridge.config.model import Table as Table
 from bridge.image import DataType
-from bridge.text import Text
+from bridge.text import Said, Text
 from bridge.tomlfile import Unfit
 
 WORD_BITS: Final = 16
@@ -160,3 +160,10 @@ class Wording(Table):
     def said(self) -> Text:
         """The sentence in the reader's language."""
         return Text.both(self.en, self.de)
+
+
+def said_of(words: str | Wording | None) -> Said:
+    """A sentence of a mapping file, in one language or in both; "" where there is none."""
+    if isinstance(words, Wording):
+        return words.said
+    return Text.plain(words) if words else ""

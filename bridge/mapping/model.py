@@ -17,7 +17,7 @@ from bridge.config.field_types import RegularExpression
 from bridge.mapping.aliases import Aliases
 from bridge.mapping.axes import STANDARDISED, on_axis
 from bridge.mapping.device_signals import Output, Signal, no_process
-from bridge.mapping.entry_types import Bit, Bits, Kind, Name, ObjectRef, Pattern, Ref, Table, Word
+from bridge.mapping.entry_types import Bit, Bits, Kind, Name, ObjectRef, Pattern, Ref, Table, Word, Wording
 from bridge.mapping.entry_types import MappedObject as MappedObject
 from bridge.mapping.entry_types import pattern_bits as pattern_bits
 from bridge.mapping.faults import EmcyTable, FaultEntry, FaultNumbers
@@ -42,7 +42,7 @@ class FamilyTable(Table):
         description="number of the device profile, such as 401: what its objects do when they are written. "
         "Left out: 402 for drives, elsewhere what `device_type` says; else an object is protected as in any",
     )
-    read_only: str = Field(
+    read_only: str | Wording = Field(
         "",
         description="reason why the bridge writes neither outputs nor parameters into such a device, as "
         "`check` says and a refused write is told. Left out: it is written like any other",

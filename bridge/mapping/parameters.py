@@ -40,7 +40,7 @@ def _name_pattern(text: str) -> str:
     try:
         pattern = re.compile(text, re.ASCII)
     except re.error as error:
-        raise Unfit(Text.of("mapping.pattern_syntax", why=str(error))) from None
+        raise Unfit(Text.of("site.regular_expression", why=str(error))) from None
     unknown = sorted(set(pattern.groupindex) - set(GROUPS))
     if unknown:
         raise Unfit(Text.of("mapping.pattern_groups", groups=GROUPS, unknown=tuple(unknown)))

@@ -11,7 +11,7 @@ from bridge.config.download import Download
 from bridge.config.field_types import PlainValue, listed
 from bridge.image import DataType
 from bridge.mapping.axes import MOST_AXES
-from bridge.mapping.entry_types import Bit, Mapped, Name, ObjectRef, Ref, States, Table, Wording
+from bridge.mapping.entry_types import Bit, Mapped, Name, ObjectRef, Ref, States, Table, Wording, said_of
 from bridge.text import Text
 
 MOST_WORDS: Final = 9
@@ -198,7 +198,7 @@ class Meaning(Table):
     @property
     def said_otherwise(self) -> Text:
         """Reason why the word has no value while a code names another one."""
-        return _said(self.otherwise) or Text.of("meaning.not_in_telegram")
+        return said_of(self.otherwise) or Text.of("meaning.not_in_telegram")
 
 
 class ProcessValue(Table):
@@ -258,7 +258,7 @@ class ProcessValue(Table):
     @property
     def said_otherwise(self) -> Text:
         """Reason why the value means nothing while a parameter in ``when`` has another value."""
-        return _said(self.otherwise) or Text.of("meaning.something_else")
+        return said_of(self.otherwise) or Text.of("meaning.something_else")
 
     @property
     def word_names(self) -> tuple[str, ...]:
@@ -319,9 +319,3 @@ class ProcessValue(Table):
     def is_conditional(self) -> bool:
         """Whether the drive's parameters decide if there is such a value."""
         return bool(self.code or self.when or self.needs)
-
-
-def _said(words: str | Wording | None) -> Text | None:
-    if isinstance(words, Wording):
-        return words.said
-    return Text.plain(words) if words else None

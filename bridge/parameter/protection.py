@@ -14,6 +14,7 @@ from typing import Final
 
 from bridge.mapping.alias_places import Alias, aliases
 from bridge.mapping.aliases import COMMUNICATION
+from bridge.mapping.entry_types import said_of
 from bridge.mapping.model import Family, ObjectRef, Parameter
 from bridge.mapping.own_places import places
 from bridge.mapping.parameters import indices
@@ -53,7 +54,7 @@ class Protection:
         rule = family.parameter_names
         self._is_device = family.is_device
         self._profile = _profile_of(family)
-        self._read_only = family.family.read_only
+        self._read_only = said_of(family.family.read_only)
         self._commands = [indices(one) for one in rule.protected] if rule else []
         axes = {1, *(slot.axis for slot in family.slot)}
         self._own = {place.ref.index for one in axes for place in places(family.of_axis(one), link=True)}

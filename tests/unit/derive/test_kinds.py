@@ -13,9 +13,11 @@ from bridge.command import Identity, Outcome, Request, Role, Source, WriteParame
 from bridge.derive import derive_family
 from bridge.derive.device_family import GENERIC
 from bridge.lint import Severity, lint
+from bridge.mapping.entry_types import said_of
 from bridge.mapping.loader import read_family
 from bridge.project import load_project
 from bridge.sim.core.nmt_slave import SlaveState
+from bridge.text import LANGUAGES, render
 from tests.support import sites
 from tests.support.invented_eds import (
     BASIC,
@@ -86,7 +88,9 @@ def test_a_device_is_what_its_number_says(
     assert bool(family.output) is outputs
     assert re.search(reason, str(made.read_only))
     assert bool(made.read_only) is bool(reason)
-    assert family.family.read_only == str(made.read_only)
+    for language in LANGUAGES:
+        told, wanted = said_of(family.family.read_only), made.read_only
+        assert render(told, language) == render(wanted, language)
 
 
 @pytest.mark.parametrize(

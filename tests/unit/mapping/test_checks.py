@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from pathlib import Path
 
 import pytest
@@ -67,14 +66,3 @@ def test_a_finding_is_told_in_german_too(tmp_path: Path):
     (fault,) = caught.value.faults
     said, advice = render(fault.said, "de"), render(fault.advice, "de")
     assert (said, advice) == ("Slot 'one' ist doppelt vorhanden", "zuerst in Zeile 9")
-
-
-def test_no_validator_raises_words_without_a_code():
-    """``Unfit`` has a text with a code; what ``MergedFile.fault`` takes is held by its types."""
-    bare = [
-        f"{path}:{node.lineno}"
-        for path in sorted(Path("bridge/mapping").glob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "ValueError"
-    ]
-    assert not bare

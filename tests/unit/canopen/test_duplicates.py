@@ -22,7 +22,9 @@ def started(tmp_path: Path, *nodes: str, bus: str = "") -> Quick:
 
 
 def ask(quick: Quick) -> None:
-    quick.core(1).sdo[1].read(0x1000, 0, quick.now, lambda result: None)
+    node = quick.core(1)
+    node.wire.sdo[1].read(0x1000, 0, quick.now, lambda result: None)
+    quick.network.touched(node)
 
 
 # SDO answers

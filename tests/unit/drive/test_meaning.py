@@ -131,9 +131,11 @@ def test_a_drive_in_another_set_than_commanded_gets_no_scaled_value(tmp_path: Pa
     enable(bench, SET_2, frequency=25.0)
     decode = bench.plant.drives[DRIVE].channel.leg_settings.decode
     with pytest.raises(Refusal, match="parameter set 1 is commanded, and the drive is in set 2"):
-        decode({"frequency": 10.0}, (0,) * 4, ENABLE)
-    assert decode({"frequency": 10.0}, (0,) * 4, SHUT_DOWN).setpoints == (0,) * 4, "a stop is never refused"
-    assert decode({"setpoint_1": 5}, (0,) * 4, ENABLE).setpoints == (5, 0, 0, 0)
+        decode({"frequency": 10.0}, (0,) * 4, ENABLE, True)
+    assert decode({"frequency": 10.0}, (0,) * 4, SHUT_DOWN, True).setpoints == (0,) * 4, (
+        "a stop is never refused"
+    )
+    assert decode({"setpoint_1": 5}, (0,) * 4, ENABLE, True).setpoints == (5, 0, 0, 0)
 
 
 @pytest.mark.landing(4)

@@ -160,7 +160,8 @@ class MasterMachine(RuleBasedStateMachine):
 
     def wait_for_all(self) -> None:
         """Nobody resets a node: only who was taken out of service, or was given up as its ``on_loss`` asks,
-        is started, and who is not supervised, whose restart may have gone unseen, is reset."""
+        is started; and who is not supervised, whose restart may have gone unseen, is reset, as is who says
+        that it waits for that: a random frame was the answer to what was written into it."""
         quick = self.quick
         for core in quick.network.nodes:
             gave_up = core.table.on_loss in ("stop_node", "nothing") and core.state is NodeState.LOST
@@ -170,6 +171,9 @@ class MasterMachine(RuleBasedStateMachine):
                 quick.ask(Action.RESET, core.node.name)
         until = quick.now + LONGEST_BACK_OFF_S + 15.0
         while quick.states() != "ooooo" and quick.now < until:
+            for number in quick.nodes:
+                if "until the node restarts or is reset" in quick.status(number):
+                    quick.ask(Action.RESET, f"n{number}")
             quick.run(5.0)
 
     def teardown(self) -> None:

@@ -134,6 +134,11 @@ class StopState(NamedTuple):
     untold: tuple[StopVerdict, ...] = ()
     """Verdicts that the next ``TimePassed`` gives, unless the stop is over by then."""
 
+    def summed(self, sums: Unfollowed) -> StopState:
+        """State with other ``sums``. As ``_replace`` at a third of its cost: this is done with each telegram
+        of a drive that goes on in spite of its stop."""
+        return StopState._make((*self[:_SUMS], sums, *self[_SUMS + 1 :]))
+
     @property
     def is_on_bus(self) -> bool:
         return self.place in _JUDGED
@@ -183,3 +188,6 @@ class StopState(NamedTuple):
     def sent_for_s(self, now: float) -> float:
         """Time in seconds for which the stop in force has been on the bus; 0 where it is not."""
         return max(0.0, now - self.since) if self.place is StopPlace.ON_BUS else 0.0
+
+
+_SUMS: Final = StopState._fields.index("sums")

@@ -223,7 +223,7 @@ def _telegram(state: StopState, event: TelegramHeard) -> StopState:
     off_s, ramp_s = state.bounds.off_s, state.bounds.ramp_s
     sums, summed = state.sums.seen(event.at, event.speed, off_s=off_s, ramp_s=ramp_s)
     if sums is not state.sums:
-        state = state._replace(sums=sums)
+        state = state.summed(sums)
     return state if summed is None else _found(state, Evidence.SUMMED, event.at, summed)
 
 

@@ -29,9 +29,10 @@ class Fault:
     says nothing. ``examine``: in place of times, what is done and judged by yes or no; ``demand`` says what
     has to hold then. ``brings_back``: somebody enables the drive again and again, so that its time is the
     longest that it turned without a stop. ``speaks_on``: somebody goes on enabling a drive whose node is
-    stopped, so that its time is to the end of its last turn. ``ends_soon``: it is undone as soon as its last
-    bound has passed, and not only when all are measured. ``hands_over``: its end gives the drives to new
-    owners, which ends what holds. ``of_outputs``: it is about the outputs beside the drives."""
+    stopped, so that its time is to the end of its last turn. ``lacks``: what a drive was not told that it has
+    to be, besides the times; empty where it was. ``ends_soon``: it is undone as soon as its last bound has
+    passed, and not only when all are measured. ``hands_over``: its end gives the drives to new owners, which
+    ends what holds. ``of_outputs``: it is about the outputs beside the drives."""
 
     name: str
     reference: Reference
@@ -55,6 +56,7 @@ class Fault:
     examine: Examine | None = None
     demand: str = ""
     of_outputs: bool = False
+    lacks: Callable[[Rig, Drive, float], str] = lambda rig, drive, moment: ""
 
     @property
     def per_round(self) -> int:

@@ -214,6 +214,7 @@ FAULTS: Final = (
         bounds.dead,
         bounds.given_way(PLANT.paused_s),
         leaves_silence=True,
+        lacks=others.owed_stop,
     ),
     Fault(
         "bus process stopped as it sends",

@@ -28,7 +28,7 @@ from tests.proof.drives import (
     write_second_site,
 )
 from tests.proof.families import CIA402
-from tests.proof.rig import BRIDGE_HEARTBEAT, Rig, Stuck
+from tests.proof.rig import BRIDGE_HEARTBEAT, NMT, Rig, Stuck
 from tests.proof.settings import PLANT
 from tests.proof.strangers import Connection
 
@@ -57,8 +57,8 @@ _SEEN_MS: Final = _JOG_STOPS_S * 1000 - _RAMP_SEEN_MS - TPDO_MS - _LOOKED_AT_MS 
 _JOGS: Final = math.ceil(IGNORED_STOP_MS / _SEEN_MS)
 _OPERATIONAL: Final = b"\x05"
 _PRE_OPERATIONAL: Final = b"\x7f"
-_NMT: Final = 0x000
-_START: Final = 0x01
+_BOOT_UP: Final = b"\0"
+_START, _STOP = 0x01, 0x02
 
 
 class Intruder:
@@ -92,7 +92,7 @@ class Intruder:
         while not self._ended.wait(_INTRUDES_S):
             with suppress(OSError):
                 if self._start:
-                    machine.send(BRIDGE_SIDE, _NMT, self._start)
+                    machine.send(BRIDGE_SIDE, NMT, self._start)
                 self._send(self._word())
 
     def end(self) -> None:
@@ -130,6 +130,16 @@ def pause_beside_twin(rig: Rig) -> float:
     machine.send(BRIDGE_SIDE, BRIDGE_HEARTBEAT, _PRE_OPERATIONAL)
     rig.bridge.signal(signal.SIGCONT)
     return now
+
+
+def owed_stop(rig: Rig, drive: Drive, moment: float) -> str:
+    """Finding on a bridge that gives way without stopping the drive's node, before its next boot-up message;
+    empty where it does."""
+    beats = rig.told.runs(BRIDGE_HEARTBEAT, moment)
+    back = min((beat.first for beat in beats if beat.data == _BOOT_UP), default=math.inf)
+    stops = [bytes((_STOP, node_id)) for node_id in (0, drive.node_id)]
+    commands = [run for run in rig.told.runs(NMT, moment) if run.first < back]
+    return "" if any(run.data in stops for run in commands) else "the bridge gave way without its NMT stop"
 
 
 def end_intruder(rig: Rig) -> None:

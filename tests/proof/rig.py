@@ -37,6 +37,7 @@ _LIMIT_S: Final = 120.0
 _FRONT_ENDS_S: Final = 10.0
 _HOUR_S: Final = 3600.0
 BRIDGE_HEARTBEAT: Final = 0x77F
+NMT: Final = 0x000
 BRIDGE: Final = "bridge"
 SIMULATION: Final = "drives"
 _SERVES: Final = {"opcua": "INFO    OPC UA on", "zenoh": "INFO    zenoh on"}
@@ -156,7 +157,7 @@ class Rig:
         self._stack.callback(self.send_guests_away)
         self.gateway.open()
         rpdos = {can_id for drive in DRIVES for can_id in (drive.rpdo, drive.number_id)}
-        self.told = Witness(BRIDGE_SIDE, sorted({*rpdos, BLOCK.rpdo, BRIDGE_HEARTBEAT}), self.clock)
+        self.told = Witness(BRIDGE_SIDE, sorted({NMT, *rpdos, BLOCK.rpdo, BRIDGE_HEARTBEAT}), self.clock)
         self.heard = Witness(BRIDGE_SIDE, _from_nodes(DRIVES), self.clock)
         self.said = Witness(DRIVE_SIDE, _from_nodes(DRIVES), self.clock)
         for witness in (self.told, self.heard, self.said):

@@ -86,6 +86,7 @@ def run_round(rig: Rig, fault: Fault, say: Callable[[str], None]) -> list[Sample
             rig.by_themselves += 1
             continue
         wrong = _wrong(rig, fault, drive, (times[0], ends.get(drive, times[1])), words[drive])
+        wrong = wrong or fault.lacks(rig, drive, moment)
         samples.append(_sample(rig, fault, drive, moment, times[1], ways.get(drive), wrong))
     held_until = undone if fault.hands_over else rig.now()
     samples += _held(rig, fault, [drive for drive in holding if drive not in still], moment, held_until)

@@ -45,7 +45,8 @@ class ModbusServer:
         self._owners = [view.image.index[f"{name}/supervision/owner"] for name in owned]
         self._allowed = [ipaddress.ip_network(network) for network in settings.allow]
         self._clock = clock
-        self._pulse = Pulse(clock)
+        self.pulse = Pulse(clock)
+        """Beat of the event loop in which its connections are read."""
         self._sessions: set[ModbusConnection] = set()
         self._admission = Admission(
             _limits(settings.max_connections), teller("Modbus"), self._count_refused, self._count_broken
@@ -76,11 +77,13 @@ class ModbusServer:
         # Connections inherit it; set later, it would not reduce the window that they begin with.
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _WINDOW)
         if is_first:
-            self._pulse.start()
-        self._server = await loop.create_server(
-            lambda: ModbusConnection(self._dispatcher, self, self._clock, self._pulse), sock=sock
-        )
+            self.pulse.start()
+        self._server = await loop.create_server(self.connection, sock=sock)
         _log.info("Modbus TCP on %s", self._settings.listen)
+
+    def connection(self) -> ModbusConnection:
+        """A connection for whoever has accepted one."""
+        return ModbusConnection(self._dispatcher, self, self._clock, self.pulse)
 
     async def failed(self) -> None:
         """Wait until nobody can connect any more, then raise ``OperationFailed``."""
@@ -92,7 +95,7 @@ class ModbusServer:
         server, self._server = self._server, None
         if server is None:
             return
-        self._pulse.stop()
+        self.pulse.stop()
         server.close()
         for session in tuple(self._sessions):
             session.close()

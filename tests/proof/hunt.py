@@ -24,6 +24,8 @@ Say = Callable[[str], None]
 _FIRST_TIMES: Final = 3
 """How often the fault is injected that is tried first: ``make proof`` injects each fault fifty times."""
 _MOST_IN_VAIN: Final = 3
+_MOST_VOID: Final = 4
+"""Rounds in which the machine was in the way, after which one counts as having found nothing."""
 PATIENCE_S: Final = 20.0
 """A plant that does not come back sooner is stuck."""
 _NONE: Final = "(none)"
@@ -65,8 +67,17 @@ def order(first: str, faults: Sequence[Fault] = FAULTS) -> Iterator[Fault]:
 
 
 def judge(rig: Rig, fault: Fault, say: Say) -> str:
-    """What one round of this fault finds; empty where it finds nothing. A plant that does not come back may
-    be the machine's doing: that counts the second time."""
+    """What one round of this fault finds; empty where it finds nothing. One in which the machine was in the
+    way has found nothing either way, and is made again."""
+    for _ in range(_MOST_VOID):
+        found = _judge_twice(rig, fault, say)
+        if found is not None:
+            return found
+    return ""
+
+
+def _judge_twice(rig: Rig, fault: Fault, say: Say) -> str | None:
+    """A plant that does not come back may be the machine's doing: that counts the second time."""
     try:
         return _judge(rig, fault, say)
     except (Stuck, AssertionError) as error:
@@ -79,7 +90,8 @@ def judge(rig: Rig, fault: Fault, say: Say) -> str:
         return str(error).splitlines()[0]
 
 
-def _judge(rig: Rig, fault: Fault, say: Say) -> str:
+def _judge(rig: Rig, fault: Fault, say: Say) -> str | None:
+    """None where nothing could be judged."""
     in_vain = len(rig.stopped_in_vain)
     try:
         samples = run_round(rig, fault, say)
@@ -92,7 +104,10 @@ def _judge(rig: Rig, fault: Fault, say: Say) -> str:
             return f"{sample.drive} ({sample.protocol}): {sample.complaint}"
     if len(rig.stopped_in_vain) - in_vain > _MOST_IN_VAIN:
         return f"{len(rig.stopped_in_vain) - in_vain} drives stopped that it does not concern"
-    return ""
+    is_void = any(sample.verdict == "void" for sample in samples)
+    # Of what is judged by yes or no, a no that the machine may have brought about is left out.
+    is_left_out = bool(fault.examine) and len(samples) < len(fault.subjects)
+    return None if is_void or is_left_out or not samples else ""
 
 
 def hunt(rig: Rig, tree: Tree, mutant: Mutant, say: Say) -> Kill:

@@ -107,8 +107,20 @@ def longest_wait_ms(folder: Path, name: str, begin: float, end: float) -> float:
 def most_waited_ms(folder: Path, name: str, begin: float, end: float, within_s: float) -> float:
     """The most that this process waited within so many seconds, from ``begin`` to ``end``, in ms."""
     lines = _lines(folder / f"{name}.waits", begin)
-    waits = [(last, waited) for first, last, waited in lines if first < end and last > begin]
-    sums = [sum(other for at, other in waits if last - within_s < at <= last) for last, _ in waits]
+    return _most_ms(
+        [(last, waited) for first, last, waited in lines if first < end and last > begin], within_s
+    )
+
+
+def most_paused_ms(folder: Path, begin: float, end: float, within_s: float) -> float:
+    """The most that the machine stood still within so many seconds, from ``begin`` to ``end``, in ms."""
+    lines = _lines(folder / "pauses", begin)
+    return _most_ms([(last, last - first) for first, last in lines if first < end and last > begin], within_s)
+
+
+def _most_ms(spans: list[tuple[float, float]], within_s: float) -> float:
+    """``spans`` are ends and lengths in seconds."""
+    sums = [sum(other for at, other in spans if last - within_s < at <= last) for last, _ in spans]
     return max(sums, default=0.0) * 1000
 
 

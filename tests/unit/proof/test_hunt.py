@@ -135,6 +135,23 @@ def test_a_drive_that_is_late_or_goes_on_is_a_finding(monkeypatch: pytest.Monkey
     assert judged(Scene(monkeypatch, ProcessLookupError())) == "the bridge has ended"
 
 
+def test_what_the_machine_was_in_the_way_of_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    void = replace(LATE, paused_ms=60.0)
+    assert void.verdict == "void"
+    late = "fan/drive (modbus): on the bus after 150 ms, 120 allowed"
+    assert judged(Scene(monkeypatch, [void], [], [LATE])) == late
+    assert judged(Scene(monkeypatch, [void], [GOOD])) == ""
+    asked = next(fault for fault in FAULTS if fault.examine and len(fault.subjects) > 1)
+    wrong = replace(GOOD, wrong="it moves")
+    scene = Scene(monkeypatch, [GOOD], [wrong])
+    assert hunt.judge(cast("Rig", scene), asked, lambda text: None) == "fan/drive (modbus): it moves"
+
+
+def test_who_is_always_in_the_way_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene(monkeypatch, *[[replace(LATE, paused_ms=60.0)] for _ in range(20)])
+    assert judged(scene) == ""
+
+
 def test_a_plant_that_does_not_come_back_is_one_the_second_time(monkeypatch: pytest.MonkeyPatch) -> None:
     once = Scene(monkeypatch, Stuck("no process data"), [GOOD])
     assert judged(once) == ""

@@ -10,7 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from tests.proof.waits import Account, follow, longest_wait_ms, most_waited_ms, paused_ms, waited_ms
+from tests.proof.waits import (
+    Account,
+    follow,
+    longest_wait_ms,
+    most_paused_ms,
+    most_waited_ms,
+    paused_ms,
+    waited_ms,
+)
 from tests.support.process import REPOSITORY
 
 
@@ -52,6 +60,14 @@ def test_pauses_count_where_they_lie_between_two_moments(tmp_path: Path) -> None
     put(tmp_path / "pauses", "0.500 0.600", "1.000 1.040", "1.100 1.150")
     assert paused_ms(tmp_path, 1.02, 1.11) == pytest.approx(30)
     assert paused_ms(tmp_path, 1.2, 1.3) == 0.0
+
+
+def test_little_pauses_of_a_long_time_do_not_add_up(tmp_path: Path) -> None:
+    put(tmp_path / "pauses", *(f"{n}.000 {n}.050" for n in range(1, 10)), "10.000 10.300", "10.400 10.500")
+    assert paused_ms(tmp_path, 0.0, 11.0) == pytest.approx(850)
+    assert most_paused_ms(tmp_path, 0.0, 10.0, 0.8) == pytest.approx(50)
+    assert most_paused_ms(tmp_path, 0.0, 11.0, 0.8) == pytest.approx(400)
+    assert most_paused_ms(tmp_path, 11.0, 12.0, 0.8) == 0.0
 
 
 def test_a_line_that_is_being_written_does_not_count(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@
 # JOBS=n      how many tests run at a time; 0 in this process, as a debugger wants  (default: CPUs)
 # FUZZ=s      how long make fuzz takes for each protocol, in seconds  (default: 600)
 # PROTOCOL=.. the one that make fuzz throws at: opcua, modbus, zenoh or can  (default: all)
-# SEED=n      a number that make fuzz has printed, to throw the same again
+# SEED=n      a number that make fuzz or make plant has printed, to do the same again
 # KNOWN=...   a regular expression: faults that make fuzz lets pass, to find others
 # REPLAY=...  a file that make fuzz has kept: throw what it has; REDUCE=1 finds the few cases that do it
 # ARGS=...    further arguments, e.g. make unit ARGS='-k watchdog -x'
@@ -139,6 +139,15 @@ FUZZ ?= 600
 fuzz: compiled ## throw changed messages at the bridge, 10 minutes for each protocol
 	@$(IN) -m tests.fuzz $(PROTOCOL) --seconds $(FUZZ) $(SEED:%=--seed %) $(REPLAY:%=--replay %) $(if $(REDUCE),--reduce) $(if $(KNOWN),--known '$(KNOWN)')
 
+# Half of the drives on each CPU. A run that fails prints its seed, and the least steps that it takes.
+PLANT_S ?= 60
+
+plant: compiled ## whole plants on one seeded clock, for a minute of each CPU, another seed each day (SEED=n, PLANT_S=s)
+	@echo "== plants on one clock"
+	@PROOF_PLANT=second $(IN) -m tests.plant --seconds $(PLANT_S) $(SEED:%=--seed %) $(ARGS) & other=$$!; \
+	  PROOF_PLANT=first $(IN) -m tests.plant --seconds $(PLANT_S) $(SEED:%=--seed %) $(ARGS); one=$$?; \
+	  wait $$other && exit $$one
+
 bench: compiled packages ## measure everything in half an hour, write docs/explanation/performance.md (ARGS='--rounds 1')
 	@$(ON_VCAN) $(IN) -m tests.bench $(if $(filter 0,$(LAB)),--no-lab) --json build/bench.json --plots docs/images docs/explanation/performance.md $(ARGS)
 
@@ -235,5 +244,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
+.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short plant bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
   check-imports format docs setup lock wheel clean help

@@ -1,0 +1,1 @@
+"""Whole plants on one seeded clock: ``make plant``."""

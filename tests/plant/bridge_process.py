@@ -1,0 +1,189 @@
+"""The bridge of a plant: the cores of the real bus process, put together as ``bridge.service.bus_process``
+does, in a process that may stand still or end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from random import Random
+
+from bridge.catalogue import Catalogue
+from bridge.command import Event, Identity, Outcome, Plant, PlantView, Request
+from bridge.image import Quality
+from bridge.lint import lint
+from bridge.lint.own import WorstCase
+from bridge.master.master import Master
+from bridge.master.network import Network
+from bridge.master.standby import Standby, listen_s
+from bridge.northbound.modbus.server import ModbusServer
+from bridge.northbound.modbus.units import units_of
+from bridge.project import Project
+from tests.plant.machine import Process, Watcher
+from tests.plant.stream import Stream
+from tests.plant.wire import PlantBus, Wire
+from tests.plant.world import Timer, World
+
+
+class Bridge:
+    """One bridge on its wires. ``start`` begins a new process; what listens to it stays."""
+
+    def __init__(
+        self, world: World, project: Project, wires: Mapping[str, Wire], name: str, rng: Random
+    ) -> None:
+        self._world = world
+        self._project = project
+        self._catalogue = Catalogue.of(project.site, project.families)
+        self._worst_cases: list[WorstCase] = list(
+            lint(project.site, project.families, project.path, project.downloads).worst_cases
+        )
+        self._wires = wires
+        self._name = name
+        self._rng = rng
+        self._buses: list[PlantBus] = []
+        self._timer: Timer | None = None
+        self._streams: list[Stream] = []
+        self._ports = 0
+        self.on_event: list[Callable[[Event], None]] = []
+        self.on_start: list[Callable[[], None]] = []
+        self.watchers: list[Watcher] = []
+        self.process = self._begin()
+
+    # life
+
+    def _begin(self) -> Process:
+        """A process with everything in it, as after ``drivebridge run``."""
+        world = self._world
+        process = self.process = Process(world, self)
+        self.plant = Plant(self._catalogue, "0", world.now)
+        self.plant.on_event(self._tell)
+        self._buses = [
+            PlantBus(world, self._wires[table.name], process, self._name) for table in self._project.site.bus
+        ]
+        networks = [
+            Network(
+                table,
+                self.plant.side_of(table),
+                world.epoch_ns,
+                self._project.downloads,
+                Standby(listen_s(table), self._rng.random),
+            )
+            for table in self._project.site.bus
+        ]
+        self.networks = networks
+        self.master = Master(list(zip(self._buses, networks, strict=True)), self.plant, process.clock)
+        self.view = PlantView(
+            self.plant, process.clock, world.epoch_ns, self.master.carry_out, self.master.wake
+        )
+        self.modbus = None
+        if self._project.site.modbus:
+            units = units_of(self._catalogue)
+            self.modbus = ModbusServer(self.view, units, self._project.site.modbus, process.clock)
+        process.post(self._start)
+        return process
+
+    def _start(self) -> None:
+        commanded = {one.name: one for node in self.plant.nodes.values() for one in node.commanded}
+        for case in self._worst_cases:
+            commanded[case.drive].on_wire(case.wire, self._world.now)
+        if self.modbus:
+            self.modbus.pulse.start()
+        for bus in self._buses:
+            bus.open(self.master.on_bus)
+        self.master.attach(self._arm)
+        self.master.wake()
+        for tell in self.on_start:
+            tell()
+
+    def _arm(self, at: float) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._world.at(at, lambda: self.process.post(self.master.on_bus))
+
+    def on_still(self, now: float) -> None:
+        for watcher in self.watchers:
+            watcher.on_still(now)
+
+    def on_going_on(self, since: float, now: float) -> None:
+        for watcher in self.watchers:
+            watcher.on_going_on(since, now)
+
+    def on_end(self, now: float) -> None:
+        """The kernel closes what the process had open."""
+        if self._timer is not None:
+            self._timer.cancel()
+        for bus in self._buses:
+            bus.end_kernel()
+        streams, self._streams = self._streams, []
+        for stream in streams:
+            stream.reset()
+        for watcher in self.watchers:
+            watcher.on_end(now)
+
+    def restart(self) -> None:
+        """Another process in place of one that has ended."""
+        assert self.process.is_dead
+        self._begin()
+
+    def _tell(self, event: Event) -> None:
+        self._world.tell(f"{self._name} {event.kind} {event.source} {event.severity} {event.text}")
+        for tell in self.on_event:
+            tell(event)
+
+    # who asks
+
+    def connect(
+        self,
+        host: str,
+        delay_s: float,
+        *,
+        take: Callable[[bytes], None],
+        on_closed: Callable[[], None],
+    ) -> Stream | None:
+        """A Modbus connection; None where nobody listens."""
+        if self.process.is_dead or self.modbus is None:
+            return None
+        self._ports += 1
+        peer = host, 40_000 + self._ports
+        stream = Stream(
+            self._world,
+            self.process,
+            self.modbus.connection(),
+            peer,
+            delay_s,
+            take=take,
+            on_closed=on_closed,
+        )
+        self._streams.append(stream)
+        return stream
+
+    def ask(
+        self,
+        request: Request,
+        delay_s: float,
+        arrived: Callable[[], None],
+        reply: Callable[[Outcome], None],
+    ) -> None:
+        """A request of a client of OPC UA or zenoh, as its server submits it. ``reply`` is called when the
+        outcome is given. One that dies with the process has none."""
+
+        def arrive() -> None:
+            if not self.process.is_dead:
+                arrived()
+            self.process.post(lambda: self.view.submit(request, reply))
+
+        self._world.after(delay_s, arrive)
+
+    def connected(self, identity: Identity, *, is_there: bool) -> None:
+        process = self.process
+        process.post(lambda: self.view.on_connection(identity, is_there=is_there))
+
+    # what is done to it
+
+    @property
+    def buses(self) -> list[PlantBus]:
+        return self._buses
+
+    def good_number(self, name: str) -> float | None:
+        """Value of a point that is a number, and good."""
+        reading = self.plant.image.read(name)
+        is_number = reading.quality is Quality.GOOD and isinstance(reading.value, int | float)
+        return reading.value if is_number else None  # type: ignore[return-value]

@@ -1,0 +1,204 @@
+"""A process of a simulated machine: one thread, whose turns come one after the other, and which may stand
+still or end at any look at its clock."""
+
+from __future__ import annotations
+
+import asyncio
+import contextvars
+import traceback
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from math import inf
+from typing import Any, Protocol
+
+from tests.plant.world import Act, World
+
+
+class DeadError(BaseException):
+    """The process is gone: nothing in it may catch this."""
+
+
+class Watcher(Protocol):
+    """Who is told what becomes of a process."""
+
+    def on_still(self, now: float) -> None: ...
+
+    def on_going_on(self, since: float, now: float) -> None: ...
+
+    def on_end(self, now: float) -> None: ...
+
+
+class Process:
+    """While it stands still its turns wait, and come in their order when it goes on, as those of an event
+    loop do."""
+
+    def __init__(self, world: World, watcher: Watcher) -> None:
+        self._world = world
+        self._watcher = watcher
+        self._waiting: deque[Act] = deque()
+        self._is_busy = self._is_still = False
+        self.is_dead = False
+        self._pause_s = 0.0
+        """Length of the pause that begins at the next look at the clock; ``inf`` ends the process there."""
+        self.loop = ProcessLoop(self, world)
+        self.still_since = inf
+        """When it began to stand still; infinite while it does not."""
+
+    def clock(self) -> float:
+        seen = self._world.now
+        if self._pause_s:
+            pause_s, self._pause_s = self._pause_s, 0.0
+            self._stand_still(pause_s)
+        return seen
+
+    def post(self, act: Act) -> None:
+        """Have ``act`` done in a turn: now, or when those before it are over."""
+        if self.is_dead:
+            return
+        self._waiting.append(act)
+        if not (self._is_busy or self._is_still):
+            self._work()
+
+    def _work(self) -> None:
+        self._is_busy = True
+        before = asyncio._get_running_loop()
+        try:
+            while self._waiting and not self.is_dead:
+                act = self._waiting.popleft()
+                asyncio._set_running_loop(self.loop)
+                self._do(act)
+        except DeadError:
+            self._end()
+        finally:
+            asyncio._set_running_loop(before)
+            self._is_busy = False
+
+    def _do(self, act: Act) -> None:
+        """As an event loop does: what fails is noted, and the next turn comes."""
+        try:
+            act()
+        except Exception as error:  # noqa: BLE001 - it is a finding
+            self.loop.faults.append("".join(traceback.format_exception(error)))
+
+    # what is done to it
+
+    def hang(self, seconds: float, *, in_turn: bool) -> None:
+        """Stop it for so long: now, between two turns, or at its next look at the clock."""
+        if self.is_dead:
+            return
+        if in_turn:
+            self._pause_s = seconds
+        elif not (self._is_busy or self._is_still):
+            self._is_still = True
+            self._begin_pause()
+            self._world.after(seconds, self._go_on)
+
+    def kill(self, *, in_turn: bool) -> None:
+        if in_turn:
+            self._pause_s = inf
+        else:
+            self._end()
+
+    def _go_on(self) -> None:
+        if not self.is_dead:
+            self._is_still = False
+            self._end_pause()
+            self._work()
+
+    def _begin_pause(self) -> None:
+        self.still_since = self._world.now
+        self._watcher.on_still(self._world.now)
+
+    def _end_pause(self) -> None:
+        since, self.still_since = self.still_since, inf
+        if not self.is_dead:
+            self._watcher.on_going_on(since, self._world.now)
+
+    def _stand_still(self, seconds: float) -> None:
+        """In the middle of a turn."""
+        if seconds == inf:
+            raise DeadError
+        running = asyncio._get_running_loop()
+        asyncio._set_running_loop(None)
+        self._begin_pause()
+        self._world.run_until(self._world.now + seconds)
+        self._end_pause()
+        asyncio._set_running_loop(running)
+        if self.is_dead:
+            raise DeadError
+
+    def _end(self) -> None:
+        if self.is_dead:
+            return
+        self.is_dead = True
+        self._waiting.clear()
+        self._watcher.on_end(self._world.now)
+
+
+class _Handle(asyncio.TimerHandle):
+    """A turn that is to come."""
+
+    def __init__(
+        self, when: float, call: Callable[..., object], args: tuple[Any, ...], loop: ProcessLoop
+    ) -> None:
+        self._act = partial(contextvars.copy_context().run, call, *args)
+        super().__init__(when, call, args, loop)
+
+    def run(self) -> None:
+        """Not by ``_run``, which keeps what it raises to itself: the end of the process, too."""
+        if not self.cancelled():
+            self._act()
+
+
+class ProcessLoop(asyncio.AbstractEventLoop):
+    """As much of an event loop as the bridge's servers ask for, on the clock of the plant."""
+
+    def __init__(self, process: Process, world: World) -> None:
+        self._process = process
+        self._world = world
+        self.faults: list[str] = []
+        """What was raised where only an event loop hears of it."""
+
+    def time(self) -> float:
+        return self._world.now
+
+    def get_debug(self) -> bool:
+        return False
+
+    def is_running(self) -> bool:
+        return True
+
+    def is_closed(self) -> bool:
+        return False
+
+    def call_soon(  # type: ignore[override]
+        self, callback: Callable[..., object], *args: Any, context: contextvars.Context | None = None
+    ) -> asyncio.TimerHandle:
+        return self.call_at(self._world.now, callback, *args)
+
+    def call_later(  # type: ignore[override]
+        self,
+        delay: float,
+        callback: Callable[..., object],
+        *args: Any,
+        context: contextvars.Context | None = None,
+    ) -> asyncio.TimerHandle:
+        return self.call_at(self._world.now + delay, callback, *args)
+
+    def call_at(  # type: ignore[override]
+        self,
+        when: float,
+        callback: Callable[..., object],
+        *args: Any,
+        context: contextvars.Context | None = None,
+    ) -> asyncio.TimerHandle:
+        handle = _Handle(when, callback, args, self)
+        self._world.at(when, lambda: self._process.post(handle.run))
+        return handle
+
+    def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
+        """A turn that was cancelled does nothing."""
+
+    def call_exception_handler(self, context: dict[str, Any]) -> None:
+        self.faults.append(f"{context.get('message')}: {context.get('exception')!r}")

@@ -1,0 +1,89 @@
+"""What happens to a plant, drawn from one seed: a list of steps, each of which can be left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from random import Random
+from typing import Final, NamedTuple
+
+from tests.proof.drives import DRIVES
+from tests.proof.settings import PLANT
+
+_FIRST_S: Final = 8.0
+"""By then every node is booted and every drive moves."""
+_LAST_S: Final = 12.0
+"""So long nothing is done at the end."""
+_STOPS: Final = ("stop", "quick_stop", "disable_voltage")
+_NODES: Final = len({drive.node for drive in DRIVES})
+
+
+class Step(NamedTuple):
+    """At ``at`` seconds from the beginning; ``what`` is one of ``KINDS``. The other fields mean what its kind
+    says, and nothing where it has no use for them."""
+
+    at: float
+    what: str
+    which: int = 0
+    """Drive or node by its place, or a number of another kind."""
+    seconds: float = 0.0
+    how: str = ""
+
+
+class Plan(NamedTuple):
+    """``seed`` decides what no step does: losses on a noisy bus, when a bridge that was passive acts."""
+
+    seed: int
+    seconds: float
+    steps: tuple[Step, ...]
+
+
+Draw = Callable[[Random], tuple[int, float, str]]
+"""``which``, ``seconds`` and ``how`` of a step."""
+
+
+def _drive(rng: Random) -> int:
+    return rng.randrange(len(DRIVES))
+
+
+def _around(rng: Random, *bounds_ms: float) -> float:
+    """Seconds that lie about one of these times, on either side, or anywhere below the longest."""
+    if rng.random() < 0.3:
+        return rng.uniform(0.0, 1.5 * max(bounds_ms)) / 1000
+    return max(0.001, rng.choice(bounds_ms) * rng.uniform(0.8, 1.25) / 1000)
+
+
+KINDS: Final[dict[str, Draw]] = {
+    "controller silent": lambda rng: (_drive(rng), _around(rng, PLANT.fieldbus_timeout_ms, 5000), ""),
+    "all controllers silent": lambda rng: (0, _around(rng, PLANT.fieldbus_timeout_ms, 5000), ""),
+    "controller crashed": lambda rng: (_drive(rng), _around(rng, PLANT.fieldbus_timeout_ms, 5000), ""),
+    "half open": lambda rng: (_drive(rng), _around(rng, PLANT.fieldbus_timeout_ms, 5000), ""),
+    "release": lambda rng: (_drive(rng), rng.uniform(0.1, 3.0), ""),
+    "jog": lambda rng: (_drive(rng), rng.uniform(3.0, 10.0), ""),
+    "acknowledges": lambda rng: (_drive(rng), rng.uniform(3.0, 10.0), ""),
+    "stop": lambda rng: (_drive(rng), 0.0, rng.choice(_STOPS)),
+    "stranger": lambda rng: (_drive(rng), rng.uniform(0.2, 5.0), rng.choice(("elsewhere", "same host"))),
+    "backlog": lambda rng: (_drive(rng), rng.uniform(2.0, 6.0), ""),
+    "hang": lambda rng: (0, _around(rng, PLANT.deadman_ms, 1000), rng.choice(("in a turn", "between turns"))),
+    "kill": lambda rng: (0, rng.uniform(0.05, 4.0), rng.choice(("in a turn", "between turns"))),
+    "bus off": lambda rng: (0, rng.uniform(0.02, 2.0), ""),
+    "bus cut": lambda rng: (0, _around(rng, PLANT.heartbeat_ms, 3000), ""),
+    "noise": lambda rng: (0, rng.uniform(0.5, 5.0), rng.choice(("0.01", "0.1", "0.5"))),
+    "node reset": lambda rng: (rng.randrange(_NODES), 0.0, ""),
+    "node silent": lambda rng: (rng.randrange(_NODES), _around(rng, PLANT.heartbeat_ms, 3000), ""),
+    "clock stepped": lambda rng: (0, rng.uniform(-3600.0, 3600.0), ""),
+}
+"""What can happen, and how it is drawn."""
+
+
+def plan_of(seed: int, seconds: float, each_s: float = 4.0) -> Plan:
+    """A plan with a step each ``each_s`` seconds in the mean, alone and in bunches."""
+    rng = Random(seed)
+    steps: list[Step] = []
+    at = _FIRST_S
+    while (at := at + rng.expovariate(1 / (2 * each_s))) < seconds - _LAST_S:
+        for _ in range(rng.choice((1, 1, 2, 2, 4))):
+            what = rng.choice(tuple(KINDS))
+            which, length_s, how = KINDS[what](rng)
+            begins = round(at + rng.uniform(0.0, rng.choice((0.05, 0.5, 3.0))), 4)
+            steps.append(Step(begins, what, which, round(length_s, 4), how))
+    return Plan(seed, seconds, tuple(sorted(steps)))

@@ -1,0 +1,287 @@
+"""A plant: the bridge, its drives and their controllers on one clock, and an oracle that sees all of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import Final
+
+from bridge.can.interface import ControllerState
+from bridge.canopen.frame import Frame
+from bridge.cli.simulation import simulated_nodes
+from bridge.command import Outcome
+from bridge.project import Project, load_project
+from tests.plant.bridge_process import Bridge
+from tests.plant.clients import Controller, Operator, Stranger
+from tests.plant.field import FieldNode
+from tests.plant.oracle import Oracle
+from tests.plant.plan import Plan, Step
+from tests.plant.wire import Port, Wire
+from tests.plant.world import BEGIN_S, World
+from tests.proof.drives import DRIVES, Drive, write_site
+from tests.proof.settings import PLANT
+
+_BITRATE: Final = 1_000_000
+_LOOK_S: Final = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """End of a run. ``counts`` is how often each kind of step was there, ``frames`` what was on the wire, and
+    ``moved`` how many of the drives moved at the end."""
+
+    plan: Plan
+    violations: list[str]
+    hash: str
+    frames: int
+    looks: int
+    moved: int
+    counts: Counter[str]
+    log: list[str]
+
+
+def project(folder: Path) -> Project:
+    """The site of this run's plant, written to ``folder``."""
+    for name in ("state", "run"):
+        (folder / name).mkdir(exist_ok=True)
+    return load_project(write_site(folder / "site.toml", "can0", folder / "state", folder / "run"))
+
+
+class Plant:
+    def __init__(self, project: Project, plan: Plan, *, logs: bool = False) -> None:
+        self.world = World()
+        self.world.log = [] if logs else None
+        self.plan = plan
+        table = project.site.bus[0]
+        self.wire = Wire(self.world, table.name, _BITRATE, Random(f"{plan.seed} wire"))
+        self.wire.witness.append(self._on_frame)
+        self.oracle = Oracle(list(DRIVES))
+        self.nodes = [
+            FieldNode(self.world, self.wire, device) for device in simulated_nodes(table, project.path)
+        ]
+        self.bridge = Bridge(
+            self.world, project, {table.name: self.wire}, "one", Random(f"{plan.seed} bridge")
+        )
+        self.bridge.on_start.append(self._on_start)
+        self.bridge.watchers += [self.oracle, self]
+        self.controllers = [Controller(self.world, self.bridge, drive, self._on_telegram) for drive in DRIVES]
+        self.operator = Operator(self.world, self.bridge)
+        for node in self.nodes:
+            node.power_on()
+        self.counts: Counter[str] = Counter()
+        self._silent_since = BEGIN_S
+        self._down_s = 0.0
+        for step in plan.steps:
+            self.world.at(BEGIN_S + step.at, self._doing(step))
+        self.world.after(_LOOK_S, self._look)
+
+    def run(self) -> Result:
+        self.world.run_until(BEGIN_S + self.plan.seconds)
+        moved = sum(self._moves(drive) for drive in DRIVES)
+        return Result(
+            self.plan,
+            self.oracle.violations + self.bridge.process.loop.faults,
+            self.world.hash,
+            self.wire.frames,
+            self.oracle.looks,
+            moved,
+            self.counts,
+            self.world.log or [],
+        )
+
+    def _moves(self, drive: Drive) -> bool:
+        track = self.oracle.tracks[drive]
+        mask, value = drive.family.enabled
+        return bool(track.said) and track.said[-1][1] & mask == value
+
+    # what the oracle is told
+
+    def _on_frame(self, frame: Frame, sender: Port) -> None:
+        of_bridge = sender.name.startswith("bridge")
+        self.world.tell(f"{sender.name} {frame!r}")
+        self.oracle.frame(frame.time, frame.can_id, frame.data, of_bridge=of_bridge)
+
+    def _on_telegram(self, drive: Drive, word: int) -> None:
+        self.oracle.telegram(drive, self.world.now, word)
+
+    def _on_start(self) -> None:
+        self.oracle.started()
+
+    def on_still(self, now: float) -> None:
+        self._silent_since = now
+
+    def on_going_on(self, since: float, now: float) -> None:
+        """It is judged by its frames."""
+
+    def on_end(self, now: float) -> None:
+        self._silent_since = now
+        self.world.after(self._down_s, self.bridge.restart)
+
+    def _look(self) -> None:
+        self.world.after(_LOOK_S, self._look)
+        process = self.bridge.process
+        now = self.world.now
+        if process.is_dead or process.still_since < now:
+            for drive in DRIVES:
+                self.oracle.dead_for(drive, self._silent_since, now)
+            return
+        for drive in DRIVES:
+            at = f"{drive.path}/supervision"
+            self.oracle.published(
+                drive,
+                self.bridge.good_number(f"{at}/worst_case_stop_ms"),
+                self.bridge.good_number(f"{at}/worst_case_bridge_ms"),
+            )
+            word = self.bridge.good_number(f"{drive.path}/status/drive_status_word")
+            if word is not None:
+                self.oracle.value(drive, now, int(word))
+
+    # what happens
+
+    def _doing(self, step: Step) -> Callable[[], None]:
+        def do() -> None:
+            self.counts[step.what] += 1
+            self.world.tell(f"step {step.what} {step.which} {step.seconds} {step.how}")
+            _STEPS[step.what](self, step)
+
+        return do
+
+    def _controller(self, step: Step) -> Controller:
+        return self.controllers[step.which % len(self.controllers)]
+
+    def silence_controller(self, step: Step) -> None:
+        controller = self._controller(step)
+        controller.is_silent = True
+        self.world.after(step.seconds, controller.start)
+
+    def silence_all(self, step: Step) -> None:
+        for controller in self.controllers:
+            controller.is_silent = True
+            self.world.after(step.seconds, controller.start)
+
+    def crash_controller(self, step: Step) -> None:
+        controller = self._controller(step)
+        controller.crash()
+        self.oracle.left(controller.drive)
+        self.world.after(step.seconds, controller.start)
+
+    def half_open(self, step: Step) -> None:
+        """Nothing gets through between the controller's machine and ours, and nobody is told."""
+        controller = self._controller(step)
+        stream = controller.line.stream if controller.line else None
+        if stream is None:
+            self.silence_controller(step)
+            return
+        stream.is_cut = True
+        self.world.after(step.seconds, stream.mend)
+
+    def release(self, step: Step) -> None:
+        controller = self._controller(step)
+        controller.is_silent = True
+        controller.release()
+        self.oracle.left(controller.drive)
+        self.world.after(step.seconds, controller.start)
+
+    def jog(self, step: Step) -> None:
+        controller = self._controller(step)
+        controller.pauses = True
+        self.world.after(step.seconds, lambda: setattr(controller, "pauses", False))
+
+    def acknowledge_always(self, step: Step) -> None:
+        controller = self._controller(step)
+        controller.acknowledges_always = True
+        self.world.after(step.seconds, lambda: setattr(controller, "acknowledges_always", False))
+
+    def stop(self, step: Step) -> None:
+        drive = DRIVES[step.which % len(DRIVES)]
+
+        def answered(came: float, outcome: Outcome) -> None:
+            self.world.tell(f"{drive.path} {step.how} answered {outcome.code} {outcome.forwarded}")
+            if outcome.ok:
+                self.oracle.stop_answered(drive, came, self.world.now)
+
+        self.operator.stop(drive, step.how, answered)
+
+    def stranger(self, step: Step) -> None:
+        drive = DRIVES[step.which % len(DRIVES)]
+        is_same = step.how == "same host" and drive.protocol == "modbus"
+        host = f"127.0.1.{10 + drive.place}" if is_same else "192.168.1.200"
+        stranger = Stranger(self.world, self.bridge, drive, host)
+        self.world.after(step.seconds, stranger.leave)
+
+    def backlog(self, step: Step) -> None:
+        """A controller writes ahead while the bridge stands still for a moment, and hangs."""
+        controller = self._controller(step)
+        self._hang(PLANT.short_s, in_turn=False)
+        controller.write_ahead(100)
+        self.world.after(step.seconds, controller.start)
+
+    def hang(self, step: Step) -> None:
+        self._hang(step.seconds, in_turn=step.how == "in a turn")
+
+    def _hang(self, seconds: float, *, in_turn: bool) -> None:
+        self.bridge.process.hang(seconds, in_turn=in_turn)
+
+    def kill(self, step: Step) -> None:
+        if not self.bridge.process.is_dead:
+            self._down_s = step.seconds
+            self.bridge.process.kill(in_turn=step.how == "in a turn")
+
+    def bus_off(self, step: Step) -> None:
+        now = self.world.now
+        for bus in self.bridge.buses:
+            bus.enter(ControllerState.BUS_OFF)
+        self.oracle.bus_off(now)
+        buses = list(self.bridge.buses)
+
+        def back() -> None:
+            for bus in buses:
+                bus.enter(ControllerState.OK)
+
+        self.world.after(step.seconds, back)
+
+    def cut(self, step: Step) -> None:
+        self.wire.is_cut = True
+        self.world.after(step.seconds, lambda: setattr(self.wire, "is_cut", False))
+
+    def noise(self, step: Step) -> None:
+        self.wire.loss = float(step.how)
+        self.world.after(step.seconds, lambda: setattr(self.wire, "loss", 0.0))
+
+    def reset_node(self, step: Step) -> None:
+        node = self.nodes[step.which % len(self.nodes)]
+        node.device.power_cycle()
+        node.serve()
+
+    def silence_node(self, step: Step) -> None:
+        node = self.nodes[step.which % len(self.nodes)]
+        node.speaks = False
+        self.world.after(step.seconds, lambda: setattr(node, "speaks", True))
+
+    def step_clock(self, step: Step) -> None:
+        self.world.wall_step_s += step.seconds
+
+
+_STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
+    "controller silent": Plant.silence_controller,
+    "all controllers silent": Plant.silence_all,
+    "controller crashed": Plant.crash_controller,
+    "half open": Plant.half_open,
+    "release": Plant.release,
+    "jog": Plant.jog,
+    "acknowledges": Plant.acknowledge_always,
+    "stop": Plant.stop,
+    "stranger": Plant.stranger,
+    "backlog": Plant.backlog,
+    "hang": Plant.hang,
+    "kill": Plant.kill,
+    "bus off": Plant.bus_off,
+    "bus cut": Plant.cut,
+    "noise": Plant.noise,
+    "node reset": Plant.reset_node,
+    "node silent": Plant.silence_node,
+    "clock stepped": Plant.step_clock,
+}

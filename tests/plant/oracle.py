@@ -64,6 +64,8 @@ class Track:
     """When its controller's last telegram came."""
     is_owned: bool = False
     """Its controller's setpoint was on the wire, and it has not gone since."""
+    left_at: float = -inf
+    """When it went: until its next telegram the bus goes on with what it has said."""
     is_strangers: bool = False
     """The last setpoint on the wire was a stranger's, who has taken it over in a time without an owner."""
     is_acknowledged: bool = False
@@ -172,9 +174,10 @@ class Oracle:
         for track in self.tracks.values():
             track.is_owned = False
 
-    def left(self, drive: Drive) -> None:
+    def left(self, drive: Drive, at: float) -> None:
         """Its controller has released it, or has ended its connection."""
-        self.tracks[drive].is_owned = False
+        track = self.tracks[drive]
+        track.is_owned, track.left_at = False, at
 
     def bus_off(self, at: float) -> None:
         """The bridge's controller sends nothing. A bridge that stands still does not see it, and its bursts
@@ -210,7 +213,7 @@ class Oracle:
         is_there = track.is_owned and at <= track.last_at + PLANT.fieldbus_timeout_ms / 1000
         if track.is_strangers and is_there:
             self._wrong(at, f"{drive.path} got the setpoint of a stranger: {data.hex()}")
-        track.is_owned = not track.is_strangers
+        track.is_owned = not track.is_strangers and track.last_at > track.left_at
 
     def _command(self, track: Track, at: float, data: bytes) -> None:
         drive = track.drive

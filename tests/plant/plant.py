@@ -165,7 +165,7 @@ class Plant:
     def crash_controller(self, step: Step) -> None:
         controller = self._controller(step)
         controller.crash()
-        self.oracle.left(controller.drive)
+        self.oracle.left(controller.drive, self.world.now)
         self.world.after(step.seconds, controller.start)
 
     def half_open(self, step: Step) -> None:
@@ -182,7 +182,7 @@ class Plant:
         controller = self._controller(step)
         controller.is_silent = True
         controller.release()
-        self.oracle.left(controller.drive)
+        self.oracle.left(controller.drive, self.world.now)
         self.world.after(step.seconds, controller.start)
 
     def jog(self, step: Step) -> None:

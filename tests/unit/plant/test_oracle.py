@@ -114,8 +114,16 @@ def test_a_stranger_has_no_setpoint(scene: Scene) -> None:
 
 
 def test_who_takes_over_a_drive_without_an_owner_is_none(scene: Scene) -> None:
-    scene.oracle.left(DRIVE)
+    scene.oracle.left(DRIVE, 1010.0)
+    assert not scene.sees(1010.05)
     assert not scene.sees(1010.1, setpoint=FAMILY.setpoint + NUMBERS)
+
+
+def test_who_has_come_back_owns_it_with_the_next_telegram(scene: Scene) -> None:
+    scene.oracle.left(DRIVE, 1010.0)
+    scene.tell(1010.1, FAMILY.run)
+    scene.sees(1010.2)
+    assert "setpoint of a stranger" in scene.sees(1010.3, setpoint=FAMILY.setpoint + NUMBERS)
 
 
 def test_a_bus_that_was_off_lets_nothing_go_on(scene: Scene) -> None:

@@ -112,6 +112,9 @@ class Oracle:
         """How many frames and values were judged."""
         self._still_since = inf
         self._deadman_s = PLANT.deadman_ms / 1000
+        self._late_at = -inf
+        """When the bridge went on after a pause that it may have taken for a hang, which ends all time-outs:
+        it counts from its last round."""
 
     def _wrong(self, at: float, text: str) -> None:
         self.violations.append(f"{at - 1000.0:.3f} s: {text}")
@@ -129,8 +132,9 @@ class Oracle:
         if drive.reaction != "hold" and track.last_at > -inf:
             silent_s = at - track.last_at
             timeout_s = PLANT.fieldbus_timeout_ms / 1000
-            if silent_s > timeout_s + _GRAIN_S and track.enabled_at >= track.last_at:
-                # It was enabled by the last one: so it has tripped, whatever it gets now.
+            was_running = track.enabled_at >= track.last_at > self._late_at
+            if silent_s > timeout_s + _GRAIN_S and was_running:
+                # So it has tripped, whatever it gets now.
                 trip = track.last_at + timeout_s
                 self._interrupt(track, trip, track.last_at + track.worst_s, "its controller was silent", True)
         track.take(Telegram(at, word))
@@ -154,6 +158,8 @@ class Oracle:
 
     def on_going_on(self, since: float, now: float) -> None:
         self._still_since = inf
+        if now - since > self._deadman_s / 2:
+            self._late_at = now
         if now - since > self._deadman_s:
             self.interrupted(since, now + _WIRE_S, "the bridge hung")
             self._forget_owners()

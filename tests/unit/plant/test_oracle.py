@@ -95,6 +95,15 @@ def test_a_short_hang_is_none(scene: Scene) -> None:
     assert not scene.sees(1010.1 + DEAD_S / 2)
 
 
+def test_a_pause_that_may_have_been_a_hang_may_have_ended_a_trip(scene: Scene) -> None:
+    scene.oracle.on_still(1010.0)
+    scene.oracle.on_going_on(1010.0, 1010.0 + DEAD_S * 0.99)
+    late = 1010.0 + TIMEOUT_S + 0.5
+    scene.tell(late, FAMILY.ready)
+    scene.tell(late + 0.1, FAMILY.run)
+    assert not scene.sees(late + 0.2)
+
+
 def test_a_killed_bridge_is_silent_at_once(scene: Scene) -> None:
     scene.oracle.on_end(1010.0)
     assert "the bridge was killed" in scene.sees(1010.1)

@@ -45,6 +45,8 @@ class Bridge:
         self.on_event: list[Callable[[Event], None]] = []
         self.on_start: list[Callable[[], None]] = []
         self.watchers: list[Watcher] = []
+        self.faults: list[str] = []
+        """What has failed in any of its processes."""
         self.process = self._begin()
 
     # life
@@ -52,7 +54,7 @@ class Bridge:
     def _begin(self) -> Process:
         """A process with everything in it, as after ``drivebridge run``."""
         world = self._world
-        process = self.process = Process(world, self)
+        process = self.process = Process(world, self, self.faults)
         self.plant = Plant(self._catalogue, "0", world.now)
         self.plant.on_event(self._tell)
         self._buses = [
@@ -68,7 +70,6 @@ class Bridge:
             )
             for table in self._project.site.bus
         ]
-        self.networks = networks
         self.master = Master(list(zip(self._buses, networks, strict=True)), self.plant, process.clock)
         self.view = PlantView(
             self.plant, process.clock, world.epoch_ns, self.master.carry_out, self.master.wake
@@ -114,7 +115,7 @@ class Bridge:
             bus.end_kernel()
         streams, self._streams = self._streams, []
         for stream in streams:
-            stream.reset()
+            stream.close()
         for watcher in self.watchers:
             watcher.on_end(now)
 

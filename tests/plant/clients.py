@@ -116,7 +116,6 @@ class Controller:
         self._place = 0
         self._cycles = 0
         self._moves = False
-        self.refused = 0
         self.line: Line | None = None
         if drive.protocol == "modbus":
             self.line = Line(world, bridge, f"127.0.1.{10 + drive.place}", self._on_bytes)
@@ -162,7 +161,7 @@ class Controller:
         self._number = (self._number + 1) % NUMBERS
         setpoint = self.drive.family.setpoint + self._number
         if self.line is not None:
-            self.line.ask(self.drive.unit, writes(0, word, setpoint), self._on_written)
+            self.line.ask(self.drive.unit, writes(0, word, setpoint))
             self.line.ask(self.drive.unit, _READ.pack(_READ_INPUT, *_STATUS), self._on_status)
             return
         values = {"control_word": word, "setpoint_1": setpoint}
@@ -177,14 +176,10 @@ class Controller:
             if pdu[0] == _WRITE_HOLDING and _WRITE.unpack_from(pdu)[1] == 0:
                 self._arrived(self.drive, struct.unpack_from(">H", pdu, _WRITE.size)[0])
 
-    def _on_written(self, pdu: bytes) -> None:
-        self.refused += bool(pdu[0] & _EXCEPTION)
-
     def _on_status(self, pdu: bytes) -> None:
         self._moves = not pdu[0] & _EXCEPTION and self._enabled(struct.unpack_from(">H", pdu, 2)[0])
 
     def _on_outcome(self, outcome: Outcome) -> None:
-        self.refused += not outcome.ok
         word = self._bridge.good_number(f"{self.drive.path}/status/drive_status_word")
         self._moves = word is not None and self._enabled(int(word))
 

@@ -33,15 +33,17 @@ class Process:
     """While it stands still its turns wait, and come in their order when it goes on, as those of an event
     loop do."""
 
-    def __init__(self, world: World, watcher: Watcher) -> None:
+    def __init__(self, world: World, watcher: Watcher, faults: list[str]) -> None:
+        """``faults`` gets what fails in its turns."""
         self._world = world
         self._watcher = watcher
+        self._faults = faults
         self._waiting: deque[Act] = deque()
         self._is_busy = self._is_still = False
         self.is_dead = False
         self._pause_s = 0.0
         """Length of the pause that begins at the next look at the clock; ``inf`` ends the process there."""
-        self.loop = ProcessLoop(self, world)
+        self.loop = ProcessLoop(self, world, faults)
         self.still_since = inf
         """When it began to stand still; infinite while it does not."""
 
@@ -79,7 +81,7 @@ class Process:
         try:
             act()
         except Exception as error:  # noqa: BLE001 - it is a finding
-            self.loop.faults.append("".join(traceback.format_exception(error)))
+            self._faults.append("".join(traceback.format_exception(error)))
 
     # what is done to it
 
@@ -154,11 +156,11 @@ class _Handle(asyncio.TimerHandle):
 class ProcessLoop(asyncio.AbstractEventLoop):
     """As much of an event loop as the bridge's servers ask for, on the clock of the plant."""
 
-    def __init__(self, process: Process, world: World) -> None:
+    def __init__(self, process: Process, world: World, faults: list[str]) -> None:
+        """``faults`` gets what was raised where only an event loop hears of it."""
         self._process = process
         self._world = world
-        self.faults: list[str] = []
-        """What was raised where only an event loop hears of it."""
+        self._faults = faults
 
     def time(self) -> float:
         return self._world.now
@@ -201,4 +203,4 @@ class ProcessLoop(asyncio.AbstractEventLoop):
         """A turn that was cancelled does nothing."""
 
     def call_exception_handler(self, context: dict[str, Any]) -> None:
-        self.faults.append(f"{context.get('message')}: {context.get('exception')!r}")
+        self._faults.append(f"{context.get('message')}: {context.get('exception')!r}")

@@ -83,7 +83,7 @@ class Plant:
         moved = sum(self._moves(drive) for drive in DRIVES)
         return Result(
             self.plan,
-            self.oracle.violations + self.bridge.process.loop.faults,
+            self.oracle.violations + self.bridge.faults,
             self.world.hash,
             self.wire.frames,
             self.oracle.looks,

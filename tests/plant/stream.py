@@ -88,7 +88,7 @@ class ServerEnd(asyncio.Transport):
     def close(self) -> None:
         if not self._is_closing:
             self._is_closing = True
-            self._stream.on_server_closed()
+            self._stream.close()
             self._process.post(lambda: self._protocol.connection_lost(None))
 
     def abort(self) -> None:
@@ -139,7 +139,6 @@ class Stream:
         self._held: list[tuple[bool, bytes]] = []
         """Bytes to the server (True) or to the client; an empty one is the end of the stream."""
         self._is_over = False
-        self.peer = peer
         self._server = ServerEnd(self, process, protocol, peer)
 
     def send(self, data: bytes) -> None:
@@ -149,11 +148,8 @@ class Stream:
     def to_client(self, data: bytes) -> None:
         self._carry(False, data)
 
-    def on_server_closed(self) -> None:
-        self._carry(False, b"")
-
-    def reset(self) -> None:
-        """The bridge's process is gone, and its kernel says so."""
+    def close(self) -> None:
+        """The bridge's end is closed, by its server or because the process is gone."""
         self._carry(False, b"")
 
     def _carry(self, is_to_server: bool, data: bytes) -> None:

@@ -33,16 +33,11 @@ class Port:
         self.waiting: deque[Frame] = deque()
         self.is_off = False
         """It neither sends nor hears anything."""
-        self.lost = 0
 
     def send(self, frame: Frame) -> None:
-        if self.is_off:
-            return
-        if len(self.waiting) >= _MOST_WAITING:
-            self.lost += 1
-            return
-        self.waiting.append(frame)
-        self._wire.begin()
+        if not self.is_off and len(self.waiting) < _MOST_WAITING:
+            self.waiting.append(frame)
+            self._wire.begin()
 
 
 class Wire:

@@ -12,6 +12,7 @@ import pytest
 from bridge.project import Project
 from tests.plant.plan import KINDS, Plan, Step, plan_of
 from tests.plant.plant import Plant, project
+from tests.plant.world import BEGIN_S
 from tests.proof.drives import DRIVES
 from tests.support.process import REPOSITORY
 
@@ -61,6 +62,13 @@ def test_a_seed_gives_the_same_run_whatever_the_hashes_of_texts_are(tmp_path: Pa
         return done.stdout
 
     assert run(1) == run(2)
+
+
+def test_what_fails_in_a_process_is_found_though_it_is_killed(site: Project) -> None:
+    plant = Plant(site, Plan(1, 10.0, (Step(9.0, "kill", 0, 0.2, "between turns"),)))
+    plant.world.at(BEGIN_S + 8.0, lambda: plant.bridge.process.post(lambda: [].pop()))
+    (fault,) = plant.run().violations
+    assert "pop from empty list" in fault
 
 
 def test_steps_make_a_difference(site: Project) -> None:

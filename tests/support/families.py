@@ -186,6 +186,10 @@ class FamilyBridge:
         self._thread.start()
         until(lambda: self._ready.is_set() or self._error, _START_S, "the bridge is ready")
         assert not self._error, self._error
+        assert self._loop
+        # The bridge holds the ports of its fronts before they serve: a client that connects at once would
+        # spend its patience on their start.
+        asyncio.run_coroutine_threadsafe(self.service.supervisor.all_known(), self._loop).result(_START_S)
         nodes = [f"{drive.partition('/')[0]}/node" for drive in self.site.drives.values()]
         for node in nodes:
             until(

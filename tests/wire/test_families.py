@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
 import struct
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -185,11 +184,6 @@ def modbus_clients(bridge: FamilyBridge) -> Iterator[Callable[[str], Controller]
 
 @contextmanager
 def opcua_clients(bridge: FamilyBridge) -> Iterator[Callable[[str], Controller]]:
-    def is_there() -> bool:
-        with socket.socket() as probe:
-            return probe.connect_ex(("127.0.0.1", bridge.site.port)) == 0
-
-    until(is_there, 60.0, "the OPC UA front is there", 0.1)
     client = OpcUaClient(f"opc.tcp://127.0.0.1:{bridge.site.port}", timeout=_LIMIT_S)
     client.aio_obj.session_timeout = 60_000  # ms
     with client:

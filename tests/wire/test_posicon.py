@@ -7,7 +7,6 @@ are delivered with it. Of step 8, P748 is left out: the manual says nothing of i
 from __future__ import annotations
 
 import json
-import socket
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
@@ -181,7 +180,6 @@ class Rig:
         bridge = FamilyBridge(site)
         stack.callback(bridge.stop)
         bridge.start()
-        until(lambda: _listens(site.ports["opcua"]), 60.0, "the OPC UA front is there", 0.1)
         modbus = ModbusTcpClient("127.0.0.1", port=site.ports["modbus"], timeout=_CLIENT_S)
         self._opcua = OpcUaClient(f"opc.tcp://127.0.0.1:{site.ports['opcua']}", timeout=_CLIENT_S)
         self._opcua.aio_obj.session_timeout = 60_000  # ms
@@ -204,11 +202,6 @@ class Rig:
         space = self._opcua.get_namespace_index("urn:drivebridge:points")
         drive = self._opcua.get_node(f"ns={space};s=hall/{slot}")
         return int(drive.call_method(f"{space}:ReadParameter", name))
-
-
-def _listens(port: int) -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 @pytest.fixture(scope="module")

@@ -22,12 +22,15 @@ class Bound:
 @dataclass(slots=True)
 class _Heard:
     """Times of one identifier: of its last frame, of the longest silence and of when that began, in seconds;
-    ``times``: how often it was silent for too long."""
+    ``times``: how often it was silent for too long; ``place``, ``since_place``: where the last frame stands,
+    and the one before the longest silence."""
 
     last: float
+    place: str
     times: int = 0
     longest_s: float = 0.0
     since: float = 0.0
+    since_place: str = ""
 
 
 def bounds(table: BusTable, rpdos: Mapping[int, str]) -> dict[int, Bound]:
@@ -59,15 +62,16 @@ class SilenceWatch:
         self._bounds = bounds
         self._heard: dict[int, _Heard] = {}
 
-    def on_frame(self, frame: Frame) -> None:
+    def on_frame(self, frame: Frame, place: str) -> None:
+        """Take the next frame; ``place`` says where it was recorded."""
         if frame.can_id not in self._bounds:
             return
         heard = self._heard.get(frame.can_id)
         if heard is None:
-            self._heard[frame.can_id] = _Heard(frame.time)
+            self._heard[frame.can_id] = _Heard(frame.time, place)
             return
         self._judge(frame.can_id, heard, frame.time)
-        heard.last = frame.time
+        heard.last, heard.place = frame.time, place
 
     def said(self, started: float, end: float) -> list[str]:
         """Sentences, one for each identifier that was silent for too long; times are seconds after
@@ -80,7 +84,7 @@ class SilenceWatch:
                 bound = self._bounds[can_id]
                 often = f", {heard.times} times in all" if heard.times > 1 else ""
                 sentences.append(
-                    f"{bound.label}: silent for {1000 * heard.longest_s:.0f} ms from "
+                    f"{heard.since_place}: {bound.label}: silent for {1000 * heard.longest_s:.0f} ms from "
                     f"{heard.since - started:.3f} s on, {bound.key} allows {bound.most_ms} ms{often}"
                 )
         return sentences
@@ -90,4 +94,4 @@ class SilenceWatch:
         if silent_s * 1000 > self._bounds[can_id].most_ms:
             heard.times += 1
             if silent_s > heard.longest_s:
-                heard.longest_s, heard.since = silent_s, heard.last
+                heard.longest_s, heard.since, heard.since_place = silent_s, heard.last, heard.place

@@ -17,14 +17,17 @@ from bridge.base.errors import OperationFailed
 from bridge.bustools.decode import Decoder, FrameKind, FrameMeaning
 from bridge.bustools.habit_watch import HabitWatch
 from bridge.bustools.pdo_views import without_pdos
-from bridge.bustools.silence_watch import SilenceWatch, bounds
+from bridge.bustools.silence_watch import bounds
 from bridge.bustools.statistics import Statistics
 from bridge.bustools.task import BusTask
 from bridge.canopen.frame import EXTENDED, REMOTE, Frame
 from bridge.cli.bus_runner import AsJson, BusChoice, carry_out, choose_bus, print_table, takes_bus, tell
 from bridge.cli.terminal import printable
 from bridge.cli.trace import SUFFIXES, Trace
+from bridge.cli.trace_judge import TraceJudge
+from bridge.config import load_site
 from bridge.lint import family_dictionaries
+from bridge.witness.plan import UnknownFamily, WatchedBus, plan
 
 _IDENTIFIER = 0x1FFF_FFFF
 
@@ -114,10 +117,12 @@ def monitor(
         return _Listener(decoder, habits, wanted, show, now, count, seconds)
 
     trace = Trace(path, which.channel, line.table.channel) if path else None
-    silences = SilenceWatch(bounds(line.table, decoder.rpdos()) if site and trace else {})
+    judge = None
+    if site and trace:
+        judge = TraceJudge(_watched(site, line.table.name), bounds(line.table, decoder.rpdos()))
     with Record(log, is_recorded=trace is not None) if log else nullcontext() as record:
         try:
-            listener = _play(trace, listen, silences) if trace else carry_out(line, listen)
+            listener = _play(trace, listen, judge) if trace else carry_out(line, listen)
         except BrokenPipeError:
             sys.stderr.close()  # whoever read us has had enough, as `head` does
             return
@@ -125,11 +130,23 @@ def monitor(
         _print_statistics(tally, listener.last - listener.started, as_json=as_json)
     for node_id, odd in habits.habits().items():
         tell(f"{decoder.name(node_id)}: {'; '.join(odd)}")
-    silent = silences.said(listener.started, listener.last)
-    for sentence in silent:
-        tell(sentence)
-    if silent:
-        raise typer.Exit(1)
+    if judge:
+        wrong, right = judge.verdict(listener.last)
+        for sentence in (*right, *wrong):
+            tell(sentence)
+        if wrong:
+            raise typer.Exit(1)
+
+
+def _watched(site: Path, bus: str) -> WatchedBus | None:
+    """Plan of the witness for the bus; None, which is told, where it does not know its drives."""
+    try:
+        return next(one for one in plan(load_site(site), site.parent) if one.name == bus)
+    except UnknownFamily as error:
+        tell(
+            f"stops and intruders are not judged: the witness does not know the drives of the mapping {error}"
+        )
+        return None
 
 
 def _site_and_trace(files: Sequence[Path]) -> tuple[Path | None, Path | None]:
@@ -141,7 +158,7 @@ def _site_and_trace(files: Sequence[Path]) -> tuple[Path | None, Path | None]:
     return (sites[0] if sites else None), (traces[0] if traces else None)
 
 
-def _play(trace: Trace, listen: Callable[[float], _Listener], silences: SilenceWatch) -> _Listener:
+def _play(trace: Trace, listen: Callable[[float], _Listener], judge: TraceJudge | None) -> _Listener:
     """Everything that was recorded, as if it came now. Raises ``OperationFailed``."""
     listener: _Listener | None = None
     for frame in trace.frames():
@@ -149,7 +166,8 @@ def _play(trace: Trace, listen: Callable[[float], _Listener], silences: SilenceW
             listener = listen(frame.time)
         if listener.is_finished(frame.time):
             break
-        silences.on_frame(frame)
+        if judge:
+            judge.on_frame(frame, trace.place)
         listener.on_frame(frame)
     assert listener
     if trace.left_out:

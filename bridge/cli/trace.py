@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import can
 from can.io.blf import BLFParseError
@@ -16,7 +17,12 @@ from bridge.base.errors import OperationFailed
 from bridge.can.pythoncan import frame_of
 from bridge.canopen.frame import Frame
 
-SUFFIXES: Final = (".log", ".asc", ".blf", ".trc")
+_TEXTS: Final[dict[str, Callable[[Any], can.io.generic.MessageReader]]] = {
+    ".log": can.CanutilsLogReader,
+    ".asc": can.ASCReader,
+    ".trc": can.TRCReader,
+}
+SUFFIXES: Final = (*_TEXTS, ".blf")
 _UNREADABLE: Final = (
     can.CanError,
     BLFParseError,
@@ -33,6 +39,18 @@ _UNREADABLE: Final = (
 """Exceptions of python-can's readers for files that are not what their names say."""
 
 
+class _Lines(io.TextIOWrapper):
+    """A text file with the number of the line that was read last. The formats are ASCII; a comment may be in
+    any code page."""
+
+    number = 0
+
+    def __next__(self) -> str:
+        line = super().__next__()
+        self.number += 1
+        return line
+
+
 class Trace:
     """The classical CAN frames of one channel of a file, with its own times in seconds.
 
@@ -46,6 +64,13 @@ class Trace:
         self._is_sure = channel is not None
         self._expected = expected
         self._left_out: Counter[str] = Counter()
+        self._lines: _Lines | None = None
+        self._count = 0
+
+    @property
+    def place(self) -> str:
+        """Place in the file of the frame that was given last: its line, or its number in a binary one."""
+        return f"line {self._lines.number}" if self._lines else f"frame {self._count}"
 
     def frames(self) -> Iterator[Frame]:
         """Raises ``OperationFailed`` where the file cannot be read, or it has several channels."""
@@ -82,14 +107,20 @@ class Trace:
         return ", ".join(f"{count} {what}" for what, count in sorted(self._left_out.items()))
 
     def _messages(self) -> Iterator[can.Message]:
-        count = 0
         try:
-            with can.LogReader(self._path) as reader:
+            with self._reader() as reader:
                 for message in reader:
+                    self._count += 1
                     yield message
-                    count += 1
         except OSError as error:
             raise OperationFailed(f"{self._path} cannot be read: {error.strerror or error}") from None
         except _UNREADABLE as error:
-            after = f"after {count} frames" if count else "from the start"
+            after = f"after {self._count} frames" if self._count else "from the start"
             raise OperationFailed(f"{self._path} is no {self._path.suffix} trace {after}: {error}") from None
+
+    def _reader(self) -> can.io.generic.MessageReader:
+        reader = _TEXTS.get(self._path.suffix.lower())
+        if reader is None:
+            return can.BLFReader(self._path)
+        self._lines = _Lines(self._path.open("rb"), encoding="latin-1")
+        return reader(self._lines)

@@ -21,8 +21,9 @@ import typer
 from bridge.base.errors import BridgeError, OperationFailed, Unavailable
 from bridge.cli import logs
 from bridge.cli.bus_runner import AsJson
+from bridge.cli.finding_text import times_of
 from bridge.config import Site, load_site
-from bridge.witness.findings import Alarm, AlarmKind, Finding, Sight, Stop
+from bridge.witness.findings import Alarm, AlarmKind, Finding, Sight
 from bridge.witness.numbers import Numbers
 from bridge.witness.plan import UnknownFamily, WatchedBus, plan
 from bridge.witness.shell import CannotListen, Witness
@@ -209,15 +210,4 @@ def _as_text(finding: Finding) -> str:
         return f"{_time(finding.time)} {mark} {finding.source}: {finding.message}"
     if isinstance(finding, Sight):
         return f"{_time(finding.time)} sees again {finding.source}: {finding.message}"
-    return f"{_time(finding.time)} stop {finding.drive}: {finding.cause}{_times(finding)}"
-
-
-def _times(stop: Stop) -> str:
-    parts: list[str] = []
-    for what, ms, bound in (
-        ("on the bus after", stop.bus_ms, stop.bus_bound_ms),
-        ("in the drive after", stop.drive_ms, stop.drive_bound_ms),
-    ):
-        if ms is not None:
-            parts.append(f"{what} {ms} ms" + (f" of {bound}" if bound else ""))
-    return f"; {', '.join(parts)}" + ("" if stop.is_in_time else ": LATE")
+    return f"{_time(finding.time)} stop {finding.drive}: {finding.cause}{times_of(finding)}"

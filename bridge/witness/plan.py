@@ -257,7 +257,7 @@ def _drive(
     is_watched = timeout_ms and table.telegram_downtime_s != IGNORE_ALL_S and table.on_expiry != "hold"
     own_ms = node.own_timeout_ms or own_timeout_ms or 0
     return WatchedDrive(
-        name=f"{node.name}/{table.name or (table.slot if len(node.drive) > 1 else 'drive')}",
+        name=f"{node.name}/{table.name or (table.slot if len(family['slots']) > 1 else 'drive')}",
         unit_id=unit_id,
         rpdo=_cob_id(table.rpdo, slot["rpdo"], node.id),
         tpdo=_cob_id(table.tpdo, slot["tpdo"], node.id),

@@ -23,14 +23,14 @@ def watch(*times: float, end: float) -> list[str]:
     """Sentences on SYNC at these times, in a trace that begins at 10 s."""
     silences = SilenceWatch(ALLOWED)
     for time in times:
-        silences.on_frame(Frame(SYNC, b"", time))
-        silences.on_frame(Frame(0x181, b"", time))
+        silences.on_frame(Frame(SYNC, b"", time), f"line {round(time * 100)}")
+        silences.on_frame(Frame(0x181, b"", time), "elsewhere")
     return silences.said(10.0, end)
 
 
 def test_the_longest_silence_is_said_with_its_beginning_and_how_often_there_was_one() -> None:
     assert watch(10.0, 10.05, 10.3, 10.35, 10.5, end=10.55) == [
-        "SYNC: silent for 250 ms from 0.050 s on, deadman_ms allows 100 ms, 2 times in all"
+        "line 1005: SYNC: silent for 250 ms from 0.050 s on, deadman_ms allows 100 ms, 2 times in all"
     ]
 
 

@@ -12,6 +12,8 @@ from typer.testing import CliRunner, Result
 
 from bridge.cli.app import make_app
 from tests.support import sites
+from tests.support.invented import SPIN
+from tests.support.mapping_folder import Folder
 
 SYNC, RPDO, TPDO, HEARTBEAT = 0x080, 0x205, 0x185, 0x705
 READY = bytes.fromhex("310B000000000000")
@@ -72,11 +74,64 @@ def test_every_format_is_shown_with_the_sites_names_and_judged_by_its_bounds(
     lines = done.stdout.splitlines()
     assert len(lines) == len(traffic())
     assert any("TPDO1 conveyor/fu1" in line and "0B31h ready" in line for line in lines)
+    place = place_of(tmp_path / f"trace{suffix}", 0x205)
+    after = place_of(tmp_path / f"trace{suffix}", 0x080)
     said = done.stderr.splitlines()
     assert said == [
-        "SYNC: silent for 350 ms from 0.302 s on, deadman_ms allows 100 ms",
-        "RPDO1 conveyor/fu1: silent for 350 ms from 0.301 s on, deadman_ms allows 100 ms",
+        f"{after}: SYNC: silent for 350 ms from 0.302 s on, deadman_ms allows 100 ms",
+        f"{place}: RPDO1 conveyor/fu1: silent for 350 ms from 0.301 s on, deadman_ms allows 100 ms",
     ]
+
+
+def place_of(path: Path, can_id: int) -> str:
+    """Where the last frame with this identifier before the silence stands."""
+    frames = [*enumerate(traffic(), 1)]
+    number = next(n for n, one in reversed(frames) if one.arbitration_id == can_id and is_before(one))
+    if path.suffix == ".blf":
+        return f"frame {number}"
+    lines = path.read_text().splitlines()
+    first = next(n for n, line in enumerate(lines) if "705" in line)
+    return f"line {first + number}"
+
+
+def is_before(message: can.Message) -> bool:
+    return message.timestamp - 1_700_000_000 < LOST_S[1]
+
+
+def test_stops_are_shown_with_their_times_and_intruders_are_wrong(tmp_path: Path, site: Path) -> None:
+    enabled, run = bytes.fromhex("370B000000000000"), bytes.fromhex("7F04000000000000")
+    found = [at(n / 10, HEARTBEAT, b"\x05") for n in range(21)]
+    found += [at(n / 100 + 0.002, SYNC) for n in range(201)]
+    found += [at(n / 100, RPDO, run if n < 100 else DISABLED) for n in range(201)]
+    found += [at(n / 50 + 0.005, TPDO, enabled if n < 60 else READY) for n in range(101)]
+    frames = sorted(found, key=lambda message: message.timestamp)
+    done = monitor(site, written(tmp_path, ".log", frames), "--statistics")
+    assert done.exit_code == 0, (done.output, done.exception)
+    stopped = next(n for n, one in enumerate(frames, 1) if one.data == READY)
+    assert done.stderr.splitlines()[1:] == [
+        f"line {stopped}: conveyor/fu1: stop commanded at 1.205 s; in the drive after 205 ms of 6500"
+    ], done.stderr
+    reset = at(0.5001, 0x000, bytes((0x81, 5)))
+    frames = sorted([*found, reset], key=lambda message: message.timestamp)
+    done = monitor(site, written(tmp_path, ".log", frames), "--statistics")
+    assert done.exit_code == 1
+    line = frames.index(reset) + 1
+    assert (
+        f"line {line}: can0: intruder at 0.500 s: NMT reset of node 5 while a drive of it is told to run: "
+        "somebody else sends it\n"
+    ) in done.stderr
+
+
+def test_of_drives_that_the_witness_does_not_know_only_silences_are_judged(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    folder.add("acme/spin", SPIN)
+    done = monitor(folder.site, written(tmp_path, ".log", traffic()))
+    assert done.exit_code == 1, (done.output, done.exception)
+    first, sync = done.stderr.splitlines()
+    assert first == (
+        "stops and intruders are not judged: the witness does not know the drives of the mapping acme/spin"
+    )
+    assert "SYNC: silent for 350 ms" in sync
 
 
 @pytest.mark.parametrize("suffix", FORMATS)

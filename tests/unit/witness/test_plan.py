@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from bridge.catalogue import Catalogue
-from bridge.config import load_site
+from bridge.config import DriveTable, load_site
 from bridge.drive import ControlWords, DriveState, StatusWords
 from bridge.lint import lint
 from bridge.mapping import load_family
@@ -243,7 +243,17 @@ def test_drives_are_called_as_the_bridge_calls_them(tmp_path: Path) -> None:
         "conveyor/fu1",
         "conveyor/lift",
     ]
-    assert [one.name for one in bus_of(tmp_path, sites.node(FU1)).drives] == ["conveyor/drive"]
+    assert [one.name for one in bus_of(tmp_path, sites.node(FU1)).drives] == ["conveyor/fu1"]
+
+
+@pytest.mark.parametrize("mapping", family_names())
+def test_a_single_drive_is_called_as_the_bridge_calls_it(tmp_path: Path, mapping: str) -> None:
+    family = sites.family(mapping)
+    if not family.slot:
+        return
+    drive = DriveTable.model_validate({"slot": family.slot[0].name, "control": "modbus"})
+    ours = f"conveyor/{family.leaf_of(drive)}"
+    assert watched(tmp_path, mapping, family.slot[0].name).name == ours
 
 
 @pytest.mark.parametrize(

@@ -66,7 +66,11 @@ class Asker:
     def _ask(self, key: str, payload: str | None) -> Answer:
         for reply in self._session.get(key, payload=payload, attachment=_WHO, timeout=_LIMIT_S):
             said = reply.ok or reply.err
-            answer = json.loads(said.payload.to_string())
+            try:
+                answer = json.loads(said.payload.to_string())
+            except ValueError:
+                # zenoh's own words: nobody has answered in time.
+                continue
             if reply.err is not None or "ok" in answer:
                 code = "" if answer.get("ok") else answer["code"]
                 return Answer(bool(answer.get("forwarded")), code, answer.get("message", ""))

@@ -68,12 +68,16 @@ def order(first: str, faults: Sequence[Fault] = FAULTS) -> Iterator[Fault]:
 
 def judge(rig: Rig, fault: Fault, say: Say) -> str:
     """What one round of this fault finds; empty where it finds nothing. One in which the machine was in the
-    way has found nothing either way, and is made again."""
+    way has found nothing either way, and is made again. What it excuses each time, word by word, is none of
+    its doing."""
+    excused: list[set[str]] = []
     for _ in range(_MOST_VOID):
+        before = len(rig.excused)
         found = _judge_twice(rig, fault, say)
         if found is not None:
             return found
-    return ""
+        excused.append(set(rig.excused[before:]))
+    return min(set.intersection(*excused), default="")
 
 
 def _judge_twice(rig: Rig, fault: Fault, say: Say) -> str | None:

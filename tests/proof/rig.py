@@ -145,6 +145,8 @@ class Rig:
         self.hold_s = HOLD_S
         self.by_themselves = 0
         """Drives that stood still before a fault: what a slow machine has done."""
+        self.excused: list[str] = []
+        """Findings by yes or no that a slow machine may have brought about."""
         self.stopped_in_vain: list[str] = []
         """Drives that a fault stopped which did not concern them."""
 

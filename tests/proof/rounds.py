@@ -112,6 +112,7 @@ def _examined(rig: Rig, fault: Fault, examine: Examine, say: Callable[[str], Non
         if finding.wrong and _was_held_up(rig, of if isinstance(of, Drive) else None, began):
             say(f"the machine was slow: {fault.name}: {of.path}: {finding.wrong}")
             rig.by_themselves += 1
+            rig.excused.append(f"{of.path}: {finding.wrong}")
             continue
         paused, waited = _held_up_ms(rig, spans)
         sample = Sample(

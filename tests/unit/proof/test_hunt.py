@@ -101,12 +101,16 @@ class Scene:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, *ends: list[Sample] | Exception) -> None:
         self.stopped_in_vain: list[str] = []
+        self.excused: list[str] = []
         self.mended = 0
+        self.excuses: list[str] = []
+        """What the machine is blamed for, round by round."""
         self._ends = list(ends)
         monkeypatch.setattr(hunt, "run_round", self._round)
 
     def _round(self, *_: object) -> list[Sample]:
         end = self._ends.pop(0)
+        self.excused += [self.excuses.pop(0)] if self.excuses else []
         if isinstance(end, Exception):
             raise end
         return end
@@ -150,6 +154,22 @@ def test_what_the_machine_was_in_the_way_of_is_made_again(monkeypatch: pytest.Mo
 def test_who_is_always_in_the_way_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = Scene(monkeypatch, *[[replace(LATE, paused_ms=60.0)] for _ in range(20)])
     assert judged(scene) == ""
+
+
+@pytest.mark.parametrize(
+    ("excuses", "found"),
+    [
+        (["fan: it moves"] * 4, "fan: it moves"),
+        (["fan: it moves", "fan: it moves", "lift: it moves", "fan: it moves"], ""),
+        (["fan: it moves"] * 3, ""),
+    ],
+)
+def test_what_is_excused_each_time_in_the_same_words_is_not_the_machines(
+    monkeypatch: pytest.MonkeyPatch, excuses: list[str], found: str
+) -> None:
+    scene = Scene(monkeypatch, *[list[Sample]() for _ in range(4)])
+    scene.excuses = list(excuses)
+    assert judged(scene) == found
 
 
 def test_a_plant_that_does_not_come_back_is_one_the_second_time(monkeypatch: pytest.MonkeyPatch) -> None:

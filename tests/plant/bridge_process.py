@@ -4,6 +4,7 @@ does, in a process that may stand still or end."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from random import Random
 
 from bridge.catalogue import Catalogue
@@ -44,6 +45,10 @@ class Bridge:
         self._ports = 0
         self.on_event: list[Callable[[Event], None]] = []
         self.on_start: list[Callable[[], None]] = []
+        self.on_request: list[Callable[[int, Request], None]] = []
+        """Called with each request that is submitted, and its number; ``on_answer`` with its outcome."""
+        self.on_answer: list[Callable[[int, Outcome], None]] = []
+        self._requests = 0
         self.watchers: list[Watcher] = []
         self.faults: list[str] = []
         """What has failed in any of its processes."""
@@ -167,11 +172,21 @@ class Bridge:
         outcome is given. One that dies with the process has none."""
 
         def arrive() -> None:
-            if not self.process.is_dead:
-                arrived()
-            self.process.post(lambda: self.view.submit(request, reply))
+            if self.process.is_dead:
+                return
+            arrived()
+            self._requests += 1
+            number = self._requests
+            for tell in self.on_request:
+                tell(number, request)
+            self.process.post(lambda: self.view.submit(request, partial(self._answer, number, reply)))
 
         self._world.after(delay_s, arrive)
+
+    def _answer(self, number: int, reply: Callable[[Outcome], None], outcome: Outcome) -> None:
+        for tell in self.on_answer:
+            tell(number, outcome)
+        reply(outcome)
 
     def connected(self, identity: Identity, *, is_there: bool) -> None:
         process = self.process

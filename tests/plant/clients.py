@@ -32,6 +32,10 @@ _BEGINS: Final = ("ready", "acknowledge", "ready", "run", "run", "run", "run", "
 Arrived = Callable[[Drive, int], None]
 """Called when a telegram of the drive's controller, with this control word, reaches the bridge's machine."""
 
+Refused = Callable[[Drive, int, float, int], None]
+"""Called with the setpoint of a telegram that was to enable, when it was sent, and the exception that it
+got."""
+
 
 class Line:
     """A Modbus connection with requests one after the other, connected anew when it has ended."""
@@ -83,6 +87,12 @@ class Line:
             pdu, self._received = self._received[_HEAD.size : end], self._received[end:]
             self._answers.pop(0)(pdu)
 
+    def ask_often(self, unit: int, pdu: bytes, times: int) -> None:
+        """The same request so many times, without waiting for an answer."""
+        if self.stream is not None:
+            self._answers += [lambda pdu: None] * times
+            self.stream.send((_HEAD.pack(1, 0, len(pdu) + 1, unit) + pdu) * times)
+
     def leave(self) -> None:
         """Close the connection for good, as a program that ends does."""
         self.is_wanted = False
@@ -102,7 +112,9 @@ class Controller:
     """The program that owns one drive. It writes a telegram in each period, with a number in its setpoint,
     and looks whether the drive moves."""
 
-    def __init__(self, world: World, bridge: Bridge, drive: Drive, arrived: Arrived) -> None:
+    def __init__(
+        self, world: World, bridge: Bridge, drive: Drive, arrived: Arrived, refused: Refused
+    ) -> None:
         self.drive = drive
         self.period_s = PLANT.owner_period_s
         self.is_silent = False
@@ -112,6 +124,7 @@ class Controller:
         self._world = world
         self._bridge = bridge
         self._arrived = arrived
+        self._refused = refused
         self._number = 0
         self._place = 0
         self._cycles = 0
@@ -161,7 +174,14 @@ class Controller:
         self._number = (self._number + 1) % NUMBERS
         setpoint = self.drive.family.setpoint + self._number
         if self.line is not None:
-            self.line.ask(self.drive.unit, writes(0, word, setpoint))
+            sent = self._world.now
+
+            def answered(pdu: bytes) -> None:
+                mask, value = self.drive.family.enabling
+                if pdu[0] & _EXCEPTION and word & mask == value:
+                    self._refused(self.drive, setpoint, sent, pdu[1])
+
+            self.line.ask(self.drive.unit, writes(0, word, setpoint), answered)
             self.line.ask(self.drive.unit, _READ.pack(_READ_INPUT, *_STATUS), self._on_status)
             return
         values = {"control_word": word, "setpoint_1": setpoint}
@@ -170,9 +190,10 @@ class Controller:
 
     def _on_bytes(self, data: bytes) -> None:
         """Telegrams among what reaches the bridge's machine."""
-        while len(data) >= _HEAD.size:
-            _, _, length, _ = _HEAD.unpack_from(data)
-            pdu, data = data[_HEAD.size : 6 + length], data[6 + length :]
+        begin = 0
+        while len(data) - begin >= _HEAD.size:
+            _, _, length, _ = _HEAD.unpack_from(data, begin)
+            pdu, begin = data[begin + _HEAD.size : begin + 6 + length], begin + 6 + length
             if pdu[0] == _WRITE_HOLDING and _WRITE.unpack_from(pdu)[1] == 0:
                 self._arrived(self.drive, struct.unpack_from(">H", pdu, _WRITE.size)[0])
 
@@ -193,8 +214,8 @@ class Controller:
         """So many telegrams at once, without waiting for an answer; then it hangs."""
         self.is_silent = True
         if self.line is not None:
-            for _ in range(times):
-                self.line.ask(self.drive.unit, writes(0, self.drive.family.run, self.drive.family.setpoint))
+            telegram = writes(0, self.drive.family.run, self.drive.family.setpoint)
+            self.line.ask_often(self.drive.unit, telegram, times)
 
     def release(self) -> None:
         if self.line is not None:
@@ -232,6 +253,13 @@ class Operator:
     def __init__(self, world: World, bridge: Bridge) -> None:
         self._world = world
         self._bridge = bridge
+
+    def start_nodes(self, nodes: list[str]) -> None:
+        """Start what somebody has stopped."""
+        identity = Identity(Source.OPCUA, "operator", connection="session 99")
+        for node in nodes:
+            request = Request(identity, node, command_of(Action.START_NODE))
+            self._bridge.ask(request, _DELAY_S, lambda: None, lambda outcome: None)
 
     def stop(self, drive: Drive, how: str, answered: Callable[[float, Outcome], None]) -> None:
         """``answered`` gets the time at which the request came, and the outcome when it is given."""

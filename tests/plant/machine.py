@@ -10,9 +10,12 @@ from collections import deque
 from collections.abc import Callable
 from functools import partial
 from math import inf
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from tests.plant.world import Act, World
+
+_LOOK_S: Final = 0.000_04
+"""Time that passes from one look at the clock to the next: a turn takes as long as it has looks."""
 
 
 class DeadError(BaseException):
@@ -43,6 +46,7 @@ class Process:
         self.is_dead = False
         self._pause_s = 0.0
         """Length of the pause that begins at the next look at the clock; ``inf`` ends the process there."""
+        self.look_s = _LOOK_S
         self.loop = ProcessLoop(self, world, faults)
         self.still_since = inf
         """When it began to stand still; infinite while it does not."""
@@ -52,6 +56,10 @@ class Process:
         if self._pause_s:
             pause_s, self._pause_s = self._pause_s, 0.0
             self._stand_still(pause_s)
+        elif self._is_busy:
+            self._world.run_until(seen + self.look_s)
+            if self.is_dead:
+                raise DeadError
         return seen
 
     def post(self, act: Act) -> None:
@@ -89,9 +97,9 @@ class Process:
         """Stop it for so long: now, between two turns, or at its next look at the clock."""
         if self.is_dead:
             return
-        if in_turn:
+        if in_turn or self._is_busy:
             self._pause_s = seconds
-        elif not (self._is_busy or self._is_still):
+        elif not self._is_still:
             self._is_still = True
             self._begin_pause()
             self._world.after(seconds, self._go_on)

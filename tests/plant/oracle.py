@@ -11,6 +11,7 @@ first, and both are right.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
 from typing import Final, NamedTuple
@@ -23,9 +24,13 @@ _WIRE_S: Final = 0.01
 """Frames that wait for the wire, and those that go before them."""
 _KERNEL_S: Final = 0.002
 """Each period of the kernel's is a little longer than it should be."""
-_REACTION_S: Final = (PLANT.rpdo_period_ms + REACTION_MS) / 1000 + _WIRE_S
+REACTION_S: Final = (PLANT.rpdo_period_ms + REACTION_MS) / 1000 + _WIRE_S
 _SEEN_S: Final = 0.02
 """Frames that were on their way when the bus went off."""
+_GONE_S: Final = 0.5
+"""A bridge that is in charge is never silent for so long."""
+_TURN_S: Final = 0.3
+"""Two bridges that begin at once may both act for a period of the heartbeat."""
 _KEPT: Final = 200
 _AGE_S: Final = 0.7
 """Longest time for which a value that is no longer told may be good: a TPDO comes each 0.3 s."""
@@ -53,6 +58,14 @@ class Track:
     needs_acknowledge: bool = False
     said: deque[tuple[float, int]] = field(default_factory=lambda: deque[tuple[float, int]](maxlen=_KEPT))
     """Status words that the drive has sent, with their times."""
+    setpoints: deque[tuple[float, int]] = field(
+        default_factory=lambda: deque[tuple[float, int]](maxlen=_KEPT)
+    )
+    """Setpoints that the bridge has sent, with their times."""
+    stops: deque[float] = field(default_factory=lambda: deque[float](maxlen=_KEPT))
+    """Times of RPDOs that do not enable."""
+    stop_word: int = 0
+    """Control word of the last of them."""
     enabled_at: float = -inf
     """When the last frame that enables it was on the wire."""
     worst_s: float = inf
@@ -64,6 +77,8 @@ class Track:
     """When its controller's last telegram came."""
     is_owned: bool = False
     """Its controller's setpoint was on the wire, and it has not gone since."""
+    intruded_at: float = -inf
+    """When somebody else has last commanded it, or its node."""
     left_at: float = -inf
     """When it went: until its next telegram the bus goes on with what it has said."""
     is_strangers: bool = False
@@ -108,6 +123,8 @@ class Oracle:
         self._of_tpdo = {drive.tpdo: track for drive, track in self.tracks.items()}
         self._of_setpoint = {drive.number_id: track for drive, track in self.tracks.items()}
         self.violations: list[str] = []
+        self.on_trip: Callable[[Drive, float, float], None] = lambda drive, since, due: None
+        """Called with a drive whose controller was silent for too long, and from when to when it may trip."""
         self.looks = 0
         """How many frames and values were judged."""
         self._still_since = inf
@@ -115,8 +132,11 @@ class Oracle:
         self._late_at = -inf
         """When the bridge went on after a pause that it may have taken for a hang, which ends all time-outs:
         it counts from its last round."""
+        self._other_since = self._other_at = -inf
+        """First and last frame of another bridge, while it is in charge."""
 
-    def _wrong(self, at: float, text: str) -> None:
+    def wrong(self, at: float, text: str) -> None:
+        """Note what is wrong at this time."""
         self.violations.append(f"{at - 1000.0:.3f} s: {text}")
 
     # what is told to it
@@ -136,6 +156,8 @@ class Oracle:
             if silent_s > timeout_s + _GRAIN_S and was_running:
                 # So it has tripped, whatever it gets now.
                 trip = track.last_at + timeout_s
+                if track.left_at < track.last_at:
+                    self.on_trip(drive, trip, track.last_at + min(track.worst_s, silent_s))
                 self._interrupt(track, trip, track.last_at + track.worst_s, "its controller was silent", True)
         track.take(Telegram(at, word))
 
@@ -193,9 +215,24 @@ class Oracle:
 
     def stop_answered(self, drive: Drive, came: float, at: float) -> None:
         """Somebody's stop, which was answered *ok*."""
-        self.interrupted(came, at + _REACTION_S, "somebody stopped it", [drive])
+        self.interrupted(came, at + REACTION_S, "somebody stopped it", [drive])
+
+    def intruded(self, drive: Drive, at: float) -> None:
+        """Somebody else commands the drive, or its node: nothing is known of what it does by that."""
+        for track in self.tracks.values():
+            if track.drive.node_id == drive.node_id:
+                track.intruded_at = at
 
     # what it sees
+
+    def frame_of_other(self, at: float, can_id: int, data: bytes) -> None:
+        """A frame of another bridge, which no controller knows."""
+        if at > self._other_at + _GONE_S:
+            self._other_since = at
+        self._other_at = at
+        track = self._of_rpdo.get(can_id)
+        if track is not None and track.drive.enabling(data):
+            self.wrong(at, f"{track.drive.path} is enabled by a second bridge, which nobody commands")
 
     def frame(self, at: float, can_id: int, data: bytes, *, of_bridge: bool) -> None:
         if of_bridge:
@@ -215,32 +252,37 @@ class Oracle:
         setpoint = drive.setpoint(data)
         if not setpoint:
             return
+        track.setpoints.append((at, setpoint))
         track.is_strangers = setpoint >= drive.family.setpoint + NUMBERS
         is_there = track.is_owned and at <= track.last_at + PLANT.fieldbus_timeout_ms / 1000
         if track.is_strangers and is_there:
-            self._wrong(at, f"{drive.path} got the setpoint of a stranger: {data.hex()}")
+            self.wrong(at, f"{drive.path} got the setpoint of a stranger: {data.hex()}")
         track.is_owned = not track.is_strangers and track.last_at > track.left_at
 
     def _command(self, track: Track, at: float, data: bytes) -> None:
         drive = track.drive
         self.looks += 1
         if not drive.enabling(data):
+            track.stops.append(at)
+            track.stop_word = drive.control_word(data)
             return
         track.enabled_at = at
+        if at < self._other_at + _TURN_S and at > self._other_since + _TURN_S:
+            self.wrong(at, f"{drive.path} is enabled while another bridge is in charge")
         if at > self._still_since + self._deadman_s + _KERNEL_S + _WIRE_S:
             since = at - self._still_since
-            self._wrong(at, f"{drive.path} is enabled {since * 1000:.0f} ms after the bridge fell silent")
+            self.wrong(at, f"{drive.path} is enabled {since * 1000:.0f} ms after the bridge fell silent")
         if track.is_strangers:
             return
         if drive.reaction != "hold" and at > track.last_at + track.worst_s + _WIRE_S:
             late_ms = (at - track.last_at) * 1000
-            self._wrong(
+            self.wrong(
                 at,
                 f"{drive.path} is enabled {late_ms:.0f} ms after its controller's last telegram; "
                 f"{track.worst_s * 1000:.0f} ms are published",
             )
         if at > track.until and not track.is_armed:
-            self._wrong(
+            self.wrong(
                 at, f"{drive.path} is enabled, and its controller has not asked for it since {track.why}"
             )
 
@@ -254,7 +296,7 @@ class Oracle:
                 if track.said
                 else "none"
             )
-            self._wrong(
+            self.wrong(
                 at, f"{drive.path}: {word:04X} is said to be good, and the drive's last word is {last}"
             )
 
@@ -265,7 +307,9 @@ class Oracle:
             return
         said_at, word = track.said[-1]
         mask, value = drive.family.enabled
+        if track.intruded_at > since - PLANT.heartbeat_ms / 1000:
+            return
         if said_at > since + track.bridge_s + TPDO_MS / 1000 and word & mask == value:
-            self._wrong(
+            self.wrong(
                 at, f"{drive.path} still runs {(at - since) * 1000:.0f} ms after the bridge fell silent"
             )

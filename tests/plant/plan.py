@@ -6,6 +6,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Final, NamedTuple
 
+from tests.plant.third_parties import Intruder
 from tests.proof.drives import DRIVES
 from tests.proof.settings import PLANT
 
@@ -62,7 +63,7 @@ KINDS: Final[dict[str, Draw]] = {
     "acknowledges": lambda rng: (_drive(rng), rng.uniform(3.0, 10.0), ""),
     "stop": lambda rng: (_drive(rng), 0.0, rng.choice(_STOPS)),
     "stranger": lambda rng: (_drive(rng), rng.uniform(0.2, 5.0), rng.choice(("elsewhere", "same host"))),
-    "backlog": lambda rng: (_drive(rng), rng.uniform(2.0, 6.0), ""),
+    "backlog": lambda rng: (_drive(rng), rng.uniform(2.0, 6.0), rng.choice(("20", "1000", "6000"))),
     "hang": lambda rng: (0, _around(rng, PLANT.deadman_ms, 1000), rng.choice(("in a turn", "between turns"))),
     "kill": lambda rng: (0, rng.uniform(0.05, 4.0), rng.choice(("in a turn", "between turns"))),
     "bus off": lambda rng: (0, rng.uniform(0.02, 2.0), ""),
@@ -70,6 +71,9 @@ KINDS: Final[dict[str, Draw]] = {
     "noise": lambda rng: (0, rng.uniform(0.5, 5.0), rng.choice(("0.01", "0.1", "0.5"))),
     "node reset": lambda rng: (rng.randrange(_NODES), 0.0, ""),
     "node silent": lambda rng: (rng.randrange(_NODES), _around(rng, PLANT.heartbeat_ms, 3000), ""),
+    "intruder": lambda rng: (_drive(rng), rng.uniform(0.01, 2.0), rng.choice(Intruder.WAYS)),
+    "second bridge": lambda rng: (0, rng.uniform(1.0, 8.0), ""),
+    "box slow": lambda rng: (0, rng.uniform(1.0, 6.0), rng.choice(("0.0001", "0.0003"))),
     "clock stepped": lambda rng: (0, rng.uniform(-3600.0, 3600.0), ""),
 }
 """What can happen, and how it is drawn."""

@@ -12,13 +12,16 @@ from typing import Final
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.cli.simulation import simulated_nodes
-from bridge.command import Outcome
+from bridge.command import EventKind, Outcome
 from bridge.project import Project, load_project
+from tests.plant.answers import Answers
 from tests.plant.bridge_process import Bridge
+from tests.plant.causes import Causes
 from tests.plant.clients import Controller, Operator, Stranger
 from tests.plant.field import FieldNode
 from tests.plant.oracle import Oracle
 from tests.plant.plan import Plan, Step
+from tests.plant.third_parties import Intruder
 from tests.plant.wire import Port, Wire
 from tests.plant.world import BEGIN_S, World
 from tests.proof.drives import DRIVES, Drive, write_site
@@ -26,6 +29,12 @@ from tests.proof.settings import PLANT
 
 _BITRATE: Final = 1_000_000
 _LOOK_S: Final = 0.25
+_SECOND: Final = "bridge two"
+_ROUND_S: Final = 0.05
+_FOUND_S: Final = 0.5
+"""An intruder's frame is found by then (docs: 10 ms; one that repeats what the bridge sends, later)."""
+_ORDER_S: Final = 3.0
+"""By then a bridge that was passive acts again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +68,11 @@ class Plant:
         self.wire = Wire(self.world, table.name, _BITRATE, Random(f"{plan.seed} wire"))
         self.wire.witness.append(self._on_frame)
         self.oracle = Oracle(list(DRIVES))
+        self.answers = Answers(self.oracle, list(DRIVES))
+        self.causes = Causes(self.oracle)
+        self.oracle.on_trip = self._on_trip
+        self.second: Bridge | None = None
+        self._project = project
         self.nodes = [
             FieldNode(self.world, self.wire, device) for device in simulated_nodes(table, project.path)
         ]
@@ -66,8 +80,15 @@ class Plant:
             self.world, project, {table.name: self.wire}, "one", Random(f"{plan.seed} bridge")
         )
         self.bridge.on_start.append(self._on_start)
+        self.bridge.on_event.append(lambda event: self.causes.told(event, self.world.now))
         self.bridge.watchers += [self.oracle, self]
-        self.controllers = [Controller(self.world, self.bridge, drive, self._on_telegram) for drive in DRIVES]
+        self.bridge.on_request.append(lambda number, asked: self.answers.asked(number, asked, self.world.now))
+        self.bridge.on_answer.append(lambda number, outcome: self._on_answer(number, outcome))
+        self.controllers = [
+            Controller(self.world, self.bridge, drive, self._on_telegram, self._on_refused)
+            for drive in DRIVES
+        ]
+        self._last_stops: dict[Drive, float | None] = dict.fromkeys(DRIVES)
         self.operator = Operator(self.world, self.bridge)
         for node in self.nodes:
             node.power_on()
@@ -102,28 +123,55 @@ class Plant:
     def _on_frame(self, frame: Frame, sender: Port) -> None:
         of_bridge = sender.name.startswith("bridge")
         self.world.tell(f"{sender.name} {frame!r}")
-        self.oracle.frame(frame.time, frame.can_id, frame.data, of_bridge=of_bridge)
+        if sender.name == _SECOND:
+            self.oracle.frame_of_other(frame.time, frame.can_id, frame.data)
+            self.answers.disturbed(frame.time)
+            self.causes.disturbed(frame.time)
+        else:
+            self.oracle.frame(frame.time, frame.can_id, frame.data, of_bridge=of_bridge)
 
     def _on_telegram(self, drive: Drive, word: int) -> None:
         self.oracle.telegram(drive, self.world.now, word)
 
+    def _on_answer(self, number: int, outcome: Outcome) -> None:
+        self.world.tell(f"request {number} {outcome.code} {outcome.forwarded}")
+        self.answers.answered(number, outcome, self.world.now)
+
+    def _on_refused(self, drive: Drive, setpoint: int, sent: float, code: int) -> None:
+        self.answers.refused(drive, setpoint, sent, self.world.now, code)
+
     def _on_start(self) -> None:
         self.oracle.started()
+        self._disturbed()
 
     def on_still(self, now: float) -> None:
         self._silent_since = now
+        self._disturbed()
 
     def on_going_on(self, since: float, now: float) -> None:
-        """It is judged by its frames."""
+        self._disturbed()
 
     def on_end(self, now: float) -> None:
         self._silent_since = now
+        self.answers.ended(now)
+        self._disturbed()
         self.world.after(self._down_s, self.bridge.restart)
+
+    def _disturbed(self) -> None:
+        self.answers.disturbed(self.world.now)
+        self.causes.disturbed(self.world.now)
+
+    def _on_trip(self, drive: Drive, since: float, due: float) -> None:
+        what = f"the controller of {drive.path} was silent for too long"
+        self.causes.owes(EventKind.WATCHDOG, drive.path, since - _ROUND_S, due + _ROUND_S, what)
 
     def _look(self) -> None:
         self.world.after(_LOOK_S, self._look)
         process = self.bridge.process
         now = self.world.now
+        is_still = process.is_dead or process.still_since < now
+        self.answers.look(now, is_still=is_still)
+        self.causes.look(now, is_still=is_still)
         if process.is_dead or process.still_since < now:
             for drive in DRIVES:
                 self.oracle.dead_for(drive, self._silent_since, now)
@@ -138,6 +186,9 @@ class Plant:
             word = self.bridge.good_number(f"{drive.path}/status/drive_status_word")
             if word is not None:
                 self.oracle.value(drive, now, int(word))
+            said = self.bridge.good_number(f"{at}/last_stop")
+            self.answers.last_stop(drive, now, self._last_stops[drive], said)
+            self._last_stops[drive] = said
 
     # what happens
 
@@ -216,7 +267,7 @@ class Plant:
         """A controller writes ahead while the bridge stands still for a moment, and hangs."""
         controller = self._controller(step)
         self._hang(PLANT.short_s, in_turn=False)
-        controller.write_ahead(100)
+        controller.write_ahead(int(step.how))
         self.world.after(step.seconds, controller.start)
 
     def hang(self, step: Step) -> None:
@@ -235,9 +286,11 @@ class Plant:
         for bus in self.bridge.buses:
             bus.enter(ControllerState.BUS_OFF)
         self.oracle.bus_off(now)
+        self._disturbed()
         buses = list(self.bridge.buses)
 
         def back() -> None:
+            self._disturbed()
             for bus in buses:
                 bus.enter(ControllerState.OK)
 
@@ -261,6 +314,54 @@ class Plant:
         node.speaks = False
         self.world.after(step.seconds, lambda: setattr(node, "speaks", True))
 
+    def intrude(self, step: Step) -> None:
+        """A tool commands a node for a while; afterwards an operator starts what was stopped for it."""
+        drive = DRIVES[step.which % len(DRIVES)]
+        intruder = Intruder(self.world, self.wire, drive, step.how)
+        now = self.world.now
+        if not (self.wire.is_cut or self.wire.loss):
+            what = f"an intruder's {step.how} at {drive.path}"
+            bus = self._project.site.bus[0].name
+            self.causes.owes(EventKind.INTRUDER, bus, now, now + _FOUND_S + step.seconds, what)
+
+        def goes_on() -> None:
+            self.oracle.intruded(drive, self.world.now)
+            if self.world.now < now + step.seconds:
+                self.world.after(_LOOK_S, goes_on)
+
+        def leave() -> None:
+            intruder.leave()
+            self.oracle.intruded(drive, self.world.now)
+            self.world.after(_ORDER_S, self._put_in_order)
+
+        goes_on()
+        self.world.after(step.seconds, leave)
+
+    def _put_in_order(self) -> None:
+        self.operator.start_nodes(sorted({drive.node for drive in DRIVES}))
+
+    def second_bridge(self, step: Step) -> None:
+        """Another bridge with the same site file, which no controller knows."""
+        if self.second is not None:
+            return
+        wires = {self._project.site.bus[0].name: self.wire}
+        second = self.second = Bridge(
+            self.world, self._project, wires, "two", Random(f"{self.plan.seed} second {step.at}")
+        )
+
+        def leave() -> None:
+            second.process.kill(in_turn=False)
+            self.second = None
+            self.world.after(_ORDER_S, self._put_in_order)
+
+        self.world.after(step.seconds, leave)
+
+    def slow(self, step: Step) -> None:
+        """The machine is busy: whatever the bridge does takes longer."""
+        process = self.bridge.process
+        usual_s, process.look_s = process.look_s, float(step.how)
+        self.world.after(step.seconds, lambda: setattr(process, "look_s", usual_s))
+
     def step_clock(self, step: Step) -> None:
         self.world.wall_step_s += step.seconds
 
@@ -283,5 +384,8 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "noise": Plant.noise,
     "node reset": Plant.reset_node,
     "node silent": Plant.silence_node,
+    "intruder": Plant.intrude,
+    "second bridge": Plant.second_bridge,
+    "box slow": Plant.slow,
     "clock stepped": Plant.step_clock,
 }

@@ -1,0 +1,146 @@
+"""What requests are answered against what the wire carries: each has one answer, and it says what is so.
+
+Written from the docs (outcomes.md, dead-man-chain.md). Where the bridge or its bus failed in between, an
+answer may be older than what it says, and is not judged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Final
+
+from bridge.command import Outcome, Request, Write
+from tests.plant.oracle import REACTION_S, Oracle, Track
+from tests.proof.drives import Drive
+from tests.proof.settings import PLANT
+
+_ANSWER_S: Final = 10.0
+"""Longest time to an answer: a start has 3 s, a parameter two more rounds of SDO."""
+_NEVER_S: Final = 3.0
+"""So long the wire is watched for what was not forwarded. Numbers of telegrams come again after eleven."""
+_PERIOD_S: Final = PLANT.rpdo_period_ms / 1000
+_FOLLOWED: Final = 2
+_STOPS: Final = ("stop", "quick_stop", "disable_voltage")
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A request whose answer is still to come."""
+
+    request: Request
+    came: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Claim:
+    """What an answer says of the wire; it is judged at ``due``. ``setpoint``: that of a telegram that
+    enables, None for a stop."""
+
+    drive: Drive
+    came: float
+    answered: float
+    due: float
+    is_forwarded: bool
+    said: str
+    setpoint: int | None = None
+
+
+class Answers:
+    """Judge of answers. What is wrong goes to the oracle's violations."""
+
+    def __init__(self, oracle: Oracle, drives: list[Drive]) -> None:
+        self._oracle = oracle
+        self._drives = {drive.path: drive for drive in drives}
+        self._asked: dict[int, _Asked] = {}
+        self._claims: list[_Claim] = []
+        self._disturbed_at = -inf
+        """When the bridge last stood still, ended, or lost its bus."""
+
+    # what happens
+
+    def disturbed(self, at: float) -> None:
+        """The bridge or its bus fails, or is back: answers of this moment say nothing of the wire."""
+        self._disturbed_at = at
+
+    def ended(self, at: float) -> None:
+        """The bridge is gone, and with it the answers that it owed."""
+        self._asked.clear()
+        self.disturbed(at)
+
+    def asked(self, number: int, request: Request, at: float) -> None:
+        self._asked[number] = _Asked(request, at)
+
+    def answered(self, number: int, outcome: Outcome, at: float) -> None:
+        asked = self._asked.pop(number, None)
+        if asked is None:
+            self._oracle.wrong(at, f"request {number} is answered twice: {outcome.code}")
+            return
+        drive = self._drives.get(asked.request.target)
+        if drive is None:
+            return
+        command = asked.request.command
+        said = f"{outcome.code}{'' if outcome.forwarded else ', not forwarded'}"
+        is_sent = outcome.ok and outcome.forwarded
+        if isinstance(command, Write):
+            word, setpoint = command.values.get("control_word"), command.values.get("setpoint_1")
+            mask, value = drive.family.enabling
+            if isinstance(word, int) and isinstance(setpoint, int) and word & mask == value:
+                self._claim(drive, asked.came, at, is_sent, said, setpoint)
+        elif command.action in _STOPS and outcome.ok and outcome.forwarded:
+            self._claim(drive, asked.came, at, True, said, None)
+
+    def refused(self, drive: Drive, setpoint: int, sent: float, at: float, code: int) -> None:
+        """A Modbus exception as the answer to a telegram that enables, with this setpoint."""
+        self._claim(drive, sent, at, False, f"exception {code:02X}h", setpoint)
+
+    def _claim(
+        self, drive: Drive, came: float, at: float, is_forwarded: bool, said: str, setpoint: int | None
+    ) -> None:
+        due = at + (REACTION_S if is_forwarded else _NEVER_S)
+        self._claims.append(_Claim(drive, came, at, due, is_forwarded, said, setpoint))
+
+    # judging
+
+    def look(self, now: float, *, is_still: bool) -> None:
+        """Judge what is due by ``now``; a bridge that stands still owes nothing."""
+        if is_still:
+            self._disturbed_at = now
+        for number, asked in list(self._asked.items()):
+            if now - max(asked.came, self._disturbed_at) > _ANSWER_S:
+                del self._asked[number]
+                self._oracle.wrong(now, f"{asked.request} has no answer for {_ANSWER_S:.0f} s")
+        due = [claim for claim in self._claims if claim.due <= now]
+        self._claims = [claim for claim in self._claims if claim.due > now]
+        for claim in due:
+            self._oracle.looks += 1
+            if wrong := self._judged(claim, self._oracle.tracks[claim.drive]):
+                asked = f"{claim.drive.path}, asked at {claim.came - 1000.0:.3f} s"
+                self._oracle.wrong(claim.answered, f"{asked}: {claim.said!r}, and {wrong}")
+
+    def _judged(self, claim: _Claim, track: Track) -> str:
+        if not claim.is_forwarded:
+            sent = [at for at, said in track.setpoints if at > claim.came and said == claim.setpoint]
+            return f"its setpoint is on the wire at {sent[0] - 1000.0:.3f} s" if sent else ""
+        if self._disturbed_at >= claim.came - _PERIOD_S:
+            return ""
+        if claim.setpoint is None:
+            is_there = any(claim.came <= at <= claim.due for at in track.stops)
+            return "" if is_there else "no RPDO has told the drive to stop"
+        is_overtaken = track.last_at > claim.came or track.since >= claim.came
+        if is_overtaken or any(at >= claim.came and said == claim.setpoint for at, said in track.setpoints):
+            return ""
+        return "its setpoint was not on the wire"
+
+    def last_stop(self, drive: Drive, at: float, before: float | None, said: float | None) -> None:
+        """``supervision/last_stop`` as it was at the last look, and is now. A drive follows a ramp that it is
+        on; what that looks like is its own."""
+        if said != _FOLLOWED or before in (None, _FOLLOWED):
+            return
+        mask, value = drive.family.enabled
+        track = self._oracle.tracks[drive]
+        takes_voltage, off = drive.family.stops["disable_voltage"]
+        if track.stop_word & takes_voltage != off:
+            return
+        if not any(when >= at - 1.0 and word & mask != value for when, word in track.said):
+            self._oracle.wrong(at, f"{drive.path}: followed, and the drive has not said that it is stopped")

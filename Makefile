@@ -148,6 +148,22 @@ plant: compiled ## whole plants on one seeded clock, for a minute of each CPU, a
 	  PROOF_PLANT=first $(IN) -m tests.plant --seconds $(PLANT_S) $(SEED:%=--seed %) $(ARGS); one=$$?; \
 	  wait $$other && exit $$one
 
+# Atheris has no wheel for every machine: it is installed where it is asked for.
+GUIDED_S ?= 20
+DEEP_S ?= 1800
+
+$(VENV)/guided.stamp: $(VENV)/dev.stamp
+	@echo "Installing Atheris into $(VENV)"
+	@$(QUIETLY) $(PIP) install --no-build-isolation -c requirements.lock -e '.[dev,fuzz]'
+	@touch $@
+
+fuzz-guided: compiled $(VENV)/guided.stamp ## fuzz every codec and parser, guided by coverage: 20 s each, two at a time
+	@echo "== fuzzing guided by coverage"
+	@$(IN) -m tests.fuzz.guided $(PARSERS) --seconds $(GUIDED_S) $(ARGS)
+
+fuzz-deep: compiled $(VENV)/guided.stamp ## the same for hours, and what covers something new is kept (DEEP_S=s for each)
+	@$(IN) -m tests.fuzz.guided $(PARSERS) --seconds $(DEEP_S) --keep $(ARGS)
+
 bench: compiled packages ## measure everything in half an hour, write docs/explanation/performance.md (ARGS='--rounds 1')
 	@$(ON_VCAN) $(IN) -m tests.bench $(if $(filter 0,$(LAB)),--no-lab) --json build/bench.json --plots docs/images docs/explanation/performance.md $(ARGS)
 
@@ -223,7 +239,7 @@ lock: ## write requirements.lock anew with today's versions
 	@folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; new=$$folder/venv/bin/python; \
 	  tools/make-venv "$$folder/venv"; \
 	  echo "Resolving today's versions"; \
-	  tools/quietly "$$folder/log" "$$new" -m pip install --no-build-isolation -e '.[dev]'; \
+	  tools/quietly "$$folder/log" "$$new" -m pip install --no-build-isolation -e '.[dev,fuzz]'; \
 	  { echo "# Every package of .venv, for pip's -c. Written by \`make lock\` with $$("$$new" --version)."; \
 	    "$$new" -m pip freeze --exclude-editable; } >"$$folder/lock"; \
 	  ! grep -n '@\|file:' "$$folder/lock"; \
@@ -244,5 +260,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short plant bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
+.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short fuzz-guided fuzz-deep plant bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
   check-imports format docs setup lock wheel clean help

@@ -12,12 +12,13 @@ from typing import Any, Final
 
 import can
 from can.io.blf import BLFParseError
+from can.io.generic import MessageReader
 
 from bridge.base.errors import OperationFailed
 from bridge.can.pythoncan import frame_of
 from bridge.canopen.frame import Frame
 
-_TEXTS: Final[dict[str, Callable[[Any], can.io.generic.MessageReader]]] = {
+_TEXTS: Final[dict[str, Callable[[Any], MessageReader]]] = {
     ".log": can.CanutilsLogReader,
     ".asc": can.ASCReader,
     ".trc": can.TRCReader,
@@ -118,7 +119,7 @@ class Trace:
             after = f"after {self._count} frames" if self._count else "from the start"
             raise OperationFailed(f"{self._path} is no {self._path.suffix} trace {after}: {error}") from None
 
-    def _reader(self) -> can.io.generic.MessageReader:
+    def _reader(self) -> MessageReader:
         reader = _TEXTS.get(self._path.suffix.lower())
         if reader is None:
             return can.BLFReader(self._path)

@@ -25,7 +25,7 @@ from bridge.cli.bus_runner import AsJson, BusChoice, carry_out, choose_bus, prin
 from bridge.cli.terminal import printable
 from bridge.cli.trace import SUFFIXES, Trace
 from bridge.cli.trace_judge import TraceJudge
-from bridge.config import load_site
+from bridge.config import BusTable, load_site
 from bridge.lint import family_dictionaries
 from bridge.witness.plan import UnknownFamily, WatchedBus, plan
 
@@ -117,9 +117,7 @@ def monitor(
         return _Listener(decoder, habits, wanted, show, now, count, seconds)
 
     trace = Trace(path, which.channel, line.table.channel) if path else None
-    judge = None
-    if site and trace:
-        judge = TraceJudge(_watched(site, line.table.name), bounds(line.table, decoder.rpdos()))
+    judge = _judge_of(site, line.table, decoder) if site and trace else None
     with Record(log, is_recorded=trace is not None) if log else nullcontext() as record:
         try:
             listener = _play(trace, listen, judge) if trace else carry_out(line, listen)
@@ -130,12 +128,21 @@ def monitor(
         _print_statistics(tally, listener.last - listener.started, as_json=as_json)
     for node_id, odd in habits.habits().items():
         tell(f"{decoder.name(node_id)}: {'; '.join(odd)}")
-    if judge:
-        wrong, right = judge.verdict(listener.last)
-        for sentence in (*right, *wrong):
-            tell(sentence)
-        if wrong:
-            raise typer.Exit(1)
+    if judge and not _tell_verdict(judge, listener.last):
+        raise typer.Exit(1)
+
+
+def _judge_of(site: Path, table: BusTable, decoder: Decoder) -> TraceJudge:
+    """Judge of a trace of this bus."""
+    return TraceJudge(_watched(site, table.name), bounds(table, decoder.rpdos()))
+
+
+def _tell_verdict(judge: TraceJudge, end: float) -> bool:
+    """True if nothing is wrong up to the end of the trace."""
+    wrong, right = judge.verdict(end)
+    for sentence in (*right, *wrong):
+        tell(sentence)
+    return not wrong
 
 
 def _watched(site: Path, bus: str) -> WatchedBus | None:

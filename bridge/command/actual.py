@@ -243,7 +243,7 @@ class ActualData:
             word = words[place]
             values.append((word - 0x1_0000 if word & 0x8000 else word) * full / at)
         if self._others:
-            values.extend(codec.from_words(words) for codec in self._others)
+            values.extend([codec.from_words(words) for codec in self._others])
         self._image.set_values(self._indices, values, now)
 
     def _judge(self, quality: Quality, now: float) -> None:

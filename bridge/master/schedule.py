@@ -31,6 +31,8 @@ class Schedule(Generic[N]):
 
     def take_touched(self) -> list[N]:
         """Touched nodes, each once, in the order in which they were touched."""
+        if not self._touched:
+            return []
         touched, self._touched = self._touched, {}
         return [self._nodes[place] for place in touched]
 

@@ -16,11 +16,10 @@ from bridge.command.stop_check.event import (
     Sends,
     StatusChange,
     TelegramGap,
-    TelegramHeard,
     TimePassed,
 )
 from bridge.command.stop_check.state import Bounds, LastStop, Says, Sent, StopState, StopVerdict
-from bridge.command.stop_check.step import next_deadline, step
+from bridge.command.stop_check.step import next_deadline, on_telegram, step
 from bridge.drive import MOVING, DriveState, OwnJudgement, OwnVerdict, StatusWords
 
 _DEADLINES: Final = 3
@@ -139,11 +138,9 @@ class DriveStopCheck:
     def on_telegram(self, now: float, speed: float | None) -> None:
         """Take note of the TPDO that ``after_pdo`` knows, changed or not. ``speed`` is the actual speed or
         frequency in any unit, None where it is not known."""
-        if self._state.says is not Says.ENABLED:
-            return
-        before = self._state.last_stop
-        self._tell(TelegramHeard(now, speed))
-        if self._state.last_stop is not before:
+        before = self._state
+        state = self._state = on_telegram(before, now, speed)
+        if state.last_stop is not before.last_stop:
             self._channel.plan_anew()
 
     def _says(self, word: int) -> Says:

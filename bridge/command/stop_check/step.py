@@ -38,7 +38,7 @@ def step(state: StopState, event: Event) -> tuple[StopState, tuple[StopVerdict, 
     """Let ``event`` happen. Only ``TimePassed`` brings verdicts: the bus has been drained by then."""
     match event:
         case TelegramHeard():
-            state = _telegram(state, event)
+            state = on_telegram(state, event.at, event.speed)
         case StatusChange():
             state = _report(state, event)
         case TimePassed():
@@ -216,15 +216,16 @@ _PLACE_DEEDS: Final[Mapping[PlaceDeed, Callable[[StopState, float, Bounds], Stop
 # the drive
 
 
-def _telegram(state: StopState, event: TelegramHeard) -> StopState:
-    is_older = state.is_on_bus and event.at < state.since
+def on_telegram(state: StopState, at: float, speed: float | None) -> StopState:
+    """State after a ``TelegramHeard``, for a caller that has one of every telegram: no event is made."""
+    is_older = state.is_on_bus and at < state.since
     if is_older or state.says is not Says.ENABLED or state.sent is Sent.SILENT:
         return state
-    off_s, ramp_s = state.bounds.off_s, state.bounds.ramp_s
-    sums, summed = state.sums.seen(event.at, event.speed, off_s=off_s, ramp_s=ramp_s)
-    if sums is not state.sums:
+    bounds, before = state.bounds, state.sums
+    sums, summed = before.seen(at, speed, off_s=bounds.off_s, ramp_s=bounds.ramp_s)
+    if sums is not before:
         state = state.summed(sums)
-    return state if summed is None else _found(state, Evidence.SUMMED, event.at, summed)
+    return state if summed is None else _found(state, Evidence.SUMMED, at, summed)
 
 
 def _report(state: StopState, event: StatusChange) -> StopState:

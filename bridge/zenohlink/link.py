@@ -127,9 +127,10 @@ class ZenohLink:
         """
 
         def put_some(rest: Sequence[Value], session: zenoh.Session) -> None:
+            put = self._publishers.put
             for value in rest[:_PUTS_AT_ONCE]:
                 try:
-                    self._publishers.put(session, value)
+                    put(session, value)
                 except Exception as error:  # noqa: BLE001 - one bad value must not stop the others
                     self._worker.complain(error)
             if rest := rest[_PUTS_AT_ONCE:]:

@@ -138,13 +138,14 @@ class KeySpace:
     def as_jsons(self, indices: Sequence[int], columns: Columns, at_zero_ns: int) -> Iterator[bytes]:
         """The same for many points. ``at_zero_ns``: the wall clock at time 0 of the readings."""
         last, tail = nan, ""
+        states, good = self._states, Quality.GOOD
         for index, value, quality, time, why in zip(indices, *columns, strict=True):
             if time != last:  # many change together
                 last = time
                 tail = f',"q":"good","t":{seconds(at_zero_ns + round(time * 1e9))!r}}}'
             # What most of them are is written here, four times as fast.
             is_plain = type(value) is int or (type(value) is float and isfinite(value))
-            if is_plain and quality is Quality.GOOD and not why and not self._states[index]:
+            if is_plain and quality is good and not why and not states[index]:
                 yield f'{{"v":{value!r}{tail}'.encode()
             else:
                 reading = Reading(value, quality, time, why)

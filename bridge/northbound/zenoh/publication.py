@@ -76,11 +76,11 @@ class Publication:
             self._pace.wake()
 
     def _publish(self, changed: list[int]) -> None:
-        owner_of, tokens = self._keys.owner_of, self._tokens
+        owner_of, tokens, has_readers = self._keys.owner_of, self._tokens, self._has_readers
         read = list[int]()
         for index in changed:
             place = owner_of[index]
-            if self._has_readers[place]:
+            if has_readers[place]:
                 read.append(index)
             else:
                 self._held[place][index] = None

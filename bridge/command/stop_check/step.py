@@ -217,7 +217,8 @@ _PLACE_DEEDS: Final[Mapping[PlaceDeed, Callable[[StopState, float, Bounds], Stop
 
 
 def on_telegram(state: StopState, at: float, speed: float | None) -> StopState:
-    """State after a ``TelegramHeard``, for a caller that has one of every telegram: no event is made."""
+    """State after a ``TelegramHeard``. The stop check of a drive calls it without that event: telegrams are
+    so many that making one for each shows in the cost of a PDO."""
     is_older = state.is_on_bus and at < state.since
     if is_older or state.says is not Says.ENABLED or state.sent is Sent.SILENT:
         return state

@@ -28,6 +28,8 @@ _COMMANDS: Final = {
     "family": "family_command.app",
     "faults": "faults_command.faults",
     "hash-password": "project_command.hash_password",
+    "record": "record_command.record",
+    "replay": "replay_command.replay",
     "scan": "scan_command.scan",
     "nmt": "nmt_command.nmt",
     "monitor": "monitor.monitor",

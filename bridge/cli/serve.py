@@ -147,6 +147,7 @@ async def _serve(
     """The service, with simulated nodes on its virtual buses."""
     from bridge.base.memory_lock import lock_memory
     from bridge.master.standstill import SignalAlarm
+    from bridge.recorder.recorder import Recorder
     from bridge.service.bus_process import BusProcess, make_bus
 
     why_not = lock_memory()
@@ -167,7 +168,9 @@ async def _serve(
         simulations.append(nodes)
         return wire.end(table.name)
 
-    service = BusProcess(project, open_bus, fronts=fronts, alarm=SignalAlarm())
+    recorder = Recorder(project.site) if project.site.recorder.enabled else None
+    alarm = recorder.alarm() if recorder else SignalAlarm()
+    service = BusProcess(project, open_bus, fronts=fronts, alarm=alarm, recorder=recorder)
     ending.first = service.halt
     if controller and project.site.zenoh:
         service.fronts.append(_demo_controller(project.site.zenoh, project.site.site.name))

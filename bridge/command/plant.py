@@ -12,6 +12,7 @@ from typing import Final, TypeVar
 
 from bridge.base.guard import Guard
 from bridge.base.ratelimit import RateLimit
+from bridge.base.turns import Turn, Turns
 from bridge.catalogue import Catalogue, DeviceSpec, NodeSpec
 from bridge.catalogue.points import CONNECTION_COUNTS
 from bridge.command.audit import AuditTrail, Rejection
@@ -60,11 +61,14 @@ class Plant:
     """All drives of a site.
 
     ``began`` is the monotonic time of what is known from the start, such as the version. ``on_event``
-    callbacks get the events.
+    callbacks get the events. ``turns`` runs what changes it.
     """
 
-    def __init__(self, catalogue: Catalogue, version: str, began: float = 0.0) -> None:
+    def __init__(
+        self, catalogue: Catalogue, version: str, began: float = 0.0, turns: Turns | None = None
+    ) -> None:
         self.catalogue, self.began = catalogue, began
+        self.turns = turns or Turns()
         self.image = Image(catalogue.points)
         self.audit = AuditTrail(self.image)
         self.eeprom_writes = Ledger()
@@ -156,6 +160,9 @@ class Plant:
 
     def report(self, event: Event) -> None:
         """Tell the listeners of an event, after those that wait."""
+        self.turns.run(Turn.REPORT, self._report, event)
+
+    def _report(self, event: Event) -> None:
         if self.events.waiting:
             self.tell_events()
         self._tell(event)
@@ -290,7 +297,7 @@ class Plant:
         for one in self._deadlines.sweep(now):
             if self._missed_limit.allows(now):
                 said = Text.of("watchdog.deadline_missed")
-                self.report(Event(now, EventKind.WATCHDOG, one.name, _SEVERITY_MISSED, said))
+                self._report(Event(now, EventKind.WATCHDOG, one.name, _SEVERITY_MISSED, said))
         self.set("bridge/missed_deadlines", self._deadlines.missed, now)
         for member in self.members.values():
             member.look(now)
@@ -369,9 +376,15 @@ class PlantView:
         """Do nothing: changes are here at once anyway."""
 
     def look(self, drive: str) -> None:
+        self._plant.turns.run(Turn.LOOK, self._look, drive)
+
+    def _look(self, drive: str) -> None:
         self._plant.members[drive].look(self._clock())
 
     def submit(self, request: Request, reply: Reply) -> None:
+        self._plant.turns.run(Turn.SUBMIT, self._submit, request, reply)
+
+    def _submit(self, request: Request, reply: Reply) -> None:
         is_changed = True
         try:
             later = self._plant.reply_later(reply)
@@ -384,10 +397,19 @@ class PlantView:
 
     def rejected(self, rejection: Rejection, at: float | None = None, count: int = 1) -> None:
         """Pass on ``count`` rejections of this kind, the last ``at`` a time of the plant's, or now."""
+        self._plant.turns.run(Turn.REJECTED, self._rejected, rejection, at, count)
+
+    def _rejected(self, rejection: Rejection, at: float | None, count: int) -> None:
         self._plant.rejected(rejection, self._clock() if at is None else at, count)
 
     def count(self, leaf: str, by: int = 1) -> None:
+        self._plant.turns.run(Turn.COUNT, self._count, leaf, by)
+
+    def _count(self, leaf: str, by: int) -> None:
         self._plant.count(leaf, self._clock(), by)
 
     def on_connection(self, identity: Identity, *, is_there: bool, has_others: bool = False) -> None:
+        self._plant.turns.run(Turn.CONNECTION, self._on_connection, identity, is_there, has_others)
+
+    def _on_connection(self, identity: Identity, is_there: bool, has_others: bool) -> None:
         self._plant.on_connection(identity, self._clock(), is_there=is_there, has_others=has_others)

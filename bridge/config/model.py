@@ -373,6 +373,14 @@ class AuditTable(Table):
     every_telegram: bool = False
 
 
+class RecorderTable(Table):
+    enabled: bool = True
+    size_mb: int = Field(16, ge=4, le=100_000, description="4…100000 MB")
+    before_s: float = Field(30.0, ge=1, le=3600, description="1…3600 s")
+    after_s: float = Field(5.0, ge=0, le=600, description="0…600 s")
+    black_box_mb: int = Field(64, ge=4, le=100_000, description="4…100000 MB")
+
+
 class Site(Table):
     """One site file, checked. Lists are in the order of the file."""
 
@@ -383,3 +391,4 @@ class Site(Table):
     zenoh: ZenohTable | None = None
     page: PageTable | None = None
     audit: AuditTable = Field(default_factory=lambda: AuditTable.model_validate({}))
+    recorder: RecorderTable = Field(default_factory=lambda: RecorderTable.model_validate({}))

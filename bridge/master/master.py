@@ -15,6 +15,7 @@ from functools import partial
 
 from bridge.base.errors import OperationFailed
 from bridge.base.guard import Guard
+from bridge.base.turns import Turn
 from bridge.can import open_all
 from bridge.can.interface import Bus, ControllerState
 from bridge.command import Event, EventKind, Plant, Reply, Request
@@ -24,7 +25,6 @@ from bridge.master.lateness import Lateness
 from bridge.master.line import RENEWALS, BusLine
 from bridge.master.network import Network
 from bridge.master.standstill import WatchdogTimer
-from bridge.master.suspend import SuspendWatch
 from bridge.master.timer import LoopTimer
 from bridge.text import Text
 
@@ -52,8 +52,8 @@ class Master:
     when the words of a round are on their way.
 
     ``clock`` gives monotonic seconds; ``alive`` is called at the end of every complete round; ``alarm``
-    detects a standstill while frames are handed to the bus; ``suspended`` gives a lower and an upper bound,
-    in seconds, of how long the machine has been suspended.
+    detects a standstill while frames are handed to the bus; ``slept`` gives the seconds for which the machine
+    has been suspended since it was called last, 0 for none.
     """
 
     def __init__(
@@ -63,14 +63,14 @@ class Master:
         clock: Callable[[], float],
         alive: Callable[[float], None] = lambda now: None,
         alarm: WatchdogTimer | None = None,
-        suspended: Callable[[], tuple[float, float]] = lambda: (0.0, 0.0),
+        slept: Callable[[], float] = lambda: 0.0,
     ) -> None:
         self._alarm = alarm or WatchdogTimer()
         self._lines = [BusLine(bus, network, plant, clock, self._alarm) for bus, network in lines]
         self._plant = plant
         self._clock = clock
         self._alive = alive
-        self._suspend = SuspendWatch(suspended)
+        self._slept = slept
         self._lateness = Lateness(plant.image, plant.events)
         self._replies = Guard("outcome")
         self._due: float | None = None
@@ -101,6 +101,9 @@ class Master:
 
     def halt(self, now: float) -> None:
         """Take no more commands, and hand stopped words to the buses at once. May be called again."""
+        self._plant.turns.run(Turn.HALT, self._halt, now)
+
+    def _halt(self, now: float) -> None:
         self._plant.close(now)
         self.wake()
 
@@ -116,12 +119,21 @@ class Master:
             if not self._running or has_stopped or self._clock() > now + _DRIVES_FOLLOW_S:
                 break
             await asyncio.sleep(_LOOK_S)
+        ending = self.stop_nodes()
+        if ending.nodes_stopped:
+            await asyncio.sleep(_STOP_DRIVES_S)
+        return ending
+
+    def stop_nodes(self) -> Ending:
+        """Send NMT stop to the nodes of drives that do not follow."""
+        return self._plant.turns.run(Turn.STOP_NODES, self._stop_nodes)
+
+    def _stop_nodes(self) -> Ending:
         ending = end(self._plant, can_send=self._running)
         for enforcement in nmt_stops(self._plant, ending):
             self._enforce(enforcement, self._clock())
         if ending.nodes_stopped:
             self.wake()
-            await asyncio.sleep(_STOP_DRIVES_S)
         return ending
 
     async def close(self) -> None:
@@ -147,20 +159,27 @@ class Master:
     def wake(self) -> None:
         """Run one round, while the master runs. An outcome may call this: it is delivered when the work of a
         round is done."""
-        self._carry_on(self.pump)
+        self._carry_on(Turn.PUMP, self.pump)
 
     def on_bus(self) -> None:
         """Take in frames, and let the buses do their work, or run a round that is due."""
-        self._carry_on(self.take_in)
+        self._carry_on(Turn.TAKE_IN, self.take_in)
 
-    def _carry_on(self, turn: Callable[[], None]) -> None:
+    @property
+    def asks(self) -> bool:
+        """True while any node is asked for anything by SDO."""
+        return any(node.is_asked for line in self._lines for node in line.network.nodes)
+
+    def _carry_on(self, turn: Turn, act: Callable[[], None]) -> None:
         """Do one turn. A fault of our own ends the running: no drive is left to a master that does half of
         its work. Each drive gets a last, stopped word if possible; the bursts end within the dead-man time,
         and ``failed`` says why."""
-        if not self._running:
-            return
+        if self._running:
+            self._plant.turns.run(turn, self._try, act)
+
+    def _try(self, act: Callable[[], None]) -> None:
         try:
-            turn()
+            act()
         except Exception as error:
             self._running = False
             if self._failure and not self._failure.done():
@@ -283,7 +302,7 @@ class Master:
     def _check_gap(self, now: float) -> None:
         """Stop all drives after a pause longer than the dead-man time, or a suspended machine: all bursts
         have ended, and nothing that was moving may go on by itself."""
-        slept_s = self._suspend.take()
+        slept_s = self._slept()
         if self._last_round is None:
             return
         pause_s = now - self._last_round

@@ -18,12 +18,12 @@ class Schedule(Generic[N]):
     def __init__(self, nodes: Iterable[N]) -> None:
         self._nodes = tuple(nodes)
         self._touched: dict[int, None] = dict.fromkeys(range(len(self._nodes)))
-        self._places = {id(node): place for place, node in enumerate(self._nodes)}
+        self._places: dict[Neighbour, int] = {node: place for place, node in enumerate(self._nodes)}
         self._planned: list[float | None] = [None] * len(self._nodes)
         self._heap: list[tuple[float, int]] = []
 
     def touch(self, node: Neighbour) -> None:
-        self._touched[self._places[id(node)]] = None
+        self._touched[self._places[node]] = None
 
     @property
     def is_touched(self) -> bool:
@@ -38,7 +38,7 @@ class Schedule(Generic[N]):
 
     def plan(self, node: Neighbour) -> None:
         """Plan this node by its present deadline."""
-        place = self._places[id(node)]
+        place = self._places[node]
         at, planned = node.next_deadline(), self._planned[place]
         if at is not None and (planned is None or at < planned):
             self._planned[place] = at

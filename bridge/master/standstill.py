@@ -29,13 +29,14 @@ class SignalAlarm(WatchdogTimer):
     """Timer that takes SIGALRM and the real-time interval timer of the process. Made in its main thread."""
 
     def __init__(self) -> None:
-        signal.signal(signal.SIGALRM, lambda number, frame: self._ring())
+        signal.signal(signal.SIGALRM, lambda number, frame: self.ring())
 
     def set(self, seconds: float) -> None:
         self.rang = False
         signal.setitimer(signal.ITIMER_REAL, seconds)
 
-    def _ring(self) -> None:
+    def ring(self) -> None:
+        """Note that the time has passed."""
         self.rang = True
         if self.breaks_in:
             self.breaks_in = False

@@ -438,6 +438,11 @@ class NodeCore:
         self._show(now)
 
     @property
+    def is_asked(self) -> bool:
+        """True while a boot-up runs, or an SDO transfer."""
+        return self.booting.is_running or any(channel.waiting for channel in self.wire.sdo)
+
+    @property
     def is_operational(self) -> bool:
         return self.state is NodeState.OPERATIONAL
 

@@ -25,6 +25,7 @@ from bridge.lint import Severity, lint
 from bridge.master.ending import Ending
 from bridge.master.master import Master
 from bridge.master.network import Network
+from bridge.master.standby import Standby, listen_s
 from bridge.master.standstill import WatchdogTimer
 from bridge.mirror.endpoint import socket_endpoint, tap_path
 from bridge.mirror.publisher import MirrorPublisher
@@ -34,6 +35,8 @@ from bridge.northbound.listening import Port
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
 from bridge.project import Project, count
+from bridge.recorder.recorder import Recorder
+from bridge.recorder.tape import machine_tape
 from bridge.service.audit_log import AuditLog
 from bridge.service.event_log import log_event
 from bridge.service.front_process import Front
@@ -68,7 +71,8 @@ class BusProcess:
     """The bus process of one site.
 
     ``make_bus`` gives the buses. Of what the site serves by fronts, ``fronts`` are started: without any, this
-    process serves Modbus alone. ``alarm`` is the master's.
+    process serves Modbus alone. ``alarm`` is the master's. ``recorder`` records the core; without one nothing
+    does.
     """
 
     def __init__(
@@ -78,22 +82,39 @@ class BusProcess:
         *,
         fronts: Collection[FrontKind[Any]] = FRONTS,
         alarm: WatchdogTimer | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         self.project = project
+        self._recorder = recorder
+        tape = recorder.tape if recorder else machine_tape()
         site = project.site
         catalogue = Catalogue.of(site, project.families)
-        self.plant = Plant(catalogue, __version__, clock.now())
+        self.plant = Plant(catalogue, __version__, clock.now(), tape)
+        if recorder:
+            # Before all others: what they do upon an event comes after it.
+            self.plant.on_event(tape.on_event)
         self.plant.on_event(log_event)
         self.wear = WearKeeper(self.plant.eeprom_writes, Path(site.site.state_dir))
         self.audit = AuditLog(self.plant, site, clock.now, clock.epoch_ns)
         self.notifier = Notifier()
+        buses = [make_bus(table) for table in site.bus]
         networks = [
-            (make_bus(table), Network(table, self.plant.side_of(table), clock.epoch_ns, project.downloads))
-            for table in site.bus
+            (
+                bus,
+                Network(
+                    bus_table,
+                    self.plant.side_of(bus_table),
+                    tape.epoch_ns,
+                    project.downloads,
+                    Standby(listen_s(bus_table), tape.chance),
+                ),
+            )
+            for bus_table, bus in zip(site.bus, buses, strict=True)
         ]
         self._networks = [network for _, network in networks]
-        self.master = Master(networks, self.plant, clock.now, self.notifier.alive, alarm, clock.suspended_s)
-        self.view = PlantView(self.plant, clock.now, clock.epoch_ns, self.master.carry_out, self.master.wake)
+        lines = [(recorder.taped(bus) if recorder else bus, network) for bus, network in networks]
+        self.master = Master(lines, self.plant, tape.now, self.notifier.alive, alarm, tape.slept)
+        self.view = PlantView(self.plant, tape.now, clock.epoch_ns, self.master.carry_out, self.master.wake)
         self.condition = PlantCondition(self.plant, clock.now, clock.epoch_ns)
         self.modbus = None
         if site.modbus:
@@ -174,6 +195,9 @@ class BusProcess:
             # opened, because the first look takes longer than a round may be late.
             gc.collect()
             gc.freeze()
+            if self._recorder:
+                stack.callback(self._recorder.close)
+                self._recorder.start(self.master, self.view, self.plant)
             await self.master.start()
             # Whatever ends the service: the drives stop before anything else ends.
             stack.push_async_callback(self._stop)
@@ -220,6 +244,7 @@ class BusProcess:
             "EEPROM counts": self.wear.run(),
             "audit log": self.audit.run(),
             "condition": self.condition.run(),
+            **({"recorder": self._recorder.run()} if self._recorder else {}),
             "start": self._start(),
             **{part.name: self.supervisor.keep(part) for part in parts},
         }

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from random import Random
 
+from bridge.can import Bus
 from bridge.catalogue import Catalogue
 from bridge.command import Event, Identity, Outcome, Plant, PlantView, Request
 from bridge.image import Quality
@@ -18,6 +19,7 @@ from bridge.master.standby import Standby, listen_s
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
 from bridge.project import Project
+from bridge.recorder.tape import RecordingTape, TapedBus
 from tests.plant.machine import Process, Watcher
 from tests.plant.stream import Stream
 from tests.plant.wire import PlantBus, Wire
@@ -28,7 +30,13 @@ class Bridge:
     """One bridge on its wires. ``start`` begins a new process; what listens to it stays."""
 
     def __init__(
-        self, world: World, project: Project, wires: Mapping[str, Wire], name: str, rng: Random
+        self,
+        world: World,
+        project: Project,
+        wires: Mapping[str, Wire],
+        name: str,
+        rng: Random,
+        records: Callable[[bytes], None] | None = None,
     ) -> None:
         self._world = world
         self._project = project
@@ -50,6 +58,9 @@ class Bridge:
         self.on_answer: list[Callable[[int, Outcome], None]] = []
         self._requests = 0
         self.watchers: list[Watcher] = []
+        self.tape: RecordingTape | None = None
+        """Tape of the process that is on, where ``records`` has it recorded."""
+        self._records = records
         self.faults: list[str] = []
         """What has failed in any of its processes."""
         self.process = self._begin()
@@ -60,25 +71,34 @@ class Bridge:
         """A process with everything in it, as after ``drivebridge run``."""
         world = self._world
         process = self.process = Process(world, self, self.faults)
-        self.plant = Plant(self._catalogue, "0", world.now)
+        chance = self._rng.random
+        tape = self.tape = (
+            RecordingTape(self._records, now=process.clock, epoch_ns=world.epoch_ns, chance=chance)
+            if self._records
+            else None
+        )
+        self.plant = Plant(self._catalogue, "0", world.now, tape)
+        if tape:
+            self.plant.on_event(tape.on_event)
         self.plant.on_event(self._tell)
         self._buses = [
             PlantBus(world, self._wires[table.name], process, self._name) for table in self._project.site.bus
         ]
+        self.taped = [TapedBus(bus, tape) for bus in self._buses] if tape else []
+        buses: list[Bus] = [*(self.taped or self._buses)]
+        clock = tape.now if tape else process.clock
         networks = [
             Network(
                 table,
                 self.plant.side_of(table),
-                world.epoch_ns,
+                tape.epoch_ns if tape else world.epoch_ns,
                 self._project.downloads,
-                Standby(listen_s(table), self._rng.random),
+                Standby(listen_s(table), tape.chance if tape else chance),
             )
             for table in self._project.site.bus
         ]
-        self.master = Master(list(zip(self._buses, networks, strict=True)), self.plant, process.clock)
-        self.view = PlantView(
-            self.plant, process.clock, world.epoch_ns, self.master.carry_out, self.master.wake
-        )
+        self.master = Master(list(zip(buses, networks, strict=True)), self.plant, clock)
+        self.view = PlantView(self.plant, clock, world.epoch_ns, self.master.carry_out, self.master.wake)
         self.modbus = None
         if self._project.site.modbus:
             units = units_of(self._catalogue)

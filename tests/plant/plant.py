@@ -60,7 +60,15 @@ def project(folder: Path) -> Project:
 
 
 class Plant:
-    def __init__(self, project: Project, plan: Plan, *, logs: bool = False) -> None:
+    def __init__(
+        self,
+        project: Project,
+        plan: Plan,
+        *,
+        logs: bool = False,
+        records: Callable[[bytes], None] | None = None,
+    ) -> None:
+        """``records`` takes the notes of each turn of the bridge while its tape is on."""
         self.world = World()
         self.world.log = [] if logs else None
         self.plan = plan
@@ -77,7 +85,7 @@ class Plant:
             FieldNode(self.world, self.wire, device) for device in simulated_nodes(table, project.path)
         ]
         self.bridge = Bridge(
-            self.world, project, {table.name: self.wire}, "one", Random(f"{plan.seed} bridge")
+            self.world, project, {table.name: self.wire}, "one", Random(f"{plan.seed} bridge"), records
         )
         self.bridge.on_start.append(self._on_start)
         self.bridge.on_event.append(lambda event: self.causes.told(event, self.world.now))

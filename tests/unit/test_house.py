@@ -53,7 +53,7 @@ ALLOWED = {
     "LoopTimer.wake",
     "Master.alive",
     "Master.clock",
-    "Master.suspended",
+    "Master.slept",
     "Network.epoch_ns",
     "PlantView.carry_out",
     "PlantView.clock",

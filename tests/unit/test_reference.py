@@ -280,7 +280,7 @@ def leaf_commands(command: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def test_every_command_and_option_is_described() -> None:
     reference = page("reference/command-line.md")
     headings = {
-        re.sub(r" (\[?SITE|FILE).*", "", heading.strip("`").removeprefix("drivebridge ")): heading
+        re.sub(r" (\[?SITE|FILE|RECORDING).*", "", heading.strip("`").removeprefix("drivebridge ")): heading
         for heading in reference.headings
         if heading.startswith("`drivebridge ")
     }

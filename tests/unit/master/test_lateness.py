@@ -72,7 +72,7 @@ def test_a_machine_that_was_suspended_starts_all_drives_anew(tmp_path: Path) -> 
         [(bench.bus, bench.network)],
         bench.plant,
         bench.clock,
-        suspended=lambda: (offset[0], offset[0] + 0.001),
+        slept=SuspendWatch(lambda: (offset[0], offset[0] + 0.001)).take,
     )
     bench.master.attach(lambda at: setattr(bench, "wake_at", at))
     bench.run(1.0)

@@ -1,0 +1,337 @@
+"""The tape: everything outside of the core, as the core sees it. What it gives to the core are inputs, what
+it takes are outputs; both are notes of the turn in which they are.
+
+A note is one value that MessagePack has: a float is a look at the clock, a list begins with its kind.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, Final, ParamSpec, TypeVar
+
+import msgspec
+
+from bridge.base import clock
+from bridge.base.turns import Turn, Turns
+from bridge.can.burstend import Burst
+from bridge.can.interface import Bus, BusStatus, ControllerState
+from bridge.canopen.frame import Frame
+from bridge.command import Event, Identity, Outcome, Rejection, Reply, Request
+from bridge.master.standstill import SignalAlarm
+from bridge.master.suspend import SuspendWatch
+from bridge.mirror import protocol
+from bridge.mirror.protocol import Answered, Connected, Malformed, Rejected
+from bridge.text import Said
+
+Notes = list[Any]
+"""The notes of one turn: its kind, its arguments, then the notes proper."""
+
+_Args = ParamSpec("_Args")
+_Result = TypeVar("_Result")
+_OF_THE_CORE: Final = frozenset((Turn.TAKE_IN, Turn.PUMP))
+"""Turns that the core itself begins within others."""
+STATUS_EVERY_S: Final = 0.1
+
+
+class Note(StrEnum):
+    """Kind of a note."""
+
+    __hash__ = str.__hash__
+
+    # inputs
+    FRAMES = "frames"
+    FOREIGN = "foreign"
+    STATUS = "status"
+    RANG = "rang"
+    SLEPT = "slept"
+    WALL_CLOCK = "wall_clock"
+    CHANCE = "chance"
+    TURN = "turn"
+    """A turn that a server begins in answer to an outcome or an event, within the one that gave it."""
+    # outputs
+    SEND = "send"
+    BURST = "burst"
+    END_BURST = "end_burst"
+    ACCEPT = "accept"
+    WATCH = "watch"
+    EVENT = "event"
+    OUTCOME = "outcome"
+    FAULT = "fault"
+
+
+class Tape(Turns):
+    """Surroundings of the core of one process: a clock, chance, and by name its buses. ``tell`` takes
+    notes of outputs, and ``on_event`` the plant's events."""
+
+    def now(self) -> float:
+        """The clock, in monotonic seconds."""
+        raise NotImplementedError
+
+    def epoch_ns(self, at: float) -> int:
+        """The wall clock at a monotonic time, in ns."""
+        raise NotImplementedError
+
+    def slept(self) -> float:
+        """Seconds for which the machine was suspended since the last call."""
+        raise NotImplementedError
+
+    def chance(self) -> float:
+        """A random number from 0 to 1."""
+        raise NotImplementedError
+
+    def reply_of(self, number: int) -> Reply:
+        """The reply to the request of this number."""
+        return NumberedReply(self, number)
+
+    def answered(self, number: int, outcome: Outcome) -> None:
+        self.tell(Note.OUTCOME, number, protocol.encode(Answered(outcome, 0, 0)))
+
+    def on_event(self, event: Event) -> None:
+        # The cause is found by what is not of the core.
+        self.tell(Note.EVENT, protocol.encode(replace(event, because="")))
+
+    def tell(self, note: Note, *facts: object) -> None:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class NumberedReply:
+    """The reply to a request, known by its number."""
+
+    tape: Tape
+    number: int
+
+    def __call__(self, outcome: Outcome) -> None:
+        self.tape.answered(self.number, outcome)
+
+
+def arguments(turn: Turn, *args: Any) -> list[Any]:
+    """The arguments of a turn as a tape has them; the reply of a request is not among them."""
+    match turn, args:
+        case Turn.SUBMIT, (Request() as request, _):
+            return [protocol.encode_request(request, 0.0)]
+        case Turn.REJECTED, (Rejection() as rejection, at, count):
+            return [protocol.encode(Rejected(at or 0.0, count, rejection)), at is None]
+        case Turn.CONNECTION, (Identity() as identity, is_there, has_others):
+            return [protocol.encode(Connected(identity, is_there, has_others))]
+        case Turn.REPORT, (Event() as event,):
+            return [protocol.encode(event)]
+        case ((Turn.HALT | Turn.COUNT | Turn.LOOK), _):
+            return list(args)
+        case _:
+            return []
+
+
+class RecordingTape(Tape):
+    """A tape that gives the core what is outside, and takes notes. ``take`` gets the notes of each turn, in
+    MessagePack.
+
+    Nothing is noted while it is not ``is_on``; it goes off by itself at what no tape can hold.
+    """
+
+    def __init__(
+        self,
+        take: Callable[[bytes], None],
+        *,
+        now: Callable[[], float] = clock.now,
+        epoch_ns: Callable[[float], int] = clock.epoch_ns,
+        slept: Callable[[], float] = lambda: 0.0,
+        chance: Callable[[], float] = random.random,
+    ) -> None:
+        self.is_on = False
+        self.count = 0
+        """Number of requests so far."""
+        self.last = 0.0
+        """Time of the last look at the clock."""
+        self.notes: Notes | None = None
+        """Notes of the turn that is on."""
+        self.replies: dict[int, Reply] = {}
+        self._take = take
+        self._now = now
+        self._epoch_ns = epoch_ns
+        self._slept = slept
+        self._chance = chance
+        self._encode = msgspec.msgpack.Encoder().encode
+
+    def run(
+        self, turn: Turn, act: Callable[_Args, _Result], /, *args: _Args.args, **options: _Args.kwargs
+    ) -> _Result:
+        within = self.notes
+        if not self.is_on or (within is not None and turn in _OF_THE_CORE):
+            return act(*args, **options)
+        try:
+            told = arguments(turn, *args)
+        except Malformed:
+            self.is_on = False
+            return act(*args, **options)
+        given: Any = args
+        if turn is Turn.SUBMIT:
+            request, reply = given
+            self.count += 1
+            told.append(self.count)
+            self.replies[self.count] = reply
+            given = request, self.reply_of(self.count)
+        if within is not None:
+            within.append((Note.TURN, turn, told))
+            return act(*given, **options)
+        notes = self.notes = [turn, told]
+        try:
+            result = act(*given, **options)
+        except Exception as error:
+            notes.append((Note.FAULT, type(error).__name__))
+            self._take(self._encode(notes))
+            raise
+        finally:
+            self.notes = None
+        self._take(self._encode(notes))
+        return result
+
+    def answered(self, number: int, outcome: Outcome) -> None:
+        super().answered(number, outcome)
+        self.replies.pop(number)(outcome)
+
+    def now(self) -> float:
+        self.last = at = self._now()
+        if self.notes is not None:
+            self.notes.append(at)
+        return at
+
+    def epoch_ns(self, at: float) -> int:
+        return self._noted(Note.WALL_CLOCK, self._epoch_ns(at))
+
+    def slept(self) -> float:
+        slept_s = self._slept()
+        return self._noted(Note.SLEPT, slept_s) if slept_s else 0.0
+
+    def chance(self) -> float:
+        return self._noted(Note.CHANCE, self._chance())
+
+    def _noted(self, note: Note, value: _Result) -> _Result:
+        self.tell(note, value)
+        return value
+
+    def tell(self, note: Note, *facts: object) -> None:
+        if self.notes is not None:
+            self.notes.append((note, *facts))
+
+
+def machine_tape(take: Callable[[bytes], None] = lambda turn: None) -> RecordingTape:
+    """The tape with this machine around it."""
+    return RecordingTape(take, slept=SuspendWatch(clock.suspended_s).take)
+
+
+class RecordedAlarm(SignalAlarm):
+    """The alarm of a bridge that is recorded."""
+
+    def __init__(self, tape: RecordingTape) -> None:
+        super().__init__()
+        self._tape = tape
+
+    def ring(self) -> None:
+        self._tape.tell(Note.RANG, self.breaks_in)
+        super().ring()
+
+
+class TapedBus:
+    """The bus ``bus`` on a tape (``bridge.can.interface.Bus``)."""
+
+    def __init__(self, bus: Bus, tape: RecordingTape) -> None:
+        self.name = bus.name
+        self._bus = bus
+        self._tape = tape
+        self._shown: tuple[object, ...] = ()
+        self._told_at = 0.0
+
+    @property
+    def status(self) -> BusStatus:
+        status = self._bus.status
+        shown = status.state, status.outages, status.bursts_refused, status.error_frames
+        tape = self._tape
+        if shown != self._shown or tape.last > self._told_at + STATUS_EVERY_S:
+            self._shown, self._told_at = shown, tape.last
+            tape.tell(Note.STATUS, self.name, *facts_of(status))
+        return status
+
+    def facts(self) -> Sequence[Any]:
+        """The status as it is, for a checkpoint."""
+        return facts_of(self._bus.status)
+
+    def open(self, wake: Callable[[], None]) -> None:
+        self._bus.open(wake)
+
+    def accept(self, can_ids: list[int]) -> None:
+        self._tape.tell(Note.ACCEPT, self.name, can_ids)
+        self._bus.accept(can_ids)
+
+    def watch(self, can_ids: frozenset[int]) -> None:
+        self._tape.tell(Note.WATCH, self.name, sorted(can_ids))
+        self._bus.watch(can_ids)
+
+    def take_foreign(self, now: float, *, at_once: bool = False) -> list[Frame]:
+        frames = self._bus.take_foreign(now, at_once=at_once)
+        self._tape.tell(Note.FOREIGN, self.name, frames)
+        return frames
+
+    def drain(self, now: float) -> list[Frame]:
+        frames = self._bus.drain(now)
+        self._tape.tell(Note.FRAMES, self.name, frames)
+        return frames
+
+    def send(self, frame: Frame, now: float, deadline: float) -> None:
+        self._tape.tell(Note.SEND, self.name, frame.can_id, frame.data)
+        self._bus.send(frame, now, deadline)
+
+    def burst(self, burst: Burst, now: float, *, at_once: bool = False) -> None:
+        self._tape.tell(Note.BURST, self.name, burst, at_once)
+        self._bus.burst(burst, now, at_once=at_once)
+
+    def end_burst(self, can_id: int) -> None:
+        self._tape.tell(Note.END_BURST, self.name, can_id)
+        self._bus.end_burst(can_id)
+
+    def next_deadline(self) -> float | None:
+        return self._bus.next_deadline()
+
+    def on_time(self, now: float) -> None:
+        self._bus.on_time(now)
+
+    def close(self) -> None:
+        self._bus.close()
+
+
+def facts_of(status: BusStatus) -> Sequence[Any]:
+    """The fields of a status, for a note."""
+    return (
+        int(status.state),
+        status.outages,
+        status.tx_errors,
+        status.rx_errors,
+        status.frames_lost,
+        status.frames_received,
+        status.frames_expired,
+        status.bits,
+        status.error_frames,
+        status.bursts_refused,
+        msgspec.msgpack.encode(status.last_error),
+    )
+
+
+def apply_facts(status: BusStatus, facts: Sequence[Any]) -> None:
+    """The other way round."""
+    state, *counters, refused, error = facts
+    status.state = ControllerState(state)
+    (
+        status.outages,
+        status.tx_errors,
+        status.rx_errors,
+        status.frames_lost,
+        status.frames_received,
+        status.frames_expired,
+        status.bits,
+        status.error_frames,
+    ) = counters
+    status.bursts_refused = refused
+    status.note_error(msgspec.msgpack.decode(error, type=Said))

@@ -19,7 +19,7 @@ from bridge.recorder.ring import parts_of, segments_in, write_recording
 def record(
     source: Annotated[
         Path,
-        typer.Argument(metavar="SITE|RECORDING", help="the site file of a service, or a recording"),
+        typer.Argument(metavar="FILE", help="the site file of a service, or a recording"),
     ],
     output: Annotated[
         Path | None,

@@ -36,9 +36,9 @@ _LOOK_S: Final = 0.2
 """Period of writing to the ring, seconds: what a killed process loses."""
 _SEGMENT_S: Final = 300.0
 _RETRY_S: Final = 2.0
-_CHECKPOINT_S: Final = 30
+_CHECKPOINT_S: Final = 120
 """Longest time for writing a checkpoint, seconds."""
-_NICE: Final = 19
+_NICE: Final = 10
 _FLAGS: Final = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC
 _MODE: Final = 0o640
 _DEPTH: Final = 100_000

@@ -13,6 +13,7 @@ import importlib.util
 import inspect
 import io
 import pickle
+import pickletools
 import types
 from collections.abc import Callable, Iterator
 from importlib.abc import InspectLoader
@@ -68,33 +69,20 @@ _SHELLS: Final = frozenset(
 _CORE_OF_CAN: Final = ("bridge.can.burstend", "bridge.can.errorframe", "bridge.can.interface")
 _PLAIN: Final = frozenset(
     (
-        ("builtins", "set"),
-        ("builtins", "frozenset"),
+        ("_struct", "Struct"),
         ("builtins", "range"),
-        ("builtins", "slice"),
-        ("builtins", "bytearray"),
-        ("builtins", "complex"),
-        ("builtins", "object"),
-        ("builtins", "bool"),
-        ("builtins", "int"),
-        ("builtins", "float"),
-        ("builtins", "str"),
-        ("builtins", "bytes"),
-        ("builtins", "list"),
-        ("builtins", "dict"),
-        ("builtins", "tuple"),
-        ("collections", "deque"),
-        ("collections", "defaultdict"),
         ("collections", "Counter"),
-        ("collections", "OrderedDict"),
+        ("collections", "defaultdict"),
+        ("collections", "deque"),
         ("functools", "partial"),
         ("operator", "getitem"),
         ("re", "_compile"),
         ("types", "MappingProxyType"),
-        ("_struct", "Struct"),
-        ("copyreg", "__newobj__"),
-        ("copyreg", "__newobj_ex__"),
     )
+)
+"""Names of others that a checkpoint may have: none of them opens, runs or reserves anything."""
+_REFUSED: Final = frozenset(
+    ("PUT", "BINPUT", "LONG_BINPUT", "GLOBAL", "INST", "OBJ", "EXT1", "EXT2", "EXT4", "PERSID", "NEXT_BUFFER")
 )
 _OWN: Final = "bridge.recorder.checkpoint"
 _METHODS_OF: Final = (Struct, dict, list, set, frozenset)
@@ -148,6 +136,7 @@ def load(data: bytes, tape: Tape, bus_of: Callable[[str], Bus], alarm: WatchdogT
     ``Unusable`` for what is no checkpoint of this program."""
     try:
         classes, states = msgspec.msgpack.decode(data, type=tuple[list[tuple[str, str]], bytes])
+        _check_codes(states)
         objects = [_empty(module, name) for module, name in classes]
         unpickler = _Unpickler(io.BytesIO(states), tape, bus_of, alarm, objects)
         root = unpickler.load()
@@ -156,6 +145,16 @@ def load(data: bytes, tape: Tape, bus_of: Callable[[str], Bus], alarm: WatchdogT
     except Exception as error:  # noqa: BLE001 - a damaged one may fail in any way
         raise Unusable(f"{type(error).__name__}: {error}") from None
     return root
+
+
+def _check_codes(states: bytes) -> None:
+    """Raise ``Unusable`` for operation codes that ``save`` does not write: a number in one of them is enough
+    to reserve any amount of memory."""
+    file = io.BytesIO(states)
+    while file.tell() < len(states):
+        for code, _, _ in pickletools.genops(file):
+            if code.name in _REFUSED:
+                raise Unusable(f"{code.name} is nothing that a checkpoint has")
 
 
 def _empty(module: str, name: str) -> Any:

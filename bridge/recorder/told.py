@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import msgspec
 
+from bridge.base.errors import OperationFailed
 from bridge.base.turns import Turn
 from bridge.canopen.frame import Frame
 from bridge.command import Event
 from bridge.mirror import protocol
-from bridge.mirror.protocol import Answered, Connected, Malformed, Rejected
+from bridge.mirror.protocol import Answered, Connected, Rejected
 from bridge.recorder.recording import Segment, notes_of
 from bridge.recorder.tape import Note, Notes
 
@@ -27,6 +29,15 @@ class TracedFrame(NamedTuple):
     is_ours: bool
 
 
+@contextmanager
+def _readable() -> Generator[None]:
+    """Raise ``OperationFailed`` for notes that are not as a tape makes them."""
+    try:
+        yield
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError) as error:
+        raise OperationFailed(f"a turn that cannot be read: {error}") from None
+
+
 def epoch_at(segment: Segment, at: float) -> float:
     """A monotonic time of a segment as seconds since 1970, by the wall clock at its beginning."""
     return segment.header.epoch_ns / 1e9 + at - segment.header.began
@@ -35,6 +46,11 @@ def epoch_at(segment: Segment, at: float) -> float:
 def frames_of(segments: list[Segment]) -> Iterator[TracedFrame]:
     """The frames of a recording, in the order in which the bridge had them. What the kernel repeats is there
     each time it becomes another frame. Raises ``OperationFailed``."""
+    with _readable():
+        yield from _frames_of(segments)
+
+
+def _frames_of(segments: list[Segment]) -> Iterator[TracedFrame]:
     repeated: dict[tuple[str, int], list[Any]] = {}
     for segment in segments:
         for turn in segment.turns:
@@ -63,6 +79,11 @@ def frames_of(segments: list[Segment]) -> Iterator[TracedFrame]:
 
 def lines_of(segments: list[Segment]) -> Iterator[Line]:
     """Everything in a recording but the looks at the clock, a line each. Raises ``OperationFailed``."""
+    with _readable():
+        yield from _lines_of(segments)
+
+
+def _lines_of(segments: list[Segment]) -> Iterator[Line]:
     for segment in segments:
         number = segment.header.number
         yield {"t": epoch_at(segment, segment.header.began), "what": "segment", "number": number}
@@ -90,38 +111,35 @@ def lines_of_turn(segment: Segment, notes: Notes) -> Iterator[Line]:
 
 
 def _turn_lines(kind: str, arguments: list[Any]) -> Iterator[Line]:
-    try:
-        match Turn(kind), arguments:
-            case Turn.SUBMIT, [asked, number]:
-                request, _ = protocol.decode_request(asked)
-                yield {
-                    "what": "request",
-                    "number": number,
-                    "source": request.identity.source.label,
-                    "user": request.identity.user,
-                    "target": request.target,
-                    "action": request.action,
-                    "command": msgspec.to_builtins(request.command),
-                    "received_at": request.received_at,
-                }
-            case Turn.REJECTED, [told, _]:
-                one = protocol.decode(Rejected, told)
-                yield {
-                    "what": "rejected",
-                    "target": one.rejection.target,
-                    "action": one.rejection.action,
-                    "code": one.rejection.code,
-                    "count": one.count,
-                }
-            case Turn.CONNECTION, [told]:
-                other = protocol.decode(Connected, told)
-                yield {"what": "connection", "user": other.identity.user, "is_there": other.is_there}
-            case Turn.HALT | Turn.STOP_NODES, _:
-                yield {"what": kind}
-            case _:
-                pass
-    except (Malformed, ValueError) as error:
-        yield {"what": "unreadable", "error": str(error)}
+    match Turn(kind), arguments:
+        case Turn.SUBMIT, [asked, number]:
+            request, _ = protocol.decode_request(asked)
+            yield {
+                "what": "request",
+                "number": number,
+                "source": request.identity.source.label,
+                "user": request.identity.user,
+                "target": request.target,
+                "action": request.action,
+                "command": msgspec.to_builtins(request.command),
+                "received_at": request.received_at,
+            }
+        case Turn.REJECTED, [told, _]:
+            one = protocol.decode(Rejected, told)
+            yield {
+                "what": "rejected",
+                "target": one.rejection.target,
+                "action": one.rejection.action,
+                "code": one.rejection.code,
+                "count": one.count,
+            }
+        case Turn.CONNECTION, [told]:
+            other = protocol.decode(Connected, told)
+            yield {"what": "connection", "user": other.identity.user, "is_there": other.is_there}
+        case Turn.HALT | Turn.STOP_NODES, _:
+            yield {"what": kind}
+        case _:
+            pass
 
 
 def _note_lines(segment: Segment, note: Any) -> Iterator[Line]:

@@ -5,14 +5,15 @@ What a parser says of bytes that are none of its own is part of it; whatever els
 
 from __future__ import annotations
 
-import struct
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
+from struct import Struct
 from typing import Final, NamedTuple
 
+import msgspec
 from asyncua import ua
 from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary
@@ -20,6 +21,7 @@ from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary
 from bridge.base.errors import FileFaults, OperationFailed
 from bridge.bustools.decode import Decoder
 from bridge.can import errorframe, netlink
+from bridge.can.interface import BusStatus
 from bridge.canopen.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.cli.trace import SUFFIXES, Trace
 from bridge.command import Event
@@ -32,7 +34,25 @@ from bridge.northbound.gateway import cia309_types, syntax
 from bridge.northbound.modbus.connection import Conversation
 from bridge.northbound.zenoh.commands import BadCommand, Commands, identity_of
 from bridge.project import Project, load_project
-from bridge.text import LANGUAGES, render
+from bridge.recorder.checkpoint import Unusable
+from bridge.recorder.checkpoint import load as load_checkpoint
+from bridge.recorder.checkpoint import save as save_checkpoint
+from bridge.recorder.recording import (
+    MAGIC,
+    SUFFIX,
+    Header,
+    Segment,
+    State,
+    header_chunk,
+    read,
+    state_chunk,
+    turns_chunk,
+)
+from bridge.recorder.replay import PlayedBus, PlayingTape
+from bridge.recorder.tape import facts_of
+from bridge.recorder.told import frames_of as frames_of_recording
+from bridge.recorder.told import lines_of
+from bridge.text import LANGUAGES, Text, render
 from bridge.uaserver import decoding
 from bridge.witness.description import Unreadable, describe
 from tests.fuzz.case import load
@@ -40,12 +60,14 @@ from tests.support.modbus_site import PLC, READY, Rig, make_plant
 from tests.support.process import REPOSITORY
 from tests.support.quick import Quick, quick_site
 
-_FRAME: Final = struct.Struct("<IBB8s")
+_FRAME: Final = Struct("<IBB8s")
 """Identifier with its flags, length, how long after the one before (10 ms), data."""
 _LENGTHS: Final = 9
 _MOST_FRAMES: Final = 40
 _DEMO: Final = REPOSITORY / "bridge" / "demo" / "site.toml"
 _NODES: Final = ("", 'supervision = "guarding"')
+_HEADER: Final = Header(version="1", site="x", buses=("can0",), number=1, began=0.0, epoch_ns=0)
+_NO_BUS: Final = PlayedBus("can0", PlayingTape(), facts_of(BusStatus()))
 _PARTS: Final = b"\0\0"
 """Between the parts of what has several."""
 
@@ -107,7 +129,7 @@ def monitor(data: bytes) -> None:
 
 def _recorded_frames() -> Iterator[bytes]:
     for case in load("can").of("frames"):
-        heads = [(struct.unpack(">I", part[:4])[0], part[4:12]) for part in case.parts]
+        heads = [(int.from_bytes(part[:4], "big"), part[4:12]) for part in case.parts]
         yield bytes_of(Frame(can_id, content) for can_id, content in heads)
 
 
@@ -176,6 +198,40 @@ def site_file(data: bytes) -> None:
 def mapping_file(data: bytes) -> None:
     with suppress(FileFaults):
         family_of(data.decode("utf-8", "replace"), mappings_dir() / "own.toml")
+
+
+def recording(data: bytes) -> None:
+    """A recording; the first byte says of what the rest is: the file, a turn, or a checkpoint."""
+    kind, content = data[0] % 3 if data else 0, data[1:]
+    with suppress(OperationFailed, Unusable):
+        match kind:
+            case 0:
+                with tempfile.NamedTemporaryFile(suffix=SUFFIX) as file:
+                    file.write(content)
+                    file.flush()
+                    _tell(read(Path(file.name)))
+            case 1:
+                _tell([Segment(_HEADER, None, [content])])
+            case _:
+                tape = PlayingTape()
+                core = load_checkpoint(content, tape, lambda name: _NO_BUS, tape.alarm)
+                del core
+
+
+def _tell(segments: list[Segment]) -> None:
+    for told in lines_of(segments), frames_of_recording(segments):
+        for _ in told:
+            pass
+
+
+def _recordings() -> Iterator[bytes]:
+    turn = msgspec.msgpack.encode(
+        ["take_in", [], 1.0, ["frames", "can0", [[0x185, b"\0" * 8, 0.5]]], ["send", "can0", 0, b"\1\5"]]
+    )
+    whole = header_chunk(_HEADER) + state_chunk(State("", 0, {}, b"")) + turns_chunk([turn])
+    yield b"\0" + MAGIC + whole
+    yield b"\1" + turn
+    yield b"\2" + save_checkpoint([Text.of("bus.is_down"), Struct("<H"), {1: (2.0, "x")}])
 
 
 # clients
@@ -271,6 +327,7 @@ PARSERS: Final = {
     "witness-file": Parser(witness_file, _device_files),
     "site-file": Parser(site_file, lambda: (_DEMO.read_bytes(),)),
     "mapping-file": Parser(mapping_file, lambda: ((mappings_dir() / "nord/sk-tu3-cao.toml").read_bytes(),)),
+    "recording": Parser(recording, _recordings),
     "modbus": Parser(modbus, _parts("modbus", "stream")),
     "opcua": Parser(opcua, _parts("opcua", "service")),
     "zenoh": Parser(zenoh, _queries),

@@ -91,6 +91,12 @@ def test_a_damaged_one_is_refused(data: bytes) -> None:
         loaded(data)
 
 
+def test_a_number_reserves_no_memory() -> None:
+    """A reference that is to be kept under a number beyond all others."""
+    with pytest.raises(Unusable, match="LONG_BINPUT"):
+        loaded(msgspec.msgpack.encode(([], b"\x80\x05]r\xff\xff\xff\x7f.")))
+
+
 def test_no_module_that_may_be_named_opens_or_waits() -> None:
     """All that a checkpoint names may be called by it."""
     root = Path(bridge.__file__).parent

@@ -194,8 +194,9 @@ class Oracle:
         self._still_since = inf
         self._forget_owners()
         for track in self.tracks.values():
-            # Another process knows nothing of a trip.
+            # Another process knows nothing of a trip, and of no telegram that it could miss.
             track.needs_acknowledge = False
+            track.enabled_at = -inf
 
     def _forget_owners(self) -> None:
         """After a start and after a hang every drive waits for the next telegram, whoever sends it."""

@@ -54,9 +54,23 @@ def test_a_bridge_that_was_disturbed_has_not_seen_it(causes: Causes) -> None:
 
 
 def test_nor_has_one_that_stands_still(causes: Causes) -> None:
-    assert not wrong(causes, is_still=True)
+    causes.look(1010.4, is_still=True)
+    assert not wrong(causes)
 
 
 def test_what_was_over_long_before_excuses_nothing(causes: Causes) -> None:
     causes.disturbed(1009.0)
+    assert wrong(causes)
+
+
+def test_what_is_known_only_long_after_was_told_in_time() -> None:
+    causes = Causes(Oracle([DRIVES[0]]))
+    causes.told(Event(1010.01, EventKind.WATCHDOG, DRIVES[0].path, 900, "silent"), 1010.01)
+    causes.look(1020.0, is_still=False)
+    causes.owes(EventKind.WATCHDOG, DRIVES[0].path, 1010.0, 1010.1, "a silence")
+    assert not wrong(causes, 1020.1)
+
+
+def test_what_comes_after_it_is_due_excuses_nothing(causes: Causes) -> None:
+    causes.disturbed(1010.55)
     assert wrong(causes)

@@ -74,6 +74,15 @@ def test_a_trip_is_to_be_acknowledged(scene: Scene) -> None:
     assert not scene.sees(late + 0.4)
 
 
+def test_another_process_does_not_miss_what_the_last_one_has_got(scene: Scene) -> None:
+    trips: list[Drive] = []
+    scene.oracle.on_trip = lambda drive, since, due: trips.append(drive)
+    scene.oracle.on_end(1010.1)
+    scene.oracle.started()
+    scene.tell(1010.0 + 2 * TIMEOUT_S, FAMILY.ready)
+    assert not trips
+
+
 def test_a_bridge_that_stands_still_falls_silent(scene: Scene) -> None:
     scene.oracle.on_still(1010.0)
     assert not scene.sees(1010.0 + DEAD_S)

@@ -3,8 +3,8 @@
     python -m tests.plant [--seed N] [--runs N] [--minutes M] [--seconds S] [--log]
 
 Plays plants of ``--minutes`` each, one seed after the other from ``--seed`` on (of today, unless given),
-for ``--seconds`` of CPU or ``--runs`` of them. What fails is reduced and printed as a unit test; ends with 1
-then.
+for ``--seconds`` of CPU or ``--runs`` of them. What fails ends there, is reduced for ``--reduce`` seconds and
+printed as a unit test; ends with 1 then.
 ``PROOF_PLANT`` says which half of the drives there is (tests/proof/settings.py).
 """
 
@@ -36,6 +36,9 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=1_000_000)
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument(
+        "--reduce", type=float, default=60.0, metavar="S", help="how long what fails is reduced"
+    )
     parser.add_argument("--log", action="store_true", help="print all that happens, of the first plant")
     asked = parser.parse_args()
     logging.disable(logging.CRITICAL)  # of what the bridge says, the oracle hears the events
@@ -47,9 +50,9 @@ def main() -> int:
         site = project(Path(folder))
         while runs < asked.runs and time.process_time() - began < asked.seconds and not failed:
             seed = asked.seed + int(runs)
-            result = Plant(site, plan_of(seed, asked.minutes * 60), logs=asked.log).run()
+            result = Plant(site, plan_of(seed, asked.minutes * 60), logs=asked.log).run(to_first=True)
             runs += 1
-            played_s += result.plan.seconds
+            played_s += result.played_s
             frames += result.frames
             looks += result.looks
             counts += result.counts
@@ -67,19 +70,22 @@ def main() -> int:
         for what, number in sorted(counts.items()):
             print(f"  {number:5}  {what}")
         for result in failed:
-            _tell(site, result)
+            _tell(site, result, asked.reduce)
     return 1 if failed else 0
 
 
-def _tell(site: Project, result: Result) -> None:
+def _tell(site: Project, result: Result, seconds: float) -> None:
     print(f"FAILED: seed {result.plan.seed}, {len(result.violations)} violations")
     for text in result.violations[:_MOST_SHOWN]:
         print(f"  {text}")
 
-    def fails(plan: Plan) -> bool:
-        return bool(Plant(site, plan).run().violations)
+    spent_at = time.process_time() + seconds
 
-    least = shrunk(result.plan, fails)
+    def fails_at(plan: Plan) -> float | None:
+        again = Plant(site, plan).run(to_first=True)
+        return again.played_s if again.violations else None
+
+    least = shrunk(result.plan, result.played_s, fails_at, lambda: time.process_time() >= spent_at)
     print(f"\nreduced from {len(result.plan.steps)} steps to {len(least.steps)}:\n")
     print(as_test(least, f"seed_{least.seed}"))
     for text in Plant(site, least).run().violations[:_MOST_SHOWN]:

@@ -39,8 +39,8 @@ _ORDER_S: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """End of a run. ``counts`` is how often each kind of step was there, ``frames`` what was on the wire, and
-    ``moved`` how many of the drives moved at the end."""
+    """End of a run. ``counts`` is how often each kind of step was there, ``frames`` what was on the wire,
+    ``moved`` how many of the drives moved at the end, and ``played_s`` when that was."""
 
     plan: Plan
     violations: list[str]
@@ -50,6 +50,7 @@ class Result:
     moved: int
     counts: Counter[str]
     log: list[str]
+    played_s: float
 
 
 def project(folder: Path) -> Project:
@@ -99,8 +100,11 @@ class Plant:
             self.world.at(BEGIN_S + step.at, self._doing(step))
         self.world.after(_LOOK_S, self._look)
 
-    def run(self) -> Result:
-        self.world.run_until(BEGIN_S + self.plan.seconds)
+    def run(self, *, to_first: bool = False) -> Result:
+        """Play the plan, or as much of it as there is before the first violation is found."""
+        end = BEGIN_S + self.plan.seconds
+        while self.world.now < end and not (to_first and (self.oracle.violations or self.bridge.faults)):
+            self.world.run_until(min(end, self.world.now + _LOOK_S) if to_first else end)
         moved = sum(self._moves(drive) for drive in DRIVES)
         return Result(
             self.plan,
@@ -111,6 +115,7 @@ class Plant:
             moved,
             self.counts,
             self.world.log or [],
+            self.world.now - BEGIN_S,
         )
 
     def _moves(self, drive: Drive) -> bool:

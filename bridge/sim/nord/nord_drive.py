@@ -21,6 +21,7 @@ from bridge.sim.nord.nord_parameters import (
 )
 from bridge.sim.nord.nord_posicon import PositionControl, approach, stretch, target
 from bridge.sim.nord.nord_ramp import Demand, turned
+from bridge.sim.nord.nord_scales import BUS_SOURCES, SET_POINTS, Scales
 from bridge.sim.nord.nord_states import STATE_BITS, NordState, commanded
 
 CHARGING_S: Final = 0.2
@@ -30,15 +31,12 @@ FAULT_REACTION_S: Final = 0.02
 COAST_S: Final = 1.0
 """The motor's run-down from P105 to standstill without voltage."""
 
-SET_POINTS: Final = 5
 HUNDRED_PERCENT: Final = 0x4000
 VALID: Final = 1 << 10
 ACKNOWLEDGE: Final = 1 << 7
 LEFT: Final = 1 << 12
-_BUS_SOURCES: Final = (3, 6)
-"""P509: system bus, CANopen (§7.2)."""
-_POSITION: Final = (10, 15)
-"""P543: low and high word."""
+_SET_FREQUENCY: Final = 1
+"""P546."""
 _AT_REST: Final = (NordState.SWITCH_ON_INHIBITED, NordState.READY, NordState.SWITCHED_ON, NordState.FAULT)
 """Only a telegram leads out of these: time changes nothing."""
 _IGNORE: Final = -1
@@ -87,6 +85,10 @@ class NordDrive:
         self._accelerating = False
         self._coast_hz = 0.0
         self._coast_at = 0.0
+        self._scales_of: tuple[int, int, bool] | None = None
+        self._scales_then = self._scales
+        self._share_of: tuple[Scales, tuple[int, ...]] | None = None
+        self._share = 0.0
 
     # What the drive shows.
 
@@ -103,7 +105,7 @@ class NordDrive:
             word = word & ~0x20 | 0x10
         word |= 0x0080 if self.warning_tenths else 0
         word |= 0x0100 if self._setpoint_reached() else 0
-        word |= 0x0200 if self._bus_controls else 0
+        word |= 0x0200 if self._scales.bus_controls else 0
         left = self.output_hz < 0 or (self.output_hz == 0 and bool(self.control_word & LEFT))
         return word | (0x1000 if left else 0x0800)
 
@@ -117,8 +119,9 @@ class NordDrive:
         """A plausible motor current: magnetising, a load that grows with speed, more while accelerating."""
         if self.state not in (NordState.ENABLED, NordState.QUICK_STOP):
             return 0.0
-        share = 0.35 + 0.25 * abs(self.output_hz) / self._max_hz + (0.3 if self._accelerating else 0.0)
-        return self.parameters.value(112, self._set) * (share + self._ripple_now)
+        scales = self._scales
+        share = 0.35 + 0.25 * abs(self.output_hz) / scales.max_hz + (0.3 if self._accelerating else 0.0)
+        return scales.rated_a * (share + self._ripple_now)
 
     def motor_hz(self, now: float) -> float:
         """Speed of the shaft in Hz of its field: the output's, or running down freely without voltage."""
@@ -156,9 +159,9 @@ class NordDrive:
         if not control_word & VALID:
             self.telegrams_ignored += 1
             return False
-        if not self._bus_controls:
+        if not self._scales.bus_controls:
             return True  # local control: the telegram is valid, but somebody else commands
-        if self.parameters.raw(510) in (0, *_BUS_SOURCES):
+        if self.parameters.raw(510) in (0, *BUS_SOURCES):
             words = tuple(setpoints[:SET_POINTS]) + (0,) * (SET_POINTS - len(setpoints))
         else:
             words = self.setpoints
@@ -233,12 +236,17 @@ class NordDrive:
         return 1 if self.demand else (self.control_word >> 14) + 1
 
     @property
-    def _max_hz(self) -> float:
-        return self.parameters.value(105, self._set)
+    def _scales(self) -> Scales:
+        """Of the active set, with the present parameters."""
+        of = self.parameters.changes, self._set, self.demand is not None
+        if of != self._scales_of:
+            self._scales_of = of
+            self._scales_then = Scales.of(self.parameters, self._set, is_profile=self.demand is not None)
+        return self._scales_then
 
     @property
-    def _bus_controls(self) -> bool:
-        return self.parameters.raw(509) in _BUS_SOURCES
+    def _max_hz(self) -> float:
+        return self._scales.max_hz
 
     def _commanded_hz(self) -> float:
         """Setpoint frequency, signed: positive turns right. Bit 12 inverts it, bit 11 changes nothing (§6.5.1
@@ -250,22 +258,26 @@ class NordDrive:
 
     def _set_share(self) -> float:
         """The setpoints that are frequencies, together: 1.0 is P105."""
-        share = 0.0
-        for n, word in enumerate(self.setpoints, start=1):
-            if word and self.parameters.meaning(546, n, self._set) == 1:
-                share += ((word & 0xFFFF ^ 0x8000) - 0x8000) / HUNDRED_PERCENT
-        return max(-1.0, min(1.0, share))
+        of = self._scales, self.setpoints
+        if of != self._share_of:
+            share = sum(
+                ((word & 0xFFFF ^ 0x8000) - 0x8000) / HUNDRED_PERCENT
+                for word, code in zip(self.setpoints, of[0].setpoints, strict=True)
+                if code == _SET_FREQUENCY
+            )
+            self._share_of, self._share = of, max(-1.0, min(1.0, share))
+        return self._share
 
     def _position_goal(self) -> int | None:
         """The set position in increments, where the drive positions."""
-        if self.demand or self.parameters.raw(600, 1, self._set) == PositionControl.OFF:
+        scales = self._scales
+        if not scales.positions:
             return None
-        stretched = stretch(self.parameters)
-        return target(self.setpoints, lambda n: self.parameters.meaning(546, n, self._set), stretched)
+        return target(self.setpoints, lambda n: scales.setpoints[n - 1], stretch(self.parameters))
 
     def _positioning_hz(self) -> float:
         """Greatest speed at which it may go there. The position gives the direction."""
-        if self.parameters.raw(600, 1, self._set) == PositionControl.AT_P105:
+        if self._scales.position_control == PositionControl.AT_P105:
             return self._max_hz
         return abs(self._set_share()) * self._max_hz
 
@@ -328,10 +340,8 @@ class NordDrive:
         """The shaft turns on."""
         before = self.position_increments
         self.position_increments = turned(before, before_hz, self.output_hz, dt_s)
-        if self.position_increments != before:
-            codes = (self.parameters.meaning(543, n, self._set) for n in range(1, SET_POINTS + 1))
-            if self.has_encoder or any(code in _POSITION for code in codes):
-                self.dirty.is_set = True
+        if self.position_increments != before and (self.has_encoder or self._scales.shows_position):
+            self.dirty.is_set = True
 
     def _ramp_times_s(self) -> tuple[float, float]:
         """Up and down, between 0 and P105."""
@@ -367,15 +377,16 @@ class NordDrive:
     def actual_value(self, number: int) -> int:
         """One of them, from 1, by its P543 code: frequency, current, inputs, setpoint, fault number, position
         (low and high word, §5.4); others 0."""
-        match self.parameters.meaning(543, number, self._set):
+        scales = self._scales
+        match scales.actual_values[number - 1]:
             case 1:
-                return _word(self.output_hz / self._max_hz)
+                return _word(self.output_hz / scales.max_hz)
             case 3 | 4:
-                return _word(self.current_a / self.parameters.value(112, self._set))
+                return _word(self.current_a / scales.rated_a)
             case 5:
                 return self.digital_inputs & 0xFFFF
             case 8:
-                return _word(self._commanded_hz() / self._max_hz)
+                return _word(self._commanded_hz() / scales.max_hz)
             case 9:
                 return self.fault_tenths
             case 10:

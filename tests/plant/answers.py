@@ -120,15 +120,15 @@ class Answers:
 
     def _judged(self, claim: _Claim, track: Track) -> str:
         if not claim.is_forwarded:
-            sent = [at for at, said in track.setpoints if at > claim.came and said == claim.setpoint]
-            return f"its setpoint is on the wire at {sent[0] - 1000.0:.3f} s" if sent else ""
+            sent = track.sent_since(claim.setpoint, claim.came)
+            return f"its setpoint is on the wire at {sent - 1000.0:.3f} s" if sent > claim.came else ""
         if self._disturbed_at >= claim.came - _PERIOD_S:
             return ""
         if claim.setpoint is None:
             is_there = any(claim.came <= at <= claim.due for at in track.stops)
             return "" if is_there else "no RPDO has told the drive to stop"
         is_overtaken = track.last_at > claim.came or track.since >= claim.came
-        if is_overtaken or any(at >= claim.came and said == claim.setpoint for at, said in track.setpoints):
+        if is_overtaken or track.sent_since(claim.setpoint, claim.came) >= claim.came:
             return ""
         return "its setpoint was not on the wire"
 

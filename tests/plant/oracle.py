@@ -89,6 +89,24 @@ class Track:
     is_armed: bool = False
     """And then one that does: it has asked for what enables the drive."""
 
+    def has_said(self, word: int, since: float) -> bool:
+        """Whether the drive has sent this status word since then."""
+        for at, said in reversed(self.said):
+            if at < since:
+                return False
+            if said == word:
+                return True
+        return False
+
+    def sent_since(self, setpoint: int, since: float) -> float:
+        """When the bridge has last sent this setpoint, if that was not before ``since``."""
+        for at, sent in reversed(self.setpoints):
+            if at < since:
+                break
+            if sent == setpoint:
+                return at
+        return -inf
+
     def take(self, telegram: Telegram) -> None:
         self.telegrams.append(telegram)
         self.last_at = telegram.at
@@ -291,7 +309,7 @@ class Oracle:
         """The bridge says that this is the drive's status word, and that it is good."""
         self.looks += 1
         track = self.tracks[drive]
-        if not any(at - _AGE_S <= when and said == word for when, said in track.said):
+        if not track.has_said(word, at - _AGE_S):
             last = (
                 f"{track.said[-1][1]:04X} {(at - track.said[-1][0]) * 1000:.0f} ms ago"
                 if track.said

@@ -127,7 +127,7 @@ class Plant:
 
     def _on_frame(self, frame: Frame, sender: Port) -> None:
         of_bridge = sender.name.startswith("bridge")
-        self.world.tell(f"{sender.name} {frame!r}")
+        self.world.tell_frame(sender.name, frame)
         if sender.name == _SECOND:
             self.oracle.frame_of_other(frame.time, frame.can_id, frame.data)
             self.answers.disturbed(frame.time)

@@ -148,6 +148,17 @@ plant: compiled ## whole plants on one seeded clock, for a minute of each CPU, a
 	  PROOF_PLANT=first $(IN) -m tests.plant --seconds $(PLANT_S) $(SEED:%=--seed %) $(ARGS); one=$$?; \
 	  wait $$other && exit $$one
 
+plant-short: compiled
+	@echo "== plants on one clock, half of the drives after the other"
+	@PROOF_PLANT=first $(IN) -m tests.plant --seconds 20
+	@PROOF_PLANT=second $(IN) -m tests.plant --seconds 20
+
+plant-long: PLANT_S = 3600
+plant-long: compiled ## the same for an hour of each CPU, what was gone through in build/plant.md (PLANT_S=s)
+	@$(MAKE) --no-print-directory plant PLANT_S=$(PLANT_S) ARGS='--out build $(ARGS)'
+	@$(IN) -m tests.plant.figures build/plant.first.json build/plant.second.json > build/plant.md
+	@echo "build/plant.md"
+
 # Atheris has no wheel for every machine: it is installed where it is asked for.
 GUIDED_S ?= 20
 DEEP_S ?= 1800

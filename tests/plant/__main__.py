@@ -1,6 +1,6 @@
 """Whole plants on one seeded clock.
 
-    python -m tests.plant [--seed N] [--runs N] [--minutes M] [--seconds S] [--log]
+    python -m tests.plant [--seed N] [--runs N] [--minutes M] [--seconds S] [--out FOLDER] [--log]
 
 Plays plants of ``--minutes`` each, one seed after the other from ``--seed`` on (of today, unless given),
 for ``--seconds`` of CPU or ``--runs`` of them. What fails ends there, is reduced for ``--reduce`` seconds and
@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import argparse
 import datetime
+import gc
 import logging
 import sys
 import tempfile
 import time
-from collections import Counter
 from pathlib import Path
 
 from bridge.project import Project
+from tests.plant.figures import Figures, counted, figures_of, summary, write
 from tests.plant.plan import Plan, plan_of
 from tests.plant.plant import Plant, Result, project
 from tests.plant.shrink import as_test, shrunk
@@ -39,38 +40,30 @@ def main() -> int:
     parser.add_argument(
         "--reduce", type=float, default=60.0, metavar="S", help="how long what fails is reduced"
     )
+    parser.add_argument("--out", type=Path, help="write plant.NAME.json for tests.plant.figures there")
     parser.add_argument("--log", action="store_true", help="print all that happens, of the first plant")
     asked = parser.parse_args()
     logging.disable(logging.CRITICAL)  # of what the bridge says, the oracle hears the events
-    counts: Counter[str] = Counter()
-    played_s = frames = looks = runs = 0.0
-    failed: list[Result] = []
+    figures = Figures()
+    failed: Result | None = None
     began = time.process_time()
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, counted(figures.cells):
         site = project(Path(folder))
-        while runs < asked.runs and time.process_time() - began < asked.seconds and not failed:
-            seed = asked.seed + int(runs)
-            result = Plant(site, plan_of(seed, asked.minutes * 60), logs=asked.log).run(to_first=True)
-            runs += 1
-            played_s += result.played_s
-            frames += result.frames
-            looks += result.looks
-            counts += result.counts
+        gc.freeze()
+        while figures.runs < asked.runs and figures.spent_s < asked.seconds and failed is None:
+            plan = plan_of(asked.seed + figures.runs, asked.minutes * 60)
+            result = Plant(site, plan, logs=asked.log).run(to_first=True)
             if asked.log:
                 print("\n".join(result.log))
                 return 0
-            if result.violations:
-                failed.append(result)
-        spent = time.process_time() - began
-        hours, rate = played_s / 3600, played_s / max(spent, 0.01)
-        print(
-            f"{PLANT.name}: seeds {asked.seed} … {asked.seed + int(runs) - 1}: {hours:.2f} h of plants in "
-            f"{spent:.0f} s ({rate:.0f} times real time), {frames:.0f} frames, {looks:.0f} judgements"
-        )
-        for what, number in sorted(counts.items()):
-            print(f"  {number:5}  {what}")
-        for result in failed:
-            _tell(site, result, asked.reduce)
+            spent_s = time.process_time() - began - figures.spent_s
+            figures.add(figures_of(result, spent_s))
+            failed = result if result.violations else None
+        print(f"{PLANT.name}: seeds {asked.seed} … {asked.seed + figures.runs - 1}: {summary(figures)}")
+        if failed:
+            _tell(site, failed, asked.reduce)
+    if asked.out:
+        write(asked.out / f"plant.{PLANT.name}.json", figures)
     return 1 if failed else 0
 
 

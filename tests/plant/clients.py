@@ -217,15 +217,20 @@ class Controller:
             telegram = writes(0, self.drive.family.run, self.drive.family.setpoint)
             self.line.ask_often(self.drive.unit, telegram, times)
 
-    def release(self) -> None:
+    def release(self, released: Callable[[float], None]) -> None:
+        """``released`` gets the time at which the request came, when it is answered well."""
+        came = self._world.now + _DELAY_S
         if self.line is not None:
-            self.line.ask(self.drive.unit, writes(_RELEASE, 0))
-        else:
-            self._do(Action.RELEASE_CONTROL)
-
-    def _do(self, action: Action) -> None:
-        request = Request(self.identity, self.drive.path, command_of(action))
-        self._bridge.ask(request, _DELAY_S, lambda: None, lambda outcome: None)
+            self.line.ask(
+                self.drive.unit,
+                writes(_RELEASE, 0),
+                lambda pdu: None if pdu[0] & _EXCEPTION else released(came),
+            )
+            return
+        request = Request(self.identity, self.drive.path, command_of(Action.RELEASE_CONTROL))
+        self._bridge.ask(
+            request, _DELAY_S, lambda: None, lambda outcome: released(came) if outcome.ok else None
+        )
 
     def crash(self) -> None:
         """The program ends, and its connection with it."""

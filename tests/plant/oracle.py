@@ -81,6 +81,8 @@ class Track:
     """When somebody else has last commanded it, or its node."""
     left_at: float = -inf
     """When it went: until its next telegram the bus goes on with what it has said."""
+    released_at: float = -inf
+    """When it has released the drive: its silence is no fault from then on."""
     is_strangers: bool = False
     """The last setpoint on the wire was a stranger's, who has taken it over in a time without an owner."""
     is_acknowledged: bool = False
@@ -98,7 +100,7 @@ class Track:
                 return True
         return False
 
-    def sent_since(self, setpoint: int, since: float) -> float:
+    def sent_since(self, setpoint: int | None, since: float) -> float:
         """When the bridge has last sent this setpoint, if that was not before ``since``."""
         for at, sent in reversed(self.setpoints):
             if at < since:
@@ -171,7 +173,8 @@ class Oracle:
             silent_s = at - track.last_at
             timeout_s = PLANT.fieldbus_timeout_ms / 1000
             was_running = track.enabled_at >= track.last_at > self._late_at
-            if silent_s > timeout_s + _GRAIN_S and was_running:
+            is_released = track.released_at >= track.last_at
+            if silent_s > timeout_s + _GRAIN_S and was_running and not is_released:
                 # So it has tripped, whatever it gets now.
                 trip = track.last_at + timeout_s
                 if track.left_at < track.last_at:
@@ -222,9 +225,14 @@ class Oracle:
             track.is_owned = False
 
     def left(self, drive: Drive, at: float) -> None:
-        """Its controller has released it, or has ended its connection."""
+        """Its controller releases it, or has ended its connection."""
         track = self.tracks[drive]
         track.is_owned, track.left_at = False, at
+
+    def released(self, drive: Drive, came: float, at: float) -> None:
+        """Its controller has released it, which was answered well at this time."""
+        self.tracks[drive].released_at = came
+        self.interrupted(came, at + REACTION_S, "its controller released it", [drive])
 
     def bus_off(self, at: float) -> None:
         """The bridge's controller sends nothing. A bridge that stands still does not see it, and its bursts

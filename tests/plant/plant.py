@@ -237,8 +237,9 @@ class Plant:
     def release(self, step: Step) -> None:
         controller = self._controller(step)
         controller.is_silent = True
-        controller.release()
-        self.oracle.left(controller.drive, self.world.now)
+        drive = controller.drive
+        controller.release(lambda came: self.oracle.released(drive, came, self.world.now))
+        self.oracle.left(drive, self.world.now)
         self.world.after(step.seconds, controller.start)
 
     def jog(self, step: Step) -> None:

@@ -12,6 +12,9 @@ _SETTLED_S: Final = 0.25
 _EARLIER_S: Final = (0.0, 0.1, 0.35, 1.0)
 """Steps that begin so much later than they could show the same where the phase of a period matters."""
 
+_WORTH_S: Final = 1.0
+"""To begin earlier by less is not worth a run."""
+
 FailsAt = Callable[[Plan], float | None]
 """When the first violation of a plan is found, in its seconds; None where there is none."""
 
@@ -24,11 +27,19 @@ class _Search:
         self._spent = spent
         self.plan = _cut(plan, failed_at)
 
+    def keep_last(self) -> None:
+        """Do without all but the last steps, where these few show it by themselves: their runs are short."""
+        steps, size = self.plan.steps, 1
+        while size < len(steps) and not self._begins_earlier(steps[-size:], 0.0):
+            size *= 2
+
     def tries(self, steps: tuple[Step, ...]) -> bool:
         """Whether a plan of these steps fails, too: then it is the one."""
+        return self._is_it(self.plan._replace(steps=steps))
+
+    def _is_it(self, plan: Plan) -> bool:
         if self._spent():
             return False
-        plan = self.plan._replace(steps=steps)
         failed_at = self._fails_at(plan)
         if failed_at is not None:
             self.plan = _cut(plan, failed_at)
@@ -45,18 +56,14 @@ class _Search:
     def begin_earlier(self) -> None:
         """Leave out the time in which nothing happens before the first step: each further run is shorter."""
         steps = self.plan.steps
-        for late_s in _EARLIER_S:
-            by = steps[0].at - FIRST_S - late_s if steps else 0.0
-            if by > 1.0 and self._begins_earlier(by):
-                return
+        any(self._begins_earlier(steps, late_s) for late_s in _EARLIER_S)
 
-    def _begins_earlier(self, by: float) -> bool:
-        plan = self.plan
-        self.plan = plan._replace(seconds=plan.seconds - by + _SETTLED_S)
-        if self.tries(tuple(step._replace(at=round(step.at - by, 4)) for step in plan.steps)):
-            return True
-        self.plan = plan
-        return False
+    def _begins_earlier(self, steps: tuple[Step, ...], late_s: float) -> bool:
+        by = steps[0].at - FIRST_S - late_s if steps else 0.0
+        if by < _WORTH_S:
+            return False
+        moved = tuple(step._replace(at=round(step.at - by, 4)) for step in steps)
+        return self._is_it(self.plan._replace(seconds=self.plan.seconds - by + _SETTLED_S, steps=moved))
 
 
 def _cut(plan: Plan, failed_at: float) -> Plan:
@@ -71,6 +78,7 @@ def shrunk(
     """A plan of some of these steps that fails, too, and ends then. None of its steps can be left out, unless
     the time for it is ``spent`` before that is known."""
     search = _Search(plan, failed_at, fails_at, spent)
+    search.keep_last()
     size = max(1, len(search.plan.steps) // 2)
     while not spent():
         search.leave_out(size)

@@ -65,5 +65,17 @@ FIRST_DEFAULTS: Final = Settings(
     share=3,
 )
 SECOND_DEFAULTS: Final = replace(FIRST_DEFAULTS, name="second_defaults", nodes=("lift_modbus", "fan_opcua"))
-PLANTS: Final = {plant.name: plant for plant in (FIRST, SECOND, FIRST_DEFAULTS, SECOND_DEFAULTS)}
+CALM: Final = Settings(
+    "calm",
+    nodes=("pump_modbus", "lift_opcua", "fan_zenoh"),
+    bus="sync_period_ms = 250\nrpdo_period_ms = 250\ndeadman_ms = 800",
+    rpdo_period_ms=250,
+    deadman_ms=800,
+    heartbeat_ms=1200,
+    fieldbus_timeout_ms=3000,
+    owner_period_s=0.7,
+    paused_s=1.2,
+    short_s=0.7,
+)
+PLANTS: Final = {plant.name: plant for plant in (FIRST, SECOND, FIRST_DEFAULTS, SECOND_DEFAULTS, CALM)}
 PLANT: Final = PLANTS[os.environ.get("PROOF_PLANT", FIRST.name)]

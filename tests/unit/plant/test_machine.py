@@ -57,7 +57,7 @@ def test_a_hang_in_a_turn_begins_with_its_next_look(world: World) -> None:
     process = Process(world, watcher, [])
     process.look_s = 0.01
     process.hang(0.5, in_turn=True)
-    process.post(process.clock)
+    process.post(lambda: [process.clock()].clear())
     assert watcher.seen == ["still 0.000", "on 0.500"]
 
 

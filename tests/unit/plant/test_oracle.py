@@ -83,6 +83,15 @@ def test_another_process_does_not_miss_what_the_last_one_has_got(scene: Scene) -
     assert not trips
 
 
+def test_after_a_release_its_controller_asks_anew_and_has_nothing_to_acknowledge(scene: Scene) -> None:
+    scene.oracle.released(DRIVE, 1010.0, 1010.01)
+    assert "its controller released it" in scene.sees(1010.3)
+    late = 1010.0 + TIMEOUT_S + 0.5
+    scene.tell(late, FAMILY.ready)
+    scene.tell(late + 0.1, FAMILY.run)
+    assert not scene.sees(late + 0.2)
+
+
 def test_a_bridge_that_stands_still_falls_silent(scene: Scene) -> None:
     scene.oracle.on_still(1010.0)
     assert not scene.sees(1010.0 + DEAD_S)

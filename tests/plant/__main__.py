@@ -47,18 +47,19 @@ def main() -> int:
     figures = Figures()
     failed: Result | None = None
     began = time.process_time()
-    with tempfile.TemporaryDirectory() as folder, counted(figures.cells):
+    with tempfile.TemporaryDirectory() as folder:
         site = project(Path(folder))
         gc.freeze()
-        while figures.runs < asked.runs and figures.spent_s < asked.seconds and failed is None:
-            plan = plan_of(asked.seed + figures.runs, asked.minutes * 60)
-            result = Plant(site, plan, logs=asked.log).run(to_first=True)
-            if asked.log:
-                print("\n".join(result.log))
-                return 0
-            spent_s = time.process_time() - began - figures.spent_s
-            figures.add(figures_of(result, spent_s))
-            failed = result if result.violations else None
+        with counted(figures.cells):
+            while figures.runs < asked.runs and figures.spent_s < asked.seconds and failed is None:
+                plan = plan_of(asked.seed + figures.runs, asked.minutes * 60)
+                result = Plant(site, plan, logs=asked.log).run(to_first=True)
+                if asked.log:
+                    print("\n".join(result.log))
+                    return 0
+                spent_s = time.process_time() - began - figures.spent_s
+                figures.add(figures_of(result, spent_s))
+                failed = result if result.violations else None
         print(f"{PLANT.name}: seeds {asked.seed} … {asked.seed + figures.runs - 1}: {summary(figures)}")
         if failed:
             _tell(site, failed, asked.reduce)

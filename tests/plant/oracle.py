@@ -39,6 +39,12 @@ _GRAIN_S: Final = 0.026
 (docs: 25 ms on the way)."""
 
 
+START: Final = -1
+"""In place of a word: the command to start, by which the bridge itself leads the drive through its states."""
+ALIVE: Final = -2
+"""A telegram that says nothing."""
+
+
 class Telegram(NamedTuple):
     at: float
     """When it reached the bridge's machine."""
@@ -117,6 +123,10 @@ class Track:
     def _look_at(self, word: int) -> None:
         family = self.drive.family
         mask, value = family.enabling
+        if word in (START, ALIVE):
+            self.is_primed |= word == START
+            self.is_armed |= word == START and (self.is_acknowledged or not self.needs_acknowledge)
+            return
         self.is_acknowledged |= bool(word & family.acknowledge & ~family.ready)
         if word & mask != value:
             self.is_primed = True

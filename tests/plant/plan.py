@@ -61,6 +61,7 @@ KINDS: Final[dict[str, Draw]] = {
     "release": lambda rng: (_drive(rng), rng.uniform(0.1, 3.0), ""),
     "jog": lambda rng: (_drive(rng), rng.uniform(3.0, 10.0), ""),
     "acknowledges": lambda rng: (_drive(rng), rng.uniform(3.0, 10.0), ""),
+    "starts by command": lambda rng: (_drive(rng), rng.uniform(4.0, 10.0), rng.choice(("stands", "at once"))),
     "stop": lambda rng: (_drive(rng), 0.0, rng.choice(_STOPS)),
     "stranger": lambda rng: (_drive(rng), rng.uniform(0.2, 5.0), rng.choice(("elsewhere", "same host"))),
     "backlog": lambda rng: (_drive(rng), rng.uniform(2.0, 6.0), rng.choice(("20", "1000", "6000"))),

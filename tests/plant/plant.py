@@ -105,14 +105,13 @@ class Plant:
         end = BEGIN_S + self.plan.seconds
         while self.world.now < end and not (to_first and (self.oracle.violations or self.bridge.faults)):
             self.world.run_until(min(end, self.world.now + _LOOK_S) if to_first else end)
-        moved = sum(self._moves(drive) for drive in DRIVES)
         return Result(
             self.plan,
             self.oracle.violations + self.bridge.faults,
             self.world.hash,
             self.wire.frames,
             self.oracle.looks,
-            moved,
+            sum(self._moves(drive) for drive in DRIVES),
             self.counts,
             self.world.log or [],
             self.world.now - BEGIN_S,
@@ -252,6 +251,12 @@ class Plant:
         controller.acknowledges_always = True
         self.world.after(step.seconds, lambda: setattr(controller, "acknowledges_always", False))
 
+    def start_by_command(self, step: Step) -> None:
+        able = [one for one in self.controllers if one.line is None]
+        controller = able[step.which % len(able)]
+        controller.start_by_command(stands=step.how == "stands")
+        self.world.after(step.seconds, controller.go_on_by_words)
+
     def stop(self, step: Step) -> None:
         drive = DRIVES[step.which % len(DRIVES)]
 
@@ -272,15 +277,12 @@ class Plant:
     def backlog(self, step: Step) -> None:
         """A controller writes ahead while the bridge stands still for a moment, and hangs."""
         controller = self._controller(step)
-        self._hang(PLANT.short_s, in_turn=False)
+        self.bridge.process.hang(PLANT.short_s, in_turn=False)
         controller.write_ahead(int(step.how))
         self.world.after(step.seconds, controller.start)
 
     def hang(self, step: Step) -> None:
-        self._hang(step.seconds, in_turn=step.how == "in a turn")
-
-    def _hang(self, seconds: float, *, in_turn: bool) -> None:
-        self.bridge.process.hang(seconds, in_turn=in_turn)
+        self.bridge.process.hang(step.seconds, in_turn=step.how == "in a turn")
 
     def kill(self, step: Step) -> None:
         if not self.bridge.process.is_dead:
@@ -380,6 +382,7 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "release": Plant.release,
     "jog": Plant.jog,
     "acknowledges": Plant.acknowledge_always,
+    "starts by command": Plant.start_by_command,
     "stop": Plant.stop,
     "stranger": Plant.stranger,
     "backlog": Plant.backlog,

@@ -106,14 +106,18 @@ class Track:
                 return True
         return False
 
-    def sent_since(self, setpoint: int | None, since: float) -> float:
-        """When the bridge has last sent this setpoint, if that was not before ``since``."""
+    def sent_since(self, setpoint: int | None, since: float, until: float = inf) -> float:
+        """When the bridge has last sent this setpoint, of these times."""
         for at, sent in reversed(self.setpoints):
             if at < since:
                 break
-            if sent == setpoint:
+            if sent == setpoint and at < until:
                 return at
         return -inf
+
+    def started_after(self, since: float) -> float:
+        """When its controller has first commanded a start since then."""
+        return min((one.at for one in self.telegrams if one.word == START and one.at >= since), default=inf)
 
     def take(self, telegram: Telegram) -> None:
         self.telegrams.append(telegram)

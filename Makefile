@@ -154,7 +154,7 @@ PLANT_SHORT_S := $(if $(NIGHTLY),300,20)
 plant-short: compiled
 	@echo "== plants on one clock, half of the drives after the other"
 	@for half in first second; do \
-	  PROOF_PLANT=$$half $(IN) -m tests.plant --seconds $(PLANT_SHORT_S) || exit 1; done
+	  PROOF_PLANT=$$half $(IN) -m tests.plant --minutes 2 --seconds $(PLANT_SHORT_S) || exit 1; done
 
 plant-long: PLANT_S = 3600
 plant-long: compiled ## the same for an hour of each CPU, what was gone through in build/plant.md (PLANT_S=s)

@@ -1,6 +1,7 @@
 """The times of the plants: two halves of all drives, slow enough for seven of them and their owners on one
 slow CPU, each with every protocol; and two with what a site file leaves to the program, at ten times the
-frames, of which that CPU bears two drives. PROOF_PLANT says which, for all processes of a run."""
+frames, of which that CPU bears two drives. PROOF_PLANT says which, for all processes of a run. The calm
+one is for tests/plant alone, on a clock of its own: fewer frames, so more faults for the same CPU."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@
 Plays plants of ``--minutes`` each, one seed after the other from ``--seed`` on (of today, unless given),
 for ``--seconds`` of CPU or ``--runs`` of them. What fails ends there, is reduced for ``--reduce`` seconds and
 printed as a unit test; ends with 1 then.
-``PROOF_PLANT`` says which plant it is: a half of the drives, or a few of them at calm rates (tests/proof/settings.py).
+``PROOF_PLANT`` says which plant it is: half of the drives, or a few at calm rates (tests/proof/settings.py).
 """
 
 from __future__ import annotations

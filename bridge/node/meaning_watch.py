@@ -176,7 +176,7 @@ class MeaningWatch:
             self._read(watched, min(due, key=lambda one: max(one.read_at, one.tried_at)))
 
     def _due(self, watched: _WatchedDrive, items: list[_Item], every_s: float) -> list[_Item]:
-        """Those of ``items`` whose answers are to be read again."""
+        """Items whose answers are to be read again."""
         now, not_before = self.now, watched.not_before
         return [
             one

@@ -231,7 +231,7 @@ class NordDrive:
 
     @property
     def _aim(self) -> Aim:
-        """Where it is to go by the present parameters and words."""
+        """Aim by the present parameters and words."""
         of = self.parameters.changes, self.control_word, self.setpoints, self.demand
         if of != self._aim_of:
             scales = Scales.of(self.parameters, self._set)
@@ -239,7 +239,7 @@ class NordDrive:
         return self._aim_then
 
     def _goal(self) -> int | None:
-        """The position that it goes to."""
+        """Position that it goes to."""
         return self._aim.increments if self._runs else None
 
     def _goal_hz(self) -> float:

@@ -94,7 +94,7 @@ class NordParameters:
         self._ram = copy.copy(self._eeprom)
         self.eeprom_writes = 0
         self.changes = 0
-        """How often any of them may have got another value."""
+        """Number of times that any of them may have got another value."""
 
     def power_on(self) -> None:
         self._ram = copy.copy(self._eeprom)

@@ -1,5 +1,5 @@
-"""What a NORD inverter's parameters and words make of each other: where it is to go, and what its process
-data mean (BU 2500 §6.5)."""
+"""Meaning of a NORD inverter's process data by its parameters, and the aim that they give it (BU 2500
+§6.5)."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Scales:
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """Where a drive is to go: ``hz`` is the set frequency, signed (positive turns right), ``increments`` the
+    """Aim of a drive: ``hz`` is the set frequency, signed (positive turns right), ``increments`` the
     set position where it positions, and ``most_hz`` the greatest speed at which it may go there."""
 
     scales: Scales

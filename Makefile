@@ -59,8 +59,8 @@ demo: $(VENV)/demo.stamp ## start everything on simulated drives, on loopback, u
 ##@ Test
 # What measures times minds when it has to wait for a CPU: one after the other, and never two at a time. Unit tests
 # know no time. A tab of a browser is a controller whose silence stops a drive: beside it nothing else runs.
-test: compiled packages clients ## unit, foreign, wire, lab, docs, browser, some fuzzing; less of what takes long
-	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab pages fuzz-short" "foreign unit"
+test: compiled packages clients ## unit, foreign, wire, lab, docs, browser, some fuzzing, plants; less of what takes long
+	@$(IN) -m tools.side_by_side "$(MAKE)" "wire lab pages fuzz-short" "foreign unit plant-short"
 	@$(MAKE) --no-print-directory browser
 
 # What changes seldom break, and what is like what runs already: LANDING=1 make unit runs both, of one part.
@@ -72,7 +72,7 @@ landing: compiled packages clients ## what make test leaves out, before a change
 # One after the other, so that nobody disturbs who measures times; and all of them even if one fails.
 nightly: export NIGHTLY := 1
 nightly: compiled packages clients ## the same, with all examples and with what takes long: an hour, for a timer
-	@$(MAKE) --no-print-directory -k unit foreign wire lab pages browser fuzz-short
+	@$(MAKE) --no-print-directory -k unit foreign wire lab pages browser fuzz-short plant-short
 
 # Beside the others they get what these leave of the CPUs.
 unit: $(VENV)/dev.stamp ## tests of the code alone
@@ -147,6 +147,20 @@ plant: compiled ## whole plants on one seeded clock, for a minute of each CPU, a
 	@PROOF_PLANT=second $(IN) -m tests.plant --seconds $(PLANT_S) $(SEED:%=--seed %) $(ARGS) & other=$$!; \
 	  PROOF_PLANT=first $(IN) -m tests.plant --seconds $(PLANT_S) $(SEED:%=--seed %) $(ARGS); one=$$?; \
 	  wait $$other && exit $$one
+
+# One plant after the other: beside other lanes it gets part of a CPU.
+PLANT_SHORT_S := $(if $(NIGHTLY),300,12)
+
+plant-short: compiled
+	@echo "== plants on one clock, one after the other"
+	@for plant in first second calm; do \
+	  PROOF_PLANT=$$plant $(IN) -m tests.plant --minutes 2 --seconds $(PLANT_SHORT_S) || exit 1; done
+
+plant-long: PLANT_S = 3600
+plant-long: compiled ## the same for an hour of each CPU, what was gone through in build/plant.md (PLANT_S=s)
+	@$(MAKE) --no-print-directory plant PLANT_S=$(PLANT_S) ARGS='--out build $(ARGS)' || failed=1; \
+	  $(IN) -m tests.plant.figures build/plant.first.json build/plant.second.json > build/plant.md; \
+	  echo "build/plant.md"; exit $${failed:-0}
 
 # Atheris has no wheel for every machine: it is installed where it is asked for.
 GUIDED_S ?= 20
@@ -260,5 +274,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short fuzz-guided fuzz-deep plant bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
+.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short fuzz-guided fuzz-deep plant plant-short plant-long bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
   check-imports format docs setup lock wheel clean help

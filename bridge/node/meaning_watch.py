@@ -44,10 +44,10 @@ class _Item:
     key: Key
     read_at: float
     tried_at: float = -math.inf
+    is_of_all_sets: bool = field(init=False)
 
-    @property
-    def is_of_all_sets(self) -> bool:
-        return isinstance(self.what, Parameter) and not self.what.sets
+    def __post_init__(self) -> None:
+        self.is_of_all_sets = isinstance(self.what, Parameter) and not self.what.sets
 
 
 @dataclass(slots=True)
@@ -165,9 +165,9 @@ class MeaningWatch:
         for one in watched.items.values():
             (in_use if one.is_of_all_sets or one.in_set in sets else rest).append(one)
         lead_s = min(_SLOWEST * _EVERY_S, len(in_use) * watched.answer_s)
-        due = [one for one in in_use if self._is_due(watched, one, _EVERY_S - lead_s)]
+        due = self._due(watched, in_use, _EVERY_S - lead_s)
         if not due:
-            due = [one for one in rest if self._is_due(watched, one, _EVERY_S)]
+            due = self._due(watched, rest, _EVERY_S)
             if due and self.now < watched.rest_at:
                 self._look_at = min(self._look_at, watched.rest_at)
                 return
@@ -175,9 +175,14 @@ class MeaningWatch:
         if due:
             self._read(watched, min(due, key=lambda one: max(one.read_at, one.tried_at)))
 
-    def _is_due(self, watched: _WatchedDrive, item: _Item, every_s: float) -> bool:
-        is_old = item.read_at < watched.not_before or self.now >= item.read_at + every_s
-        return is_old and self.now >= item.tried_at + _PAUSE_S
+    def _due(self, watched: _WatchedDrive, items: list[_Item], every_s: float) -> list[_Item]:
+        """Items whose answers are to be read again."""
+        now, not_before = self.now, watched.not_before
+        return [
+            one
+            for one in items
+            if (one.read_at < not_before or now >= one.read_at + every_s) and now >= one.tried_at + _PAUSE_S
+        ]
 
     def _read(self, watched: _WatchedDrive, item: _Item) -> None:
         run, asked_at = watched.run, self.now

@@ -44,6 +44,8 @@ class _Claim:
     is_forwarded: bool
     said: str
     setpoint: int | None = None
+    is_taken: bool = False
+    """It was accepted, and not forwarded."""
 
 
 class Answers:
@@ -86,7 +88,8 @@ class Answers:
             word, setpoint = command.values.get("control_word"), command.values.get("setpoint_1")
             mask, value = drive.family.enabling
             if isinstance(word, int) and isinstance(setpoint, int) and word & mask == value:
-                self._claim(drive, asked.came, at, is_sent, said, setpoint)
+                is_taken = outcome.ok and not outcome.forwarded
+                self._claim(drive, asked.came, at, is_sent, said, setpoint, is_taken=is_taken)
         elif command.action in _STOPS and outcome.ok and outcome.forwarded:
             self._claim(drive, asked.came, at, True, said, None)
 
@@ -95,10 +98,18 @@ class Answers:
         self._claim(drive, sent, at, False, f"exception {code:02X}h", setpoint)
 
     def _claim(
-        self, drive: Drive, came: float, at: float, is_forwarded: bool, said: str, setpoint: int | None
+        self,
+        drive: Drive,
+        came: float,
+        at: float,
+        is_forwarded: bool,
+        said: str,
+        setpoint: int | None,
+        *,
+        is_taken: bool = False,
     ) -> None:
         due = at + (REACTION_S if is_forwarded else _NEVER_S)
-        self._claims.append(_Claim(drive, came, at, due, is_forwarded, said, setpoint))
+        self._claims.append(_Claim(drive, came, at, due, is_forwarded, said, setpoint, is_taken))
 
     # judging
 
@@ -120,15 +131,17 @@ class Answers:
 
     def _judged(self, claim: _Claim, track: Track) -> str:
         if not claim.is_forwarded:
-            sent = [at for at, said in track.setpoints if at > claim.came and said == claim.setpoint]
-            return f"its setpoint is on the wire at {sent[0] - 1000.0:.3f} s" if sent else ""
+            # What was taken and waits is what a start begins with; what was refused is gone.
+            until = track.started_after(claim.came) if claim.is_taken else inf
+            sent = track.sent_since(claim.setpoint, claim.came, until)
+            return f"its setpoint is on the wire at {sent - 1000.0:.3f} s" if sent > claim.came else ""
         if self._disturbed_at >= claim.came - _PERIOD_S:
             return ""
         if claim.setpoint is None:
             is_there = any(claim.came <= at <= claim.due for at in track.stops)
             return "" if is_there else "no RPDO has told the drive to stop"
         is_overtaken = track.last_at > claim.came or track.since >= claim.came
-        if is_overtaken or any(at >= claim.came and said == claim.setpoint for at, said in track.setpoints):
+        if is_overtaken or track.sent_since(claim.setpoint, claim.came) >= claim.came:
             return ""
         return "its setpoint was not on the wire"
 

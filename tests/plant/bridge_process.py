@@ -172,7 +172,7 @@ class Bridge:
         stream = Stream(
             self._world,
             self.process,
-            self.modbus.connection(),
+            self.modbus.connection,
             peer,
             delay_s,
             take=take,

@@ -5,14 +5,14 @@ Where the bridge stands still, has no bus or is not in charge, it has not seen t
 
 from __future__ import annotations
 
+from bisect import bisect_left
+from collections import defaultdict
 from dataclasses import dataclass
-from math import inf
 from typing import Final
 
 from bridge.command import Event, EventKind
 from tests.plant.oracle import Oracle
 
-_KEPT_S: Final = 5.0
 _LOOK_S: Final = 0.5
 """A bridge that was disturbed so shortly before may have missed the fault itself."""
 
@@ -29,40 +29,46 @@ class _Owed:
 
 
 class Causes:
-    """Judge of events. What is wrong goes to the oracle's violations."""
+    """Judge of events. What is wrong goes to the oracle's violations.
+
+    A fault may be known only when it is over, however long it lasts, as a controller's silence is: so
+    everything is kept with its time.
+    """
 
     def __init__(self, oracle: Oracle) -> None:
         self._oracle = oracle
         self._owed: list[_Owed] = []
-        self._told: list[tuple[float, EventKind, str]] = []
-        self._disturbed_at = -inf
+        self._told: defaultdict[tuple[EventKind, str], list[float]] = defaultdict(list)
+        self._disturbed: list[float] = []
 
     def disturbed(self, at: float) -> None:
         """The bridge stands still, ends, begins, or has no bus: it sees nothing of this moment."""
-        self._disturbed_at = at
+        self._disturbed.append(at)
 
     def owes(self, kind: EventKind, source: str, since: float, due: float, what: str) -> None:
         """An event of this kind about ``source`` has to be told from ``since`` to ``due``."""
         self._owed.append(_Owed(kind, source, since, due, what))
 
     def told(self, event: Event, at: float) -> None:
-        self._told.append((at, event.kind, event.source))
+        self._told[event.kind, event.source].append(at)
 
     def look(self, now: float, *, is_still: bool) -> None:
         """Judge what is due by ``now``."""
         if is_still:
-            self._disturbed_at = now
-        self._told = [told for told in self._told if told[0] > now - _KEPT_S]
+            self.disturbed(now)
         due = [owed for owed in self._owed if owed.due <= now]
         self._owed = [owed for owed in self._owed if owed.due > now]
         for owed in due:
             self._oracle.looks += 1
-            if self._disturbed_at >= owed.since - _LOOK_S:
+            if _is_any(self._disturbed, owed.since - _LOOK_S, owed.due):
                 continue
-            if not any(
-                owed.since <= at <= owed.due and kind is owed.kind and source == owed.source
-                for at, kind, source in self._told
-            ):
+            if not _is_any(self._told[owed.kind, owed.source], owed.since, owed.due):
                 self._oracle.wrong(
                     owed.due, f"{owed.what} at {owed.since - 1000.0:.3f} s, and no event says so"
                 )
+
+
+def _is_any(times: list[float], since: float, until: float) -> bool:
+    """Whether any of these times, which are in order, is from ``since`` to ``until``."""
+    place = bisect_left(times, since)
+    return place < len(times) and times[place] <= until

@@ -9,6 +9,7 @@ from typing import Final
 
 from bridge.command import Action, Identity, Outcome, Request, Source, Write, command_of
 from tests.plant.bridge_process import Bridge
+from tests.plant.oracle import ALIVE, START
 from tests.plant.stream import Stream
 from tests.plant.world import Timer, World
 from tests.proof.board import NUMBERS
@@ -28,6 +29,9 @@ _AGAIN_S: Final = 0.5
 _SOURCES: Final = {"modbus": Source.MODBUS, "opcua": Source.OPCUA, "zenoh": Source.ZENOH}
 _BEGINS: Final = ("ready", "acknowledge", "ready", "run", "run", "run", "run", "run")
 """Words of a controller whose drive does not move: it acknowledges whatever there is, and enables anew."""
+
+_STARTS: Final = ("ready", "acknowledge", "ready", "start", *("alive",) * 8)
+"""What one sends that starts it by a command, which takes up to 3 s."""
 
 Arrived = Callable[[Drive, int], None]
 """Called when a telegram of the drive's controller, with this control word, reaches the bridge's machine."""
@@ -121,6 +125,8 @@ class Controller:
         self.acknowledges_always = False
         self.pauses = False
         """It lets its drive run for a second and stops it for a third of one, again and again."""
+        self._starts: int | None = None
+        """How much it has sent to start its drive by a command; None while it does so by words."""
         self._world = world
         self._bridge = bridge
         self._arrived = arrived
@@ -151,8 +157,26 @@ class Controller:
     def _cycle(self) -> None:
         self._world.after(self.period_s, self._cycle)
         self._cycles += 1
-        if not self.is_silent:
+        if self.is_silent:
+            return
+        if self._starts is not None and not (self._moves and self._starts >= len(_STARTS)):
+            self._start(self._starts)
+        else:
             self._write(self._word())
+
+    def _start(self, place: int) -> None:
+        self._starts = place + 1
+        step = _STARTS[place % len(_STARTS)]
+        if step == "start":
+            self._do(Action.START, START)
+        elif step == "alive":
+            self._do(Action.KEEP_ALIVE, ALIVE)
+        else:
+            self._write(self.drive.family.ready if step == "ready" else self.drive.family.acknowledge)
+
+    def _do(self, action: Action, word: int) -> None:
+        request = Request(self.identity, self.drive.path, command_of(action))
+        self._bridge.ask(request, _DELAY_S, lambda: self._arrived(self.drive, word), self._on_outcome)
 
     def _word(self) -> int:
         family = self.drive.family
@@ -210,6 +234,13 @@ class Controller:
 
     # what happens to it
 
+    def start_by_command(self, *, stands: bool) -> None:
+        """``stands``: it lets its drive stop before."""
+        self._starts = 0 if stands else _STARTS.index("start")
+
+    def go_on_by_words(self) -> None:
+        self._starts = None
+
     def write_ahead(self, times: int) -> None:
         """So many telegrams at once, without waiting for an answer; then it hangs."""
         self.is_silent = True
@@ -217,15 +248,20 @@ class Controller:
             telegram = writes(0, self.drive.family.run, self.drive.family.setpoint)
             self.line.ask_often(self.drive.unit, telegram, times)
 
-    def release(self) -> None:
+    def release(self, released: Callable[[float], None]) -> None:
+        """``released`` gets the time at which the request came, when it is answered well."""
+        came = self._world.now + _DELAY_S
         if self.line is not None:
-            self.line.ask(self.drive.unit, writes(_RELEASE, 0))
-        else:
-            self._do(Action.RELEASE_CONTROL)
-
-    def _do(self, action: Action) -> None:
-        request = Request(self.identity, self.drive.path, command_of(action))
-        self._bridge.ask(request, _DELAY_S, lambda: None, lambda outcome: None)
+            self.line.ask(
+                self.drive.unit,
+                writes(_RELEASE, 0),
+                lambda pdu: None if pdu[0] & _EXCEPTION else released(came),
+            )
+            return
+        request = Request(self.identity, self.drive.path, command_of(Action.RELEASE_CONTROL))
+        self._bridge.ask(
+            request, _DELAY_S, lambda: None, lambda outcome: released(came) if outcome.ok else None
+        )
 
     def crash(self) -> None:
         """The program ends, and its connection with it."""

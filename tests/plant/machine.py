@@ -53,10 +53,12 @@ class Process:
 
     def clock(self) -> float:
         seen = self._world.now
+        if not self._is_busy:
+            return seen
         if self._pause_s:
             pause_s, self._pause_s = self._pause_s, 0.0
             self._stand_still(pause_s)
-        elif self._is_busy:
+        else:
             self._world.run_until(seen + self.look_s)
             if self.is_dead:
                 raise DeadError

@@ -39,6 +39,12 @@ _GRAIN_S: Final = 0.026
 (docs: 25 ms on the way)."""
 
 
+START: Final = -1
+"""In place of a word: the command to start, by which the bridge itself leads the drive through its states."""
+ALIVE: Final = -2
+"""A telegram that says nothing."""
+
+
 class Telegram(NamedTuple):
     at: float
     """When it reached the bridge's machine."""
@@ -81,6 +87,8 @@ class Track:
     """When somebody else has last commanded it, or its node."""
     left_at: float = -inf
     """When it went: until its next telegram the bus goes on with what it has said."""
+    released_at: float = -inf
+    """When it has released the drive: its silence is no fault from then on."""
     is_strangers: bool = False
     """The last setpoint on the wire was a stranger's, who has taken it over in a time without an owner."""
     is_acknowledged: bool = False
@@ -88,6 +96,28 @@ class Track:
     """Its controller has sent a word that does not enable, since ``since``."""
     is_armed: bool = False
     """And then one that does: it has asked for what enables the drive."""
+
+    def has_said(self, word: int, since: float) -> bool:
+        """Whether the drive has sent this status word since then."""
+        for at, said in reversed(self.said):
+            if at < since:
+                return False
+            if said == word:
+                return True
+        return False
+
+    def sent_since(self, setpoint: int | None, since: float, until: float = inf) -> float:
+        """When the bridge has last sent this setpoint, of these times."""
+        for at, sent in reversed(self.setpoints):
+            if at < since:
+                break
+            if sent == setpoint and at < until:
+                return at
+        return -inf
+
+    def started_after(self, since: float) -> float:
+        """When its controller has first commanded a start since then."""
+        return min((one.at for one in self.telegrams if one.word == START and one.at >= since), default=inf)
 
     def take(self, telegram: Telegram) -> None:
         self.telegrams.append(telegram)
@@ -97,6 +127,10 @@ class Track:
     def _look_at(self, word: int) -> None:
         family = self.drive.family
         mask, value = family.enabling
+        if word in (START, ALIVE):
+            self.is_primed |= word == START
+            self.is_armed |= word == START and (self.is_acknowledged or not self.needs_acknowledge)
+            return
         self.is_acknowledged |= bool(word & family.acknowledge & ~family.ready)
         if word & mask != value:
             self.is_primed = True
@@ -153,7 +187,8 @@ class Oracle:
             silent_s = at - track.last_at
             timeout_s = PLANT.fieldbus_timeout_ms / 1000
             was_running = track.enabled_at >= track.last_at > self._late_at
-            if silent_s > timeout_s + _GRAIN_S and was_running:
+            is_released = track.released_at >= track.last_at
+            if silent_s > timeout_s + _GRAIN_S and was_running and not is_released:
                 # So it has tripped, whatever it gets now.
                 trip = track.last_at + timeout_s
                 if track.left_at < track.last_at:
@@ -194,8 +229,9 @@ class Oracle:
         self._still_since = inf
         self._forget_owners()
         for track in self.tracks.values():
-            # Another process knows nothing of a trip.
+            # Another process knows nothing of a trip, and of no telegram that it could miss.
             track.needs_acknowledge = False
+            track.enabled_at = -inf
 
     def _forget_owners(self) -> None:
         """After a start and after a hang every drive waits for the next telegram, whoever sends it."""
@@ -203,9 +239,14 @@ class Oracle:
             track.is_owned = False
 
     def left(self, drive: Drive, at: float) -> None:
-        """Its controller has released it, or has ended its connection."""
+        """Its controller releases it, or has ended its connection."""
         track = self.tracks[drive]
         track.is_owned, track.left_at = False, at
+
+    def released(self, drive: Drive, came: float, at: float) -> None:
+        """Its controller has released it, which was answered well at this time."""
+        self.tracks[drive].released_at = came
+        self.interrupted(came, at + REACTION_S, "its controller released it", [drive])
 
     def bus_off(self, at: float) -> None:
         """The bridge's controller sends nothing. A bridge that stands still does not see it, and its bursts
@@ -290,7 +331,7 @@ class Oracle:
         """The bridge says that this is the drive's status word, and that it is good."""
         self.looks += 1
         track = self.tracks[drive]
-        if not any(at - _AGE_S <= when and said == word for when, said in track.said):
+        if not track.has_said(word, at - _AGE_S):
             last = (
                 f"{track.said[-1][1]:04X} {(at - track.said[-1][0]) * 1000:.0f} ms ago"
                 if track.said

@@ -10,7 +10,7 @@ from tests.plant.third_parties import Intruder
 from tests.proof.drives import DRIVES
 from tests.proof.settings import PLANT
 
-_FIRST_S: Final = 8.0
+FIRST_S: Final = 8.0
 """By then every node is booted and every drive moves."""
 _LAST_S: Final = 12.0
 """So long nothing is done at the end."""
@@ -61,6 +61,7 @@ KINDS: Final[dict[str, Draw]] = {
     "release": lambda rng: (_drive(rng), rng.uniform(0.1, 3.0), ""),
     "jog": lambda rng: (_drive(rng), rng.uniform(3.0, 10.0), ""),
     "acknowledges": lambda rng: (_drive(rng), rng.uniform(3.0, 10.0), ""),
+    "starts by command": lambda rng: (_drive(rng), rng.uniform(4.0, 10.0), rng.choice(("stands", "at once"))),
     "stop": lambda rng: (_drive(rng), 0.0, rng.choice(_STOPS)),
     "stranger": lambda rng: (_drive(rng), rng.uniform(0.2, 5.0), rng.choice(("elsewhere", "same host"))),
     "backlog": lambda rng: (_drive(rng), rng.uniform(2.0, 6.0), rng.choice(("20", "1000", "6000"))),
@@ -83,7 +84,7 @@ def plan_of(seed: int, seconds: float, each_s: float = 4.0) -> Plan:
     """A plan with a step each ``each_s`` seconds in the mean, alone and in bunches."""
     rng = Random(seed)
     steps: list[Step] = []
-    at = _FIRST_S
+    at = FIRST_S
     while (at := at + rng.expovariate(1 / (2 * each_s))) < seconds - _LAST_S:
         for _ in range(rng.choice((1, 1, 2, 2, 4))):
             what = rng.choice(tuple(KINDS))

@@ -39,8 +39,8 @@ _ORDER_S: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """End of a run. ``counts`` is how often each kind of step was there, ``frames`` what was on the wire, and
-    ``moved`` how many of the drives moved at the end."""
+    """End of a run. ``counts`` is how often each kind of step was there, ``frames`` what was on the wire,
+    ``moved`` how many of the drives moved at the end, and ``played_s`` when that was."""
 
     plan: Plan
     violations: list[str]
@@ -50,6 +50,7 @@ class Result:
     moved: int
     counts: Counter[str]
     log: list[str]
+    played_s: float
 
 
 def project(folder: Path) -> Project:
@@ -107,18 +108,21 @@ class Plant:
             self.world.at(BEGIN_S + step.at, self._doing(step))
         self.world.after(_LOOK_S, self._look)
 
-    def run(self) -> Result:
-        self.world.run_until(BEGIN_S + self.plan.seconds)
-        moved = sum(self._moves(drive) for drive in DRIVES)
+    def run(self, *, to_first: bool = False) -> Result:
+        """Play the plan, or as much of it as there is before the first violation is found."""
+        end = BEGIN_S + self.plan.seconds
+        while self.world.now < end and not (to_first and (self.oracle.violations or self.bridge.faults)):
+            self.world.run_until(min(end, self.world.now + _LOOK_S) if to_first else end)
         return Result(
             self.plan,
             self.oracle.violations + self.bridge.faults,
             self.world.hash,
             self.wire.frames,
             self.oracle.looks,
-            moved,
+            sum(self._moves(drive) for drive in DRIVES),
             self.counts,
             self.world.log or [],
+            self.world.now - BEGIN_S,
         )
 
     def _moves(self, drive: Drive) -> bool:
@@ -130,7 +134,7 @@ class Plant:
 
     def _on_frame(self, frame: Frame, sender: Port) -> None:
         of_bridge = sender.name.startswith("bridge")
-        self.world.tell(f"{sender.name} {frame!r}")
+        self.world.tell_frame(sender.name, frame)
         if sender.name == _SECOND:
             self.oracle.frame_of_other(frame.time, frame.can_id, frame.data)
             self.answers.disturbed(frame.time)
@@ -240,8 +244,9 @@ class Plant:
     def release(self, step: Step) -> None:
         controller = self._controller(step)
         controller.is_silent = True
-        controller.release()
-        self.oracle.left(controller.drive, self.world.now)
+        drive = controller.drive
+        controller.release(lambda came: self.oracle.released(drive, came, self.world.now))
+        self.oracle.left(drive, self.world.now)
         self.world.after(step.seconds, controller.start)
 
     def jog(self, step: Step) -> None:
@@ -253,6 +258,12 @@ class Plant:
         controller = self._controller(step)
         controller.acknowledges_always = True
         self.world.after(step.seconds, lambda: setattr(controller, "acknowledges_always", False))
+
+    def start_by_command(self, step: Step) -> None:
+        able = [one for one in self.controllers if one.line is None]
+        controller = able[step.which % len(able)]
+        controller.start_by_command(stands=step.how == "stands")
+        self.world.after(step.seconds, controller.go_on_by_words)
 
     def stop(self, step: Step) -> None:
         drive = DRIVES[step.which % len(DRIVES)]
@@ -274,15 +285,12 @@ class Plant:
     def backlog(self, step: Step) -> None:
         """A controller writes ahead while the bridge stands still for a moment, and hangs."""
         controller = self._controller(step)
-        self._hang(PLANT.short_s, in_turn=False)
+        self.bridge.process.hang(PLANT.short_s, in_turn=False)
         controller.write_ahead(int(step.how))
         self.world.after(step.seconds, controller.start)
 
     def hang(self, step: Step) -> None:
-        self._hang(step.seconds, in_turn=step.how == "in a turn")
-
-    def _hang(self, seconds: float, *, in_turn: bool) -> None:
-        self.bridge.process.hang(seconds, in_turn=in_turn)
+        self.bridge.process.hang(step.seconds, in_turn=step.how == "in a turn")
 
     def kill(self, step: Step) -> None:
         if not self.bridge.process.is_dead:
@@ -382,6 +390,7 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "release": Plant.release,
     "jog": Plant.jog,
     "acknowledges": Plant.acknowledge_always,
+    "starts by command": Plant.start_by_command,
     "stop": Plant.stop,
     "stranger": Plant.stranger,
     "backlog": Plant.backlog,

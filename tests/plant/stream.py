@@ -32,17 +32,25 @@ class ServerEnd(asyncio.Transport):
     """The bridge's end: what has come waits in the kernel until the process has a turn."""
 
     def __init__(
-        self, stream: Stream, process: Process, protocol: ModbusConnection, peer: tuple[str, int]
+        self,
+        stream: Stream,
+        process: Process,
+        accept: Callable[[], ModbusConnection],
+        peer: tuple[str, int],
     ) -> None:
         super().__init__()
         self._stream = stream
         self._process = process
-        self._protocol = protocol
+        self._accept = accept
         self._peer = peer
         self._waiting = bytearray()
         self._is_paused = self._is_closing = self._is_asked = self._has_ended = False
         self.is_closed_by_client = False
-        process.post(lambda: protocol.connection_made(self))
+        process.post(self._made)
+
+    def _made(self) -> None:
+        self._protocol = self._accept()
+        self._protocol.connection_made(self)
 
     def arrive(self, data: bytes) -> None:
         if not (self._process.is_dead or self._is_closing):
@@ -122,7 +130,7 @@ class Stream:
         self,
         world: World,
         process: Process,
-        protocol: ModbusConnection,
+        accept: Callable[[], ModbusConnection],
         peer: tuple[str, int],
         delay_s: float,
         *,
@@ -139,7 +147,7 @@ class Stream:
         self._held: list[tuple[bool, bytes]] = []
         """Bytes to the server (True) or to the client; an empty one is the end of the stream."""
         self._is_over = False
-        self._server = ServerEnd(self, process, protocol, peer)
+        self._server = ServerEnd(self, process, accept, peer)
 
     def send(self, data: bytes) -> None:
         """From the client; nothing is the end of its side."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from random import Random
 from typing import Final
 
@@ -16,6 +17,7 @@ from tests.plant.machine import Process
 from tests.plant.world import Timer, World
 from tests.support.broadcast_manager import BroadcastManager
 
+_MOST_BYTES: Final = 8
 _MOST_WAITING: Final = 64
 """Frames in the queue of one controller: what comes beyond them is lost, as in the kernel's."""
 _DOWN: Final = (ControllerState.DOWN, ControllerState.BUS_OFF)
@@ -48,7 +50,8 @@ class Wire:
     def __init__(self, world: World, name: str, bitrate: int, rng: Random) -> None:
         self._world = world
         self.name = name
-        self._bit_s = 1.0 / bitrate
+        self._times_s = [longest_bits(length) / bitrate for length in range(_MOST_BYTES + 1)]
+        """How long a frame with so many bytes has the wire."""
         self._rng = rng
         self._ports: list[Port] = []
         self._is_busy = False
@@ -66,24 +69,32 @@ class Wire:
         """Let the lowest identifier that waits have the wire."""
         if self._is_busy:
             return
-        ready = [port for port in self._ports if port.waiting]
-        if not ready:
+        winner, lowest = None, STANDARD_MASK + 1
+        for port in self._ports:
+            if port.waiting:
+                can_id = port.waiting[0].can_id & STANDARD_MASK
+                if can_id < lowest:
+                    winner, lowest = port, can_id
+        if winner is None:
             return
-        winner = min(ready, key=lambda port: port.waiting[0].can_id & STANDARD_MASK)
         frame = winner.waiting.popleft()
         self._is_busy = True
         length = 0 if frame.can_id & REMOTE else len(frame.data)
-        self._world.after(longest_bits(length) * self._bit_s, lambda: self._end(winner, frame))
+        self._world.after(self._times_s[length], partial(self._end, winner, frame))
 
     def _end(self, sender: Port, frame: Frame) -> None:
         if not sender.is_off:
             self.frames += 1
-            frame = frame._replace(time=self._world.now)
+            frame = Frame(frame.can_id, frame.data, self._world.now)
             for tell in self.witness:
                 tell(frame, sender)
             is_lost = self.loss > 0 and self._rng.random() < self.loss
-            for port in self._ports:
-                if port is not sender and not is_lost and not port.is_off and self._reaches(sender, port):
+            for port in () if is_lost else self._ports:
+                if (
+                    port is not sender
+                    and not port.is_off
+                    and (not self.is_cut or self._reaches(sender, port))
+                ):
                     port.take(frame)
             sender.sent(frame)
         # Whoever answers at once takes part in the next arbitration.
@@ -91,7 +102,7 @@ class Wire:
         self.begin()
 
     def _reaches(self, sender: Port, port: Port) -> bool:
-        return not self.is_cut or sender.name.startswith("bridge") == port.name.startswith("bridge")
+        return sender.name.startswith("bridge") == port.name.startswith("bridge")
 
 
 class _Manager:
@@ -170,7 +181,8 @@ class PlantBus:
     def _rouse(self) -> None:
         if not self._is_woken:
             self._is_woken = True
-            self._process.post(self._wake_up)
+            # Not within the end of a frame: the wire goes on while the process stands still in this turn.
+            self._world.after(0.0, lambda: self._process.post(self._wake_up))
 
     def _wake_up(self) -> None:
         self._is_woken = False

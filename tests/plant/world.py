@@ -9,11 +9,15 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from heapq import heappop, heappush
+from struct import Struct
 from typing import Final
+
+from bridge.canopen.frame import Frame
 
 BEGIN_S: Final = 1000.0
 _NOON_NS: Final = 1_795_262_400_000_000_000
 """2026-11-21 12:00 UTC: the wall clock at the beginning."""
+_STAMP: Final = Struct("<dII")
 
 Act = Callable[[], None]
 
@@ -47,7 +51,7 @@ class World:
 
     def at(self, time: float, act: Act) -> Timer:
         """Have ``act`` done at this time, or now where that is over; of one moment in the order of calls."""
-        timer = Timer(max(time, self.now), act)
+        timer = Timer(time if time > self.now else self.now, act)
         self._order += 1
         heappush(self._queue, (timer.at, self._order, timer))
         return timer
@@ -63,9 +67,11 @@ class World:
             if act is None:
                 continue
             timer.act = None
-            self.now = max(self.now, at)
+            if at > self.now:
+                self.now = at
             act()
-        self.now = max(self.now, end)
+        if end > self.now:
+            self.now = end
 
     def epoch_ns(self, at: float) -> int:
         return _NOON_NS + round((at - BEGIN_S + self.wall_step_s) * 1e9)
@@ -76,6 +82,14 @@ class World:
         self._digest.update(line.encode())
         if self.log is not None:
             self.log.append(line)
+
+    def tell_frame(self, sender: str, frame: Frame) -> None:
+        """Take a frame that has been on the wire into the digest. There are many: only for somebody who
+        looks they are written out."""
+        self._digest.update(_STAMP.pack(self.now, frame.can_id, len(frame.data)) + frame.data)
+        self._digest.update(sender.encode())
+        if self.log is not None:
+            self.log.append(f"{self.now - BEGIN_S:.6f} {sender} {frame!r}")
 
     @property
     def hash(self) -> str:

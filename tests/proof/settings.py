@@ -1,6 +1,7 @@
 """The times of the plants: two halves of all drives, slow enough for seven of them and their owners on one
 slow CPU, each with every protocol; and two with what a site file leaves to the program, at ten times the
-frames, of which that CPU bears two drives. PROOF_PLANT says which, for all processes of a run."""
+frames, of which that CPU bears two drives. PROOF_PLANT says which, for all processes of a run. The calm
+one is for tests/plant alone, on a clock of its own: fewer frames, so more faults for the same CPU."""
 
 from __future__ import annotations
 
@@ -65,5 +66,17 @@ FIRST_DEFAULTS: Final = Settings(
     share=3,
 )
 SECOND_DEFAULTS: Final = replace(FIRST_DEFAULTS, name="second_defaults", nodes=("lift_modbus", "fan_opcua"))
-PLANTS: Final = {plant.name: plant for plant in (FIRST, SECOND, FIRST_DEFAULTS, SECOND_DEFAULTS)}
+CALM: Final = Settings(
+    "calm",
+    nodes=("pump_modbus", "lift_opcua", "fan_zenoh"),
+    bus="sync_period_ms = 250\nrpdo_period_ms = 250\ndeadman_ms = 800",
+    rpdo_period_ms=250,
+    deadman_ms=800,
+    heartbeat_ms=1200,
+    fieldbus_timeout_ms=3000,
+    owner_period_s=0.7,
+    paused_s=1.2,
+    short_s=0.7,
+)
+PLANTS: Final = {plant.name: plant for plant in (FIRST, SECOND, FIRST_DEFAULTS, SECOND_DEFAULTS, CALM)}
 PLANT: Final = PLANTS[os.environ.get("PROOF_PLANT", FIRST.name)]

@@ -219,9 +219,11 @@ class CanopenSlave:
         plan, settings = self._plan, self._store.current
         if cob_id in plan.channels:
             server, channel = plan.channels[cob_id]
+            only_reads = server.only_reads(data)
             for answer in server.on_request(data):
                 self._send(channel.send.cob_id, answer)
-            self.touch()
+            if not only_reads:
+                self.touch()
             return
         if self.state is not SlaveState.OPERATIONAL:
             return

@@ -49,6 +49,11 @@ class SimulatedSdoServer:
     def reset(self) -> None:
         self._transfer = None
 
+    def only_reads(self, data: bytes) -> bool:
+        """True for a request of an upload, which changes no object."""
+        receives = isinstance(self._transfer, BlockDownload) and self._transfer.in_blocks
+        return not receives and data[:1] != b"" and data[0] >> 5 in (2, 3)
+
     def on_request(self, data: bytes) -> list[bytes]:
         """The answers to ``data``; a transfer under way is given up by a new one."""
         if len(data) != _REQUEST_SIZE:

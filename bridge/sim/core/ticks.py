@@ -15,4 +15,8 @@ def next_tick(time: float) -> float:
 
 
 def earliest(*deadlines: float | None) -> float | None:
-    return min([deadline for deadline in deadlines if deadline is not None], default=None)
+    first = None
+    for deadline in deadlines:
+        if deadline is not None and (first is None or deadline < first):
+            first = deadline
+    return first

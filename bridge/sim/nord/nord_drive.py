@@ -19,8 +19,9 @@ from bridge.sim.nord.nord_parameters import (
     NordParameters,
     add_display,
 )
-from bridge.sim.nord.nord_posicon import PositionControl, approach, stretch, target
+from bridge.sim.nord.nord_posicon import approach
 from bridge.sim.nord.nord_ramp import Demand, turned
+from bridge.sim.nord.nord_scales import BUS_SOURCES, HUNDRED_PERCENT, LEFT, SET_POINTS, Aim, Scales
 from bridge.sim.nord.nord_states import STATE_BITS, NordState, commanded
 
 CHARGING_S: Final = 0.2
@@ -30,15 +31,8 @@ FAULT_REACTION_S: Final = 0.02
 COAST_S: Final = 1.0
 """The motor's run-down from P105 to standstill without voltage."""
 
-SET_POINTS: Final = 5
-HUNDRED_PERCENT: Final = 0x4000
 VALID: Final = 1 << 10
 ACKNOWLEDGE: Final = 1 << 7
-LEFT: Final = 1 << 12
-_BUS_SOURCES: Final = (3, 6)
-"""P509: system bus, CANopen (§7.2)."""
-_POSITION: Final = (10, 15)
-"""P543: low and high word."""
 _AT_REST: Final = (NordState.SWITCH_ON_INHIBITED, NordState.READY, NordState.SWITCHED_ON, NordState.FAULT)
 """Only a telegram leads out of these: time changes nothing."""
 _IGNORE: Final = -1
@@ -87,6 +81,8 @@ class NordDrive:
         self._accelerating = False
         self._coast_hz = 0.0
         self._coast_at = 0.0
+        self._aim_of: tuple[object, ...] = ()
+        self._aim_then = self._aim
 
     # What the drive shows.
 
@@ -103,7 +99,7 @@ class NordDrive:
             word = word & ~0x20 | 0x10
         word |= 0x0080 if self.warning_tenths else 0
         word |= 0x0100 if self._setpoint_reached() else 0
-        word |= 0x0200 if self._bus_controls else 0
+        word |= 0x0200 if self._aim.scales.bus_controls else 0
         left = self.output_hz < 0 or (self.output_hz == 0 and bool(self.control_word & LEFT))
         return word | (0x1000 if left else 0x0800)
 
@@ -117,14 +113,15 @@ class NordDrive:
         """A plausible motor current: magnetising, a load that grows with speed, more while accelerating."""
         if self.state not in (NordState.ENABLED, NordState.QUICK_STOP):
             return 0.0
-        share = 0.35 + 0.25 * abs(self.output_hz) / self._max_hz + (0.3 if self._accelerating else 0.0)
-        return self.parameters.value(112, self._set) * (share + self._ripple_now)
+        scales = self._aim.scales
+        share = 0.35 + 0.25 * abs(self.output_hz) / scales.max_hz + (0.3 if self._accelerating else 0.0)
+        return scales.rated_a * (share + self._ripple_now)
 
     def motor_hz(self, now: float) -> float:
         """Speed of the shaft in Hz of its field: the output's, or running down freely without voltage."""
         if self.state in (NordState.ENABLED, NordState.QUICK_STOP):
             return self.output_hz
-        lost_hz = self._max_hz / COAST_S * (now - self._coast_at)
+        lost_hz = self._aim.scales.max_hz / COAST_S * (now - self._coast_at)
         left_hz = max(0.0, abs(self._coast_hz) - lost_hz)
         return left_hz if self._coast_hz > 0 else -left_hz
 
@@ -156,9 +153,9 @@ class NordDrive:
         if not control_word & VALID:
             self.telegrams_ignored += 1
             return False
-        if not self._bus_controls:
+        if not self._aim.scales.bus_controls:
             return True  # local control: the telegram is valid, but somebody else commands
-        if self.parameters.raw(510) in (0, *_BUS_SOURCES):
+        if self.parameters.raw(510) in (0, *BUS_SOURCES):
             words = tuple(setpoints[:SET_POINTS]) + (0,) * (SET_POINTS - len(setpoints))
         else:
             words = self.setpoints
@@ -233,45 +230,22 @@ class NordDrive:
         return 1 if self.demand else (self.control_word >> 14) + 1
 
     @property
-    def _max_hz(self) -> float:
-        return self.parameters.value(105, self._set)
+    def _aim(self) -> Aim:
+        """Aim by the present parameters and words."""
+        of = self.parameters.changes, self.control_word, self.setpoints, self.demand
+        if of != self._aim_of:
+            scales = Scales.of(self.parameters, self._set)
+            self._aim_of, self._aim_then = of, Aim.of(scales, self.control_word, self.setpoints, self.demand)
+        return self._aim_then
 
-    @property
-    def _bus_controls(self) -> bool:
-        return self.parameters.raw(509) in _BUS_SOURCES
-
-    def _commanded_hz(self) -> float:
-        """Setpoint frequency, signed: positive turns right. Bit 12 inverts it, bit 11 changes nothing (§6.5.1
-        note 3: bit 12 = 0 means right); clipped to P105."""
-        if self.demand:
-            return max(-self._max_hz, min(self._max_hz, self.demand.target_hz))
-        share = self._set_share()
-        return self._max_hz * (-share if self.control_word & LEFT else share)
-
-    def _set_share(self) -> float:
-        """The setpoints that are frequencies, together: 1.0 is P105."""
-        share = 0.0
-        for n, word in enumerate(self.setpoints, start=1):
-            if word and self.parameters.meaning(546, n, self._set) == 1:
-                share += ((word & 0xFFFF ^ 0x8000) - 0x8000) / HUNDRED_PERCENT
-        return max(-1.0, min(1.0, share))
-
-    def _position_goal(self) -> int | None:
-        """The set position in increments, where the drive positions."""
-        if self.demand or self.parameters.raw(600, 1, self._set) == PositionControl.OFF:
-            return None
-        stretched = stretch(self.parameters)
-        return target(self.setpoints, lambda n: self.parameters.meaning(546, n, self._set), stretched)
-
-    def _positioning_hz(self) -> float:
-        """Greatest speed at which it may go there. The position gives the direction."""
-        if self.parameters.raw(600, 1, self._set) == PositionControl.AT_P105:
-            return self._max_hz
-        return abs(self._set_share()) * self._max_hz
+    def _goal(self) -> int | None:
+        """Position that it goes to."""
+        return self._aim.increments if self._runs else None
 
     def _goal_hz(self) -> float:
         """The frequency demanded by the present control word."""
-        return self._commanded_hz() if self._runs and self._position_goal() is None else 0.0
+        aim = self._aim
+        return aim.hz if self._runs and aim.increments is None else 0.0
 
     @property
     def _runs(self) -> bool:
@@ -286,18 +260,18 @@ class NordDrive:
         """§6.5.2: with POSICON the set position."""
         if self.state in (NordState.FAULT_REACTION, NordState.FAULT):
             return False
-        goal = self._position_goal()
+        goal = self._aim.increments
         if goal is not None:
             return self.output_hz == 0 and abs(goal - self.position_increments) < 1
         return self.output_hz == self._goal_hz()
 
     def _is_under_way(self) -> bool:
         """True on the way to a position, with a speed to go there."""
-        goal = self._position_goal() if self._runs else None
-        return goal is not None and self.position_increments != goal and self._positioning_hz() > 0
+        goal = self._goal()
+        return goal is not None and self.position_increments != goal and self._aim.most_hz > 0
 
     def _ramp(self, dt_s: float) -> None:
-        goal = self._position_goal() if self._runs else None
+        goal = self._goal()
         if goal is not None:
             self._position(goal, dt_s)
             return
@@ -310,7 +284,7 @@ class NordDrive:
             self.output_hz = 0.0  # bit 4 = 0 sets the ramp generator to 0; the voltage stays on
         else:
             up_s, down_s = self._ramp_times_s()
-            self.output_hz = step(before_hz, target_hz, up_s, down_s, self._max_hz, dt_s)
+            self.output_hz = step(before_hz, target_hz, up_s, down_s, self._aim.scales.max_hz, dt_s)
         self._turn(before_hz, dt_s)
         self._accelerating = abs(self.output_hz) > abs(before_hz) and self.output_hz != target_hz
         self._ripple_now = self._random.uniform(-self._ripple, self._ripple) if self.output_hz else 0.0
@@ -318,8 +292,8 @@ class NordDrive:
     def _position(self, goal: int, dt_s: float) -> None:
         before = self.position_increments, self.output_hz
         times_s = self._ramp_times_s()
-        up, down = (self._max_hz / max(time_s, 0.01) for time_s in times_s)
-        after = approach(*before, goal, self._positioning_hz(), (up, down), dt_s)
+        up, down = (self._aim.scales.max_hz / max(time_s, 0.01) for time_s in times_s)
+        after = approach(*before, goal, self._aim.most_hz, (up, down), dt_s)
         self.position_increments, self.output_hz = after
         self._accelerating = abs(self.output_hz) > abs(before[1])
         self.dirty.is_set |= after != before
@@ -328,10 +302,8 @@ class NordDrive:
         """The shaft turns on."""
         before = self.position_increments
         self.position_increments = turned(before, before_hz, self.output_hz, dt_s)
-        if self.position_increments != before:
-            codes = (self.parameters.meaning(543, n, self._set) for n in range(1, SET_POINTS + 1))
-            if self.has_encoder or any(code in _POSITION for code in codes):
-                self.dirty.is_set = True
+        if self.position_increments != before and (self.has_encoder or self._aim.scales.shows_position):
+            self.dirty.is_set = True
 
     def _ramp_times_s(self) -> tuple[float, float]:
         """Up and down, between 0 and P105."""
@@ -367,15 +339,16 @@ class NordDrive:
     def actual_value(self, number: int) -> int:
         """One of them, from 1, by its P543 code: frequency, current, inputs, setpoint, fault number, position
         (low and high word, §5.4); others 0."""
-        match self.parameters.meaning(543, number, self._set):
+        scales = self._aim.scales
+        match scales.actual_values[number - 1]:
             case 1:
-                return _word(self.output_hz / self._max_hz)
+                return _word(self.output_hz / scales.max_hz)
             case 3 | 4:
-                return _word(self.current_a / self.parameters.value(112, self._set))
+                return _word(self.current_a / scales.rated_a)
             case 5:
                 return self.digital_inputs & 0xFFFF
             case 8:
-                return _word(self._commanded_hz() / self._max_hz)
+                return _word(self._aim.hz / scales.max_hz)
             case 9:
                 return self.fault_tenths
             case 10:
@@ -387,7 +360,7 @@ class NordDrive:
 
     @property
     def _position_word(self) -> int:
-        return round(self.position_increments / stretch(self.parameters))
+        return round(self.position_increments / self._aim.scales.stretch)
 
     def _shown(self, words: Sequence[int], element: int) -> int:
         return words[element - 1] if self.parameters.raw(509) else 0

@@ -93,9 +93,12 @@ class NordParameters:
                     self._eeprom[parameter.number, element, parameter_set] = default
         self._ram = copy.copy(self._eeprom)
         self.eeprom_writes = 0
+        self.changes = 0
+        """Number of times that any of them may have got another value."""
 
     def power_on(self) -> None:
         self._ram = copy.copy(self._eeprom)
+        self.changes += 1
 
     def raw(self, number: int, element: int = 1, parameter_set: int = 1) -> int:
         return self._ram[number, element, parameter_set]
@@ -127,10 +130,12 @@ class NordParameters:
             for parameter_set in range(1, SETS + 1):
                 self._eeprom[number, one, parameter_set] = raw
                 self._ram[number, one, parameter_set] = raw
+        self.changes += 1
 
     def at_keypad(self, number: int, raw: int, *, element: int = 1, parameter_set: int = 1) -> None:
         """Set a parameter at the drive itself: it goes to the EEPROM, unless P560 says RAM only."""
         self._ram[number, element, parameter_set] = raw
+        self.changes += 1
         if self.raw(_SAVE_TO_EEPROM) == 1:
             self._eeprom[number, element, parameter_set] = raw
 
@@ -142,6 +147,7 @@ class NordParameters:
             self._ram[parameter.number, element, one] = raw
             if to_eeprom:
                 self._eeprom[parameter.number, element, one] = raw
+        self.changes += 1
         self.eeprom_writes += to_eeprom
 
     def add_to(self, dictionary: Dictionary) -> None:

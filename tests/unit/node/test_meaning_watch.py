@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from bridge.command import Code
 from bridge.image import Quality
-from bridge.sim.nord.nord_drive import NordDrive
+from bridge.sim.nord.nord_parameters import NordParameters
+from bridge.sim.nord.nord_scales import Scales
 from tests.support import nord_words
 from tests.support.nord_words import (
     ACTUAL,
@@ -24,6 +26,13 @@ from tests.support.nord_words import (
     point,
 )
 from tests.support.slow_sdo import SlowSdo
+
+SCALES = Scales.of
+
+
+def turns_without_p105(parameters: NordParameters, in_set: int) -> Scales:
+    """Of a drive whose motor does not mind a P105 of 0."""
+    return replace(SCALES(parameters, in_set), max_hz=50.0)
 
 
 def test_a_change_at_the_keypad_is_found_within_10_s(tmp_path: Path) -> None:
@@ -60,7 +69,7 @@ def test_a_scale_that_is_changed_in_any_set_is_found(tmp_path: Path) -> None:
 def test_a_scale_that_is_none_makes_no_value_with_what_was_read_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(NordDrive, "_max_hz", 50.0)
+    monkeypatch.setattr(Scales, "of", turns_without_p105)
     bench = made(tmp_path)
     assert point(bench, "actual/frequency").quality is Quality.GOOD
     inverter(bench).parameters.at_keypad(P105, 0)
@@ -77,7 +86,7 @@ def test_a_scale_that_is_none_makes_no_value_with_what_was_read_before(
 def test_a_scale_that_is_none_at_boot_up_is_not_replaced_by_the_site_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(NordDrive, "_max_hz", 50.0)
+    monkeypatch.setattr(Scales, "of", turns_without_p105)
     monkeypatch.setattr(nord_words, "SITE", nord_words.SITE.replace("{{ P112", "{{ P105 = 50.0, P112"))
     bench = made(tmp_path, prepare=lambda drive: drive.parameters.at_keypad(P105, 0))
     status = str(bench.plant.image.read("lift/node/boot_status").value)

@@ -6,7 +6,7 @@ import pytest
 
 from bridge.command import Action, Code, Identity, Outcome, Request, Source, Write, command_of
 from tests.plant.answers import Answers
-from tests.plant.oracle import Oracle
+from tests.plant.oracle import START, Oracle
 from tests.proof.drives import DRIVES
 
 DRIVE = DRIVES[0]
@@ -143,3 +143,15 @@ def test_followed_is_what_the_drive_has_said(scene: Scene) -> None:
     scene.oracle.frame(1010.3, DRIVE.tpdo, bytes(8), of_bridge=False)
     scene.answers.last_stop(DRIVE, 1010.5, 1.0, 2.0)
     assert not scene.oracle.violations
+
+
+@pytest.mark.parametrize(("outcome", "is_good"), [(NOT_FORWARDED, True), (Outcome(Code.NOT_ALLOWED), False)])
+def test_a_start_begins_with_what_was_taken_and_not_with_what_was_refused(
+    scene: Scene, outcome: Outcome, is_good: bool
+) -> None:
+    scene.asks()
+    scene.is_answered(outcome)
+    scene.oracle.telegram(DRIVE, 1011.0, START)
+    scene.oracle.telegram(DRIVE, 1013.0, START)
+    scene.sees(1012.0, FAMILY.run)
+    assert bool(scene.wrong()) is not is_good

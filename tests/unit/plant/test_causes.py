@@ -5,11 +5,13 @@ from __future__ import annotations
 import pytest
 
 from bridge.command import Event, EventKind
+from bridge.text import Text
 from tests.plant.causes import Causes
 from tests.plant.oracle import Oracle
 from tests.proof.drives import DRIVES
 
 BUS = "can0"
+SAID = Text.plain("something")
 
 
 @pytest.fixture
@@ -25,7 +27,7 @@ def wrong(causes: Causes, at: float = 1010.6, *, is_still: bool = False) -> list
 
 
 def test_what_is_told_in_time_is_told(causes: Causes) -> None:
-    causes.told(Event(1010.01, EventKind.INTRUDER, BUS, 900, "somebody"), 1010.02)
+    causes.told(Event(1010.01, EventKind.INTRUDER, BUS, 900, SAID), 1010.02)
     assert not wrong(causes)
 
 
@@ -39,7 +41,7 @@ def test_what_is_told_in_time_is_told(causes: Causes) -> None:
     ],
 )
 def test_another_event_does_not_tell_it(causes: Causes, kind: EventKind, source: str, at: float) -> None:
-    causes.told(Event(at, kind, source, 900, "something"), at)
+    causes.told(Event(at, kind, source, 900, SAID), at)
     (text,) = wrong(causes)
     assert text == "10.500 s: an intruder at 10.000 s, and no event says so"
 
@@ -54,9 +56,23 @@ def test_a_bridge_that_was_disturbed_has_not_seen_it(causes: Causes) -> None:
 
 
 def test_nor_has_one_that_stands_still(causes: Causes) -> None:
-    assert not wrong(causes, is_still=True)
+    causes.look(1010.4, is_still=True)
+    assert not wrong(causes)
 
 
 def test_what_was_over_long_before_excuses_nothing(causes: Causes) -> None:
     causes.disturbed(1009.0)
+    assert wrong(causes)
+
+
+def test_what_is_known_only_long_after_was_told_in_time() -> None:
+    causes = Causes(Oracle([DRIVES[0]]))
+    causes.told(Event(1010.01, EventKind.WATCHDOG, DRIVES[0].path, 900, SAID), 1010.01)
+    causes.look(1020.0, is_still=False)
+    causes.owes(EventKind.WATCHDOG, DRIVES[0].path, 1010.0, 1010.1, "a silence")
+    assert not wrong(causes, 1020.1)
+
+
+def test_what_comes_after_it_is_due_excuses_nothing(causes: Causes) -> None:
+    causes.disturbed(1010.55)
     assert wrong(causes)

@@ -57,7 +57,7 @@ def test_a_hang_in_a_turn_begins_with_its_next_look(world: World) -> None:
     process = Process(world, watcher, [])
     process.look_s = 0.01
     process.hang(0.5, in_turn=True)
-    process.post(process.clock)
+    process.post(lambda: [process.clock()].clear())
     assert watcher.seen == ["still 0.000", "on 0.500"]
 
 
@@ -86,3 +86,12 @@ def test_a_process_that_is_killed_in_its_turn_does_no_more(world: World) -> None
     world.run_until(BEGIN_S + 1.0)
     assert seen == []
     assert watcher.seen == ["end 0.005"]
+
+
+def test_who_looks_at_the_clock_from_outside_does_not_end_the_process(world: World) -> None:
+    process = Process(world, Nobody(), [])
+    process.kill(in_turn=True)
+    assert process.clock() == BEGIN_S
+    assert not process.is_dead
+    process.post(lambda: [process.clock()].clear())
+    assert process.is_dead

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.plant.oracle import Oracle
+from tests.plant.oracle import ALIVE, START, Oracle
 from tests.proof.board import NUMBERS
 from tests.proof.drives import DRIVES, Drive
 from tests.proof.settings import PLANT
@@ -72,6 +72,40 @@ def test_a_trip_is_to_be_acknowledged(scene: Scene) -> None:
     assert "its controller was silent" in scene.sees(late + 0.2)
     scene.enables_again(late + 0.3)
     assert not scene.sees(late + 0.4)
+
+
+def test_another_process_does_not_miss_what_the_last_one_has_got(scene: Scene) -> None:
+    trips: list[Drive] = []
+    scene.oracle.on_trip = lambda drive, since, due: trips.append(drive)
+    scene.oracle.on_end(1010.1)
+    scene.oracle.started()
+    scene.tell(1010.0 + 2 * TIMEOUT_S, FAMILY.ready)
+    assert not trips
+
+
+def test_after_a_release_its_controller_asks_anew_and_has_nothing_to_acknowledge(scene: Scene) -> None:
+    scene.oracle.released(DRIVE, 1010.0, 1010.01)
+    assert "its controller released it" in scene.sees(1010.3)
+    late = 1010.0 + TIMEOUT_S + 0.5
+    scene.tell(late, FAMILY.ready)
+    scene.tell(late + 0.1, FAMILY.run)
+    assert not scene.sees(late + 0.2)
+
+
+def test_who_commands_a_start_has_asked_for_what_enables() -> None:
+    scene = Scene()
+    scene.oracle.stop_answered(DRIVE, 1010.1, 1010.1)
+    assert "somebody stopped it" in scene.sees(1010.5)
+    scene.tell(1010.6, ALIVE)
+    assert scene.sees(1010.7)
+    scene.tell(1010.8, START)
+    assert not scene.sees(1010.9)
+
+
+def test_a_start_acknowledges_no_trip(scene: Scene) -> None:
+    late = 1010.0 + TIMEOUT_S + 0.5
+    scene.tell(late, START)
+    assert "its controller was silent" in scene.sees(late + 0.4)
 
 
 def test_a_bridge_that_stands_still_falls_silent(scene: Scene) -> None:

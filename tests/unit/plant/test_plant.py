@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ from tests.support.process import REPOSITORY
 SECONDS = 35.0
 _HASH = """
 import sys
+from itertools import pairwise
 from pathlib import Path
 from tests.plant.plan import plan_of
 from tests.plant.plant import Plant, project
@@ -74,3 +76,10 @@ def test_what_fails_in_a_process_is_found_though_it_is_killed(site: Project) -> 
 def test_steps_make_a_difference(site: Project) -> None:
     step = Step(9.0, "controller silent", 0, 1.0)
     assert Plant(site, Plan(1, 12.0, ())).run().hash != Plant(site, Plan(1, 12.0, (step,))).run().hash
+
+
+def test_the_wire_goes_on_while_the_process_stands_still_in_a_turn(site: Project) -> None:
+    hangs = tuple(Step(round(8.0 + 0.71 * place, 2), "hang", 0, 0.3, "in a turn") for place in range(10))
+    plant = Plant(site, Plan(1, 16.0, hangs), logs=True)
+    times = [float(line.split()[0]) for line in plant.run().log if "#" in line]
+    assert max(later - at for at, later in pairwise(times) if at > 8.0) < 0.1

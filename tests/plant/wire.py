@@ -181,7 +181,8 @@ class PlantBus:
     def _rouse(self) -> None:
         if not self._is_woken:
             self._is_woken = True
-            self._process.post(self._wake_up)
+            # Not within the end of a frame: the wire goes on while the process stands still in this turn.
+            self._world.after(0.0, lambda: self._process.post(self._wake_up))
 
     def _wake_up(self) -> None:
         self._is_woken = False

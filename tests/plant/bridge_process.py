@@ -3,6 +3,7 @@ does, in a process that may stand still or end."""
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial
 from random import Random
@@ -49,7 +50,13 @@ class Bridge:
         """Called with each request that is submitted, and its number; ``on_answer`` with its outcome."""
         self.on_answer: list[Callable[[int, Outcome], None]] = []
         self._requests = 0
+        self._ending: asyncio.Task[None] | None = None
         self.watchers: list[Watcher] = []
+        self.before_round: Callable[[], None] = lambda: None
+        """Called once before the next round that is due."""
+        self.starts = 0
+        """How many of its processes have started; the last of them at ``started_at``."""
+        self.started_at = world.now
         self.faults: list[str] = []
         """What has failed in any of its processes."""
         self.process = self._begin()
@@ -75,7 +82,8 @@ class Bridge:
             )
             for table in self._project.site.bus
         ]
-        self.master = Master(list(zip(self._buses, networks, strict=True)), self.plant, process.clock)
+        lines = list(zip(self._buses, networks, strict=True))
+        self.master = Master(lines, self.plant, process.clock, alarm=process.alarm)
         self.view = PlantView(
             self.plant, process.clock, world.epoch_ns, self.master.carry_out, self.master.wake
         )
@@ -96,13 +104,19 @@ class Bridge:
             bus.open(self.master.on_bus)
         self.master.attach(self._arm)
         self.master.wake()
+        self.starts, self.started_at = self.starts + 1, self._world.now
         for tell in self.on_start:
             tell()
 
     def _arm(self, at: float) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = self._world.at(at, lambda: self.process.post(self.master.on_bus))
+        self._timer = self._world.at(at, self._round)
+
+    def _round(self) -> None:
+        before, self.before_round = self.before_round, lambda: None
+        before()
+        self.process.post(self.master.on_bus)
 
     def on_still(self, now: float) -> None:
         for watcher in self.watchers:
@@ -123,6 +137,24 @@ class Bridge:
             stream.close()
         for watcher in self.watchers:
             watcher.on_end(now)
+
+    def end(self, told: Callable[[], None], ended: Callable[[], None]) -> None:
+        """End the service, as a signal does. ``told`` is called when it has been told, and ``ended`` when it
+        has done all that it does then."""
+        process = self.process
+
+        async def ending() -> None:
+            self.master.halt(process.clock())
+            told()
+            await self.master.stop_drives(process.clock())
+            await self.master.close()
+            ended()
+            process.kill(in_turn=False)
+
+        def begin() -> None:
+            self._ending = asyncio.Task(ending(), loop=process.loop)
+
+        process.post(begin)
 
     def restart(self) -> None:
         """Another process in place of one that has ended."""

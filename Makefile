@@ -162,6 +162,9 @@ plant-long: compiled ## the same for an hour of each CPU, what was gone through 
 	  $(IN) -m tests.plant.figures build/plant.first.json build/plant.second.json > build/plant.md; \
 	  echo "build/plant.md"; exit $${failed:-0}
 
+plant-mutants: compiled ## seed faults in the chain, which plants have to find (half an hour; ARGS='"no gap"')
+	@mkdir -p build && $(IN) -m tests.plant.mutants --json build/plant-mutants.json $(ARGS)
+
 # Atheris has no wheel for every machine: it is installed where it is asked for.
 GUIDED_S ?= 20
 DEEP_S ?= 1800
@@ -274,5 +277,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short fuzz-guided fuzz-deep plant plant-short plant-long bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
+.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short fuzz-guided fuzz-deep plant plant-short plant-long plant-mutants bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
   check-imports format docs setup lock wheel clean help

@@ -52,7 +52,6 @@ _SHELLS: Final = frozenset(
         "bridge.config.site_file",
         "bridge.eds.device_file",
         "bridge.eds.site_configurations",
-        "bridge.mapping.device_signals",
         "bridge.mapping.loader",
         "bridge.mapping.merge",
         "bridge.mapping.site_families",
@@ -66,6 +65,17 @@ _SHELLS: Final = frozenset(
     )
 )
 """Modules in those folders that open, wait or look at a clock."""
+_AROUND: Final = (
+    "bridge.base.notify",
+    "bridge.can.",
+    "bridge.condition.",
+    "bridge.master.timer",
+    "bridge.mirror.",
+    "bridge.northbound.",
+    "bridge.recorder.",
+    "bridge.service.",
+)
+"""Rooms of what listens to the core and asks it: they are left out."""
 _CORE_OF_CAN: Final = ("bridge.can.burstend", "bridge.can.errorframe", "bridge.can.interface")
 _PLAIN: Final = frozenset(
     (
@@ -251,12 +261,16 @@ def _is_bare(site: Site) -> bool:
 
 
 def _is_kept(obj: object) -> bool:
-    kind = type(obj)
-    if isinstance(obj, type):
-        kind = obj
+    """Whether a checkpoint has an object, which is around the core otherwise. Raises ``Unusable`` for one of
+    which nobody knows."""
+    kind = obj if isinstance(obj, type) else type(obj)
     if kind.__module__ == "builtins":
         return not isinstance(obj, types.ModuleType | types.CoroutineType)
-    return (kind.__module__, kind.__name__) in _PLAIN or is_core(kind.__module__) or kind.__module__ == "re"
+    if (kind.__module__, kind.__name__) in _PLAIN or is_core(kind.__module__) or kind.__module__ == "re":
+        return True
+    if kind.__module__.startswith("bridge.") and not kind.__module__.startswith(_AROUND):
+        raise Unusable(f"{kind.__module__}.{kind.__qualname__} is neither of the core nor around it")
+    return False
 
 
 class _Unpickler(pickle.Unpickler):

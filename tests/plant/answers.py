@@ -155,5 +155,9 @@ class Answers:
         takes_voltage, off = drive.family.stops["disable_voltage"]
         if track.stop_word & takes_voltage != off:
             return
-        if not any(when >= at - 1.0 and word & mask != value for when, word in track.said):
+        # What it has said last counts however old it is: a bridge that has stood still hears it late.
+        latest = [word for when, word in track.said if when >= at - 1.0] or [
+            word for _, word in list(track.said)[-1:]
+        ]
+        if not any(word & mask != value for word in latest):
             self._oracle.wrong(at, f"{drive.path}: followed, and the drive has not said that it is stopped")

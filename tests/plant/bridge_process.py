@@ -3,6 +3,7 @@ does, in a process that may stand still or end."""
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping
 from functools import partial
 from random import Random
@@ -19,7 +20,7 @@ from bridge.master.standby import Standby, listen_s
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
 from bridge.project import Project
-from bridge.recorder.tape import RecordingTape, TapedBus
+from bridge.recorder.tape import Note, RecordingTape, TapedBus
 from tests.plant.machine import Process, Watcher
 from tests.plant.stream import Stream
 from tests.plant.wire import PlantBus, Wire
@@ -57,10 +58,16 @@ class Bridge:
         """Called with each request that is submitted, and its number; ``on_answer`` with its outcome."""
         self.on_answer: list[Callable[[int, Outcome], None]] = []
         self._requests = 0
+        self._ending: asyncio.Task[None] | None = None
         self.watchers: list[Watcher] = []
         self.tape: RecordingTape | None = None
         """Tape of the process that is on, where ``records`` has it recorded."""
         self._records = records
+        self.before_round: Callable[[], None] = lambda: None
+        """Called once before the next round that is due."""
+        self.starts = 0
+        """How many of its processes have started; the last of them at ``started_at``."""
+        self.started_at = world.now
         self.faults: list[str] = []
         """What has failed in any of its processes."""
         self.process = self._begin()
@@ -80,6 +87,7 @@ class Bridge:
         self.plant = Plant(self._catalogue, "0", world.now, tape)
         if tape:
             self.plant.on_event(tape.on_event)
+            process.alarm.told = partial(tape.tell, Note.RANG)
         self.plant.on_event(self._tell)
         self._buses = [
             PlantBus(world, self._wires[table.name], process, self._name) for table in self._project.site.bus
@@ -97,7 +105,7 @@ class Bridge:
             )
             for table in self._project.site.bus
         ]
-        self.master = Master(list(zip(buses, networks, strict=True)), self.plant, clock)
+        self.master = Master(list(zip(buses, networks, strict=True)), self.plant, clock, alarm=process.alarm)
         self.view = PlantView(self.plant, clock, world.epoch_ns, self.master.carry_out, self.master.wake)
         self.modbus = None
         if self._project.site.modbus:
@@ -116,13 +124,19 @@ class Bridge:
             bus.open(self.master.on_bus)
         self.master.attach(self._arm)
         self.master.wake()
+        self.starts, self.started_at = self.starts + 1, self._world.now
         for tell in self.on_start:
             tell()
 
     def _arm(self, at: float) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = self._world.at(at, lambda: self.process.post(self.master.on_bus))
+        self._timer = self._world.at(at, self._round)
+
+    def _round(self) -> None:
+        before, self.before_round = self.before_round, lambda: None
+        before()
+        self.process.post(self.master.on_bus)
 
     def on_still(self, now: float) -> None:
         for watcher in self.watchers:
@@ -143,6 +157,24 @@ class Bridge:
             stream.close()
         for watcher in self.watchers:
             watcher.on_end(now)
+
+    def end(self, told: Callable[[], None], ended: Callable[[], None]) -> None:
+        """End the service, as a signal does. ``told`` is called when it has been told, and ``ended`` when it
+        has done all that it does then."""
+        process = self.process
+
+        async def ending() -> None:
+            self.master.halt(process.clock())
+            told()
+            await self.master.stop_drives(process.clock())
+            await self.master.close()
+            ended()
+            process.kill(in_turn=False)
+
+        def begin() -> None:
+            self._ending = asyncio.Task(ending(), loop=process.loop)
+
+        process.post(begin)
 
     def restart(self) -> None:
         """Another process in place of one that has ended."""

@@ -14,16 +14,17 @@ from tests.plant.stream import Stream
 from tests.plant.world import Timer, World
 from tests.proof.board import NUMBERS
 from tests.proof.drives import Drive
+from tests.proof.families import NORD, NORD_INVALID
 from tests.proof.settings import PLANT
 
 _HEAD: Final = struct.Struct(">HHHB")
 _READ: Final = struct.Struct(">BHH")
 _WRITE: Final = struct.Struct(">BHHB")
-_READ_INPUT, _WRITE_HOLDING = 4, 16
+_READ_HOLDING, _READ_INPUT, _WRITE_HOLDING = 3, 4, 16
 _EXCEPTION: Final = 0x80
 _STATUS: Final = (9, 1)
 """Input register with the drive's own status word, and how many are read."""
-_RELEASE: Final = 10
+_RELEASE, _ACKNOWLEDGE = 10, 11
 _DELAY_S: Final = 0.002
 _AGAIN_S: Final = 0.5
 _SOURCES: Final = {"modbus": Source.MODBUS, "opcua": Source.OPCUA, "zenoh": Source.ZENOH}
@@ -112,6 +113,11 @@ def writes(register: int, *words: int) -> bytes:
     )
 
 
+def read(register: int, count: int) -> bytes:
+    """Request for holding registers."""
+    return _READ.pack(_READ_HOLDING, register, count)
+
+
 class Controller:
     """The program that owns one drive. It writes a telegram in each period, with a number in its setpoint,
     and looks whether the drive moves."""
@@ -123,10 +129,16 @@ class Controller:
         self.period_s = PLANT.owner_period_s
         self.is_silent = False
         self.acknowledges_always = False
+        """In each second cycle, and its words enable whatever becomes of the drive."""
         self.pauses = False
         """It lets its drive run for a second and stops it for a third of one, again and again."""
         self._starts: int | None = None
         """How much it has sent to start its drive by a command; None while it does so by words."""
+        self.stops_long = False
+        """It stops its drive for a second, and lets it run for another, again and again."""
+        self.acknowledges = True
+        self.is_invalid = False
+        """Its words lack "control data valid"."""
         self._world = world
         self._bridge = bridge
         self._arrived = arrived
@@ -161,8 +173,10 @@ class Controller:
             return
         if self._starts is not None and not (self._moves and self._starts >= len(_STARTS)):
             self._start(self._starts)
-        else:
-            self._write(self._word())
+            return
+        if self.acknowledges_always and not self._moves:
+            self._acknowledge()
+        self._write(NORD_INVALID if self.is_invalid else self._word())
 
     def _start(self, place: int) -> None:
         self._starts = place + 1
@@ -180,19 +194,25 @@ class Controller:
 
     def _word(self) -> int:
         family = self.drive.family
-        jogs = self.pauses and self._cycles % 4 == 0
+        jogs = (self.pauses and self._cycles % 4 == 0) or (self.stops_long and self._cycles % 6 < 4)
+        if self.acknowledges_always:
+            return family.run | (family.acknowledge & ~family.ready if self._cycles % 2 == 0 else 0)
         if self._moves:
             self._place = 0
-            if jogs:
-                return family.ready
-            return family.run | (family.acknowledge & ~family.ready if self._flips else 0)
+            return family.ready if jogs else family.run
         step = _BEGINS[self._place % len(_BEGINS)]
         self._place += 1
+        if step == "acknowledge" and not self.acknowledges:
+            return family.ready
         return {"ready": family.ready, "run": family.run, "acknowledge": family.acknowledge}[step]
 
-    @property
-    def _flips(self) -> bool:
-        return self.acknowledges_always and self._cycles % 2 == 0
+    def _acknowledge(self) -> None:
+        """By its register or its method."""
+        if self.line is not None:
+            self.line.ask(self.drive.unit, writes(_ACKNOWLEDGE, 1))
+            return
+        request = Request(self.identity, self.drive.path, command_of(Action.RESET_FAULT))
+        self._bridge.ask(request, _DELAY_S, lambda: None, lambda outcome: None)
 
     def _write(self, word: int) -> None:
         self._number = (self._number + 1) % NUMBERS
@@ -210,7 +230,7 @@ class Controller:
             return
         values = {"control_word": word, "setpoint_1": setpoint}
         request = Request(self.identity, self.drive.path, Write(values))
-        self._bridge.ask(request, _DELAY_S, lambda: self._arrived(self.drive, word), self._on_outcome)
+        self._bridge.ask(request, _DELAY_S, lambda: self._on_telegram(word), self._on_outcome)
 
     def _on_bytes(self, data: bytes) -> None:
         """Telegrams among what reaches the bridge's machine."""
@@ -219,7 +239,12 @@ class Controller:
             _, _, length, _ = _HEAD.unpack_from(data, begin)
             pdu, begin = data[begin + _HEAD.size : begin + 6 + length], begin + 6 + length
             if pdu[0] == _WRITE_HOLDING and _WRITE.unpack_from(pdu)[1] == 0:
-                self._arrived(self.drive, struct.unpack_from(">H", pdu, _WRITE.size)[0])
+                self._on_telegram(struct.unpack_from(">H", pdu, _WRITE.size)[0])
+
+    def _on_telegram(self, word: int) -> None:
+        """One that is not valid is none."""
+        if self.drive.family is not NORD or word != NORD_INVALID:
+            self._arrived(self.drive, word)
 
     def _on_status(self, pdu: bytes) -> None:
         self._moves = not pdu[0] & _EXCEPTION and self._enabled(struct.unpack_from(">H", pdu, 2)[0])

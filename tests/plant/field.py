@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from bridge.canopen.frame import STANDARD_MASK, Frame
 from bridge.sim.core.simulated_device import SimulatedDevice
 from tests.plant.wire import Wire
 from tests.plant.world import Timer, World
+
+_ERROR_CONTROL: Final = 0x700
 
 
 class FieldNode:
@@ -17,15 +21,23 @@ class FieldNode:
         self._port = wire.port(f"node {device.node_id}", self._take)
         self._timer: Timer | None = None
         self.speaks = True
+        self.is_mute = False
+        """Nothing of it but its heartbeat reaches its wire."""
+        self.deaf_to: int | None = None
+        """An identifier that it does not hear."""
 
     def power_on(self) -> None:
         self.device.start(self._world.now)
         self.serve()
 
     def _take(self, frame: Frame) -> None:
-        if frame.can_id & STANDARD_MASK in self.device.heard:
+        if frame.can_id & STANDARD_MASK in self.device.heard and frame.can_id != self.deaf_to:
             self.device.on_frame(frame, frame.time)
             self.serve()
+
+    def feed(self, frame: Frame) -> None:
+        """A frame that nobody else hears."""
+        self._take(frame._replace(time=self._world.now))
 
     def _on_time(self) -> None:
         self._timer = None
@@ -35,7 +47,8 @@ class FieldNode:
     def serve(self) -> None:
         """Send what it has to send, and look when it is due next."""
         for frame in self.device.take_frames():
-            if self.speaks:
+            is_heard = not self.is_mute or frame.can_id == _ERROR_CONTROL + self.device.node_id
+            if self.speaks and is_heard:
                 self._port.send(frame)
         due = self.device.next_deadline()
         timer = self._timer

@@ -12,14 +12,15 @@ from functools import partial
 from math import inf
 from typing import Any, Final, Protocol
 
+from bridge.master.standstill import SignalAlarm
 from tests.plant.world import Act, World
 
 _LOOK_S: Final = 0.000_04
 """Time that passes from one look at the clock to the next: a turn takes as long as it has looks."""
 
 
-class DeadError(BaseException):
-    """The process is gone: nothing in it may catch this."""
+class DeadError(SystemExit):
+    """The process is gone: nothing in it may catch this, and a task of asyncio lets it through."""
 
 
 class Watcher(Protocol):
@@ -30,6 +31,27 @@ class Watcher(Protocol):
     def on_going_on(self, since: float, now: float) -> None: ...
 
     def on_end(self, now: float) -> None: ...
+
+
+class Alarm(SignalAlarm):
+    """The process's interval timer: its signal comes before anything else when the process goes on."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._due = inf
+        self.told: Callable[[bool], None] = lambda breaks_in: None
+        """Called before it rings, with whether it breaks in."""
+
+    def set(self, seconds: float) -> None:
+        self.rang = False
+        self._due = self._world.now + seconds if seconds else inf
+
+    def deliver(self) -> None:
+        """Ring where that is due. Raises ``StoodStill`` where that is asked for."""
+        if self._world.now >= self._due:
+            self._due = inf
+            self.told(self.breaks_in)
+            self.ring()
 
 
 class Process:
@@ -46,7 +68,9 @@ class Process:
         self.is_dead = False
         self._pause_s = 0.0
         """Length of the pause that begins at the next look at the clock; ``inf`` ends the process there."""
+        self._skips = 0
         self.look_s = _LOOK_S
+        self.alarm = Alarm(world)
         self.loop = ProcessLoop(self, world, faults)
         self.still_since = inf
         """When it began to stand still; infinite while it does not."""
@@ -55,10 +79,12 @@ class Process:
         seen = self._world.now
         if not self._is_busy:
             return seen
-        if self._pause_s:
+        if self._pause_s and not self._skips:
             pause_s, self._pause_s = self._pause_s, 0.0
             self._stand_still(pause_s)
+            self.alarm.deliver()
         else:
+            self._skips = max(0, self._skips - 1)
             self._world.run_until(seen + self.look_s)
             if self.is_dead:
                 raise DeadError
@@ -95,12 +121,13 @@ class Process:
 
     # what is done to it
 
-    def hang(self, seconds: float, *, in_turn: bool) -> None:
-        """Stop it for so long: now, between two turns, or at its next look at the clock."""
+    def hang(self, seconds: float, *, in_turn: bool, skips: int = 0) -> None:
+        """Stop it for so long: now, between two turns, or in a turn, at its next look at the clock but
+        ``skips``."""
         if self.is_dead:
             return
         if in_turn or self._is_busy:
-            self._pause_s = seconds
+            self._pause_s, self._skips = seconds, skips
         elif not self._is_still:
             self._is_still = True
             self._begin_pause()
@@ -116,6 +143,7 @@ class Process:
         if not self.is_dead:
             self._is_still = False
             self._end_pause()
+            self.alarm.deliver()
             self._work()
 
     def _begin_pause(self) -> None:
@@ -208,6 +236,9 @@ class ProcessLoop(asyncio.AbstractEventLoop):
         handle = _Handle(when, callback, args, self)
         self._world.at(when, lambda: self._process.post(handle.run))
         return handle
+
+    def create_future(self) -> asyncio.Future[Any]:
+        return asyncio.Future(loop=self)
 
     def _timer_handle_cancelled(self, handle: asyncio.TimerHandle) -> None:
         """A turn that was cancelled does nothing."""

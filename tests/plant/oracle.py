@@ -31,6 +31,7 @@ _GONE_S: Final = 0.5
 """A bridge that is in charge is never silent for so long."""
 _TURN_S: Final = 0.3
 """Two bridges that begin at once may both act for a period of the heartbeat."""
+_BETWEEN_S: Final = 0.05
 _KEPT: Final = 200
 _AGE_S: Final = 0.7
 """Longest time for which a value that is no longer told may be good: a TPDO comes each 0.3 s."""
@@ -166,6 +167,8 @@ class Oracle:
         self._late_at = -inf
         """When the bridge went on after a pause that it may have taken for a hang, which ends all time-outs:
         it counts from its last round."""
+        self._pause = -inf, -inf
+        """Begin and end of the bridge's last pause, or of several of them that follow each other closely."""
         self._other_since = self._other_at = -inf
         """First and last frame of another bridge, while it is in charge."""
 
@@ -215,10 +218,14 @@ class Oracle:
 
     def on_going_on(self, since: float, now: float) -> None:
         self._still_since = inf
+        # What came in a pause shortly before this one may be read after it.
+        began = self._pause[0] if since < self._pause[1] + _BETWEEN_S else since
+        self._pause = began, now
         if now - since > self._deadman_s / 2:
             self._late_at = now
         if now - since > self._deadman_s:
-            self.interrupted(since, now + _WIRE_S, "the bridge hung")
+            # The bursts have ended then, and what was right before is not sent any more.
+            self.interrupted(began, since + self._deadman_s + _KERNEL_S + _WIRE_S, "the bridge hung")
             self._forget_owners()
 
     def on_end(self, now: float) -> None:

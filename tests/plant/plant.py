@@ -18,12 +18,16 @@ from tests.plant.answers import Answers
 from tests.plant.bridge_process import Bridge
 from tests.plant.causes import Causes
 from tests.plant.clients import Controller, Operator, Stranger
+from tests.plant.debts import Debts
+from tests.plant.deeds import CALM, MORE
 from tests.plant.field import FieldNode
 from tests.plant.oracle import Oracle
+from tests.plant.outputs import Outputs, stop_outputs
 from tests.plant.plan import Plan, Step
-from tests.plant.third_parties import Intruder
+from tests.plant.ways import Ways
 from tests.plant.wire import Port, Wire
 from tests.plant.world import BEGIN_S, World
+from tests.proof.block import BLOCK
 from tests.proof.drives import DRIVES, Drive, write_site
 from tests.proof.settings import PLANT
 
@@ -31,10 +35,7 @@ _BITRATE: Final = 1_000_000
 _LOOK_S: Final = 0.25
 _SECOND: Final = "bridge two"
 _ROUND_S: Final = 0.05
-_FOUND_S: Final = 0.5
-"""An intruder's frame is found by then (docs: 10 ms; one that repeats what the bridge sends, later)."""
-_ORDER_S: Final = 3.0
-"""By then a bridge that was passive acts again."""
+_QUIET_S: Final = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,9 @@ def project(folder: Path) -> Project:
     """The site of this run's plant, written to ``folder``."""
     for name in ("state", "run"):
         (folder / name).mkdir(exist_ok=True)
-    return load_project(write_site(folder / "site.toml", "can0", folder / "state", folder / "run"))
+    site = folder / "site.toml"
+    others = (BLOCK.site(folder),)
+    return load_project(write_site(site, "can0", folder / "state", folder / "run", others=others))
 
 
 class Plant:
@@ -79,9 +82,15 @@ class Plant:
         self.oracle = Oracle(list(DRIVES))
         self.answers = Answers(self.oracle, list(DRIVES))
         self.causes = Causes(self.oracle)
+        self.debts = Debts(self.oracle)
+        self.debts.is_quiet = self.is_quiet
+        self.ways = Ways(self.oracle)
+        self.outputs = Outputs(self.oracle)
+        self.has_outputs = False
+        """Whether the outputs have an owner."""
         self.oracle.on_trip = self._on_trip
         self.second: Bridge | None = None
-        self._project = project
+        self.project = project
         self.nodes = [
             FieldNode(self.world, self.wire, device) for device in simulated_nodes(table, project.path)
         ]
@@ -90,7 +99,7 @@ class Plant:
         )
         self.bridge.on_start.append(self._on_start)
         self.bridge.on_event.append(lambda event: self.causes.told(event, self.world.now))
-        self.bridge.watchers += [self.oracle, self]
+        self.bridge.watchers += [self.oracle, self.debts, self]
         self.bridge.on_request.append(lambda number, asked: self.answers.asked(number, asked, self.world.now))
         self.bridge.on_answer.append(lambda number, outcome: self._on_answer(number, outcome))
         self.controllers = [
@@ -103,7 +112,10 @@ class Plant:
             node.power_on()
         self.counts: Counter[str] = Counter()
         self._silent_since = BEGIN_S
-        self._down_s = 0.0
+        self._loud_until = BEGIN_S
+        self.intruder_at = 0.0
+        """When somebody has last commanded a node beside the bridge."""
+        self.down_s = 0.0
         for step in plan.steps:
             self.world.at(BEGIN_S + step.at, self._doing(step))
         self.world.after(_LOOK_S, self._look)
@@ -137,10 +149,15 @@ class Plant:
         self.world.tell_frame(sender.name, frame)
         if sender.name == _SECOND:
             self.oracle.frame_of_other(frame.time, frame.can_id, frame.data)
-            self.answers.disturbed(frame.time)
-            self.causes.disturbed(frame.time)
-        else:
-            self.oracle.frame(frame.time, frame.can_id, frame.data, of_bridge=of_bridge)
+            self.debts.frame_of_other(frame.time, frame.can_id)
+            self._disturbed()
+            return
+        self.oracle.frame(frame.time, frame.can_id, frame.data, of_bridge=of_bridge)
+        who = "bridge" if of_bridge else sender.name.partition(" ")[0]
+        self.debts.frame(frame.time, frame.can_id, frame.data, who)
+        if of_bridge:
+            self.ways.frame(frame.time, frame.can_id, frame.data)
+            self.outputs.frame(frame.time, frame.can_id, frame.data)
 
     def _on_telegram(self, drive: Drive, word: int) -> None:
         self.oracle.telegram(drive, self.world.now, word)
@@ -154,6 +171,7 @@ class Plant:
 
     def _on_start(self) -> None:
         self.oracle.started()
+        self.debts.started()
         self._disturbed()
 
     def on_still(self, now: float) -> None:
@@ -167,11 +185,16 @@ class Plant:
         self._silent_since = now
         self.answers.ended(now)
         self._disturbed()
-        self.world.after(self._down_s, self.bridge.restart)
+        self.world.after(self.down_s, self.bridge.restart)
 
     def _disturbed(self) -> None:
-        self.answers.disturbed(self.world.now)
-        self.causes.disturbed(self.world.now)
+        for judge in (self.answers, self.causes, self.debts, self.outputs):
+            judge.disturbed(self.world.now)
+        self.ways.excuse(self.world.now)
+
+    def is_quiet(self) -> bool:
+        """Whether frames reach everybody, and have done so for a while."""
+        return self.world.now > self._loud_until
 
     def _on_trip(self, drive: Drive, since: float, due: float) -> None:
         what = f"the controller of {drive.path} was silent for too long"
@@ -184,6 +207,7 @@ class Plant:
         is_still = process.is_dead or process.still_since < now
         self.answers.look(now, is_still=is_still)
         self.causes.look(now, is_still=is_still)
+        self.debts.look(now, is_still=is_still)
         if process.is_dead or process.still_since < now:
             for drive in DRIVES:
                 self.oracle.dead_for(drive, self._silent_since, now)
@@ -208,15 +232,17 @@ class Plant:
         def do() -> None:
             self.counts[step.what] += 1
             self.world.tell(f"step {step.what} {step.which} {step.seconds} {step.how}")
+            if step.what not in CALM:
+                self.ways.excuse(self.world.now + step.seconds)
             _STEPS[step.what](self, step)
 
         return do
 
-    def _controller(self, step: Step) -> Controller:
+    def controller(self, step: Step) -> Controller:
         return self.controllers[step.which % len(self.controllers)]
 
     def silence_controller(self, step: Step) -> None:
-        controller = self._controller(step)
+        controller = self.controller(step)
         controller.is_silent = True
         self.world.after(step.seconds, controller.start)
 
@@ -226,14 +252,14 @@ class Plant:
             self.world.after(step.seconds, controller.start)
 
     def crash_controller(self, step: Step) -> None:
-        controller = self._controller(step)
+        controller = self.controller(step)
         controller.crash()
         self.oracle.left(controller.drive, self.world.now)
         self.world.after(step.seconds, controller.start)
 
     def half_open(self, step: Step) -> None:
         """Nothing gets through between the controller's machine and ours, and nobody is told."""
-        controller = self._controller(step)
+        controller = self.controller(step)
         stream = controller.line.stream if controller.line else None
         if stream is None:
             self.silence_controller(step)
@@ -242,7 +268,7 @@ class Plant:
         self.world.after(step.seconds, stream.mend)
 
     def release(self, step: Step) -> None:
-        controller = self._controller(step)
+        controller = self.controller(step)
         controller.is_silent = True
         drive = controller.drive
         controller.release(lambda came: self.oracle.released(drive, came, self.world.now))
@@ -250,51 +276,59 @@ class Plant:
         self.world.after(step.seconds, controller.start)
 
     def jog(self, step: Step) -> None:
-        controller = self._controller(step)
+        controller = self.controller(step)
         controller.pauses = True
         self.world.after(step.seconds, lambda: setattr(controller, "pauses", False))
 
     def acknowledge_always(self, step: Step) -> None:
-        controller = self._controller(step)
+        controller = self.controller(step)
         controller.acknowledges_always = True
         self.world.after(step.seconds, lambda: setattr(controller, "acknowledges_always", False))
 
-    def start_by_command(self, step: Step) -> None:
-        able = [one for one in self.controllers if one.line is None]
-        controller = able[step.which % len(able)]
-        controller.start_by_command(stands=step.how == "stands")
-        self.world.after(step.seconds, controller.go_on_by_words)
-
     def stop(self, step: Step) -> None:
-        drive = DRIVES[step.which % len(DRIVES)]
+        self.stop_drive(DRIVES[step.which % len(DRIVES)], step.how)
+
+    def stop_drive(self, drive: Drive, how: str) -> None:
+        """An operator stops it."""
 
         def answered(came: float, outcome: Outcome) -> None:
-            self.world.tell(f"{drive.path} {step.how} answered {outcome.code} {outcome.forwarded}")
+            now = self.world.now
+            self.world.tell(f"{drive.path} {how} answered {outcome.code} {outcome.forwarded}")
+            self.ways.stop_asked(drive, now)
             if outcome.ok:
-                self.oracle.stop_answered(drive, came, self.world.now)
+                self.ways.stop_answered(drive, how, came, now, is_forwarded=outcome.forwarded)
+                self.oracle.stop_answered(drive, came, now)
 
-        self.operator.stop(drive, step.how, answered)
+        self.ways.stop_asked(drive, self.world.now)
+        self.operator.stop(drive, how, answered)
 
     def stranger(self, step: Step) -> None:
         drive = DRIVES[step.which % len(DRIVES)]
         is_same = step.how == "same host" and drive.protocol == "modbus"
-        host = f"127.0.1.{10 + drive.place}" if is_same else "192.168.1.200"
+        host = f"127.0.1.{10 + drive.place}" if is_same else "127.0.3.200"
         stranger = Stranger(self.world, self.bridge, drive, host)
         self.world.after(step.seconds, stranger.leave)
 
     def backlog(self, step: Step) -> None:
         """A controller writes ahead while the bridge stands still for a moment, and hangs."""
-        controller = self._controller(step)
+        controller = self.controller(step)
         self.bridge.process.hang(PLANT.short_s, in_turn=False)
         controller.write_ahead(int(step.how))
         self.world.after(step.seconds, controller.start)
 
     def hang(self, step: Step) -> None:
-        self.bridge.process.hang(step.seconds, in_turn=step.how == "in a turn")
+        def hang() -> None:
+            in_turn = step.how != "between turns"
+            self.bridge.process.hang(step.seconds, in_turn=in_turn, skips=step.which)
+
+        if step.how == "in a round":
+            self.bridge.before_round = hang
+        else:
+            hang()
 
     def kill(self, step: Step) -> None:
         if not self.bridge.process.is_dead:
-            self._down_s = step.seconds
+            self.down_s = step.seconds
             self.bridge.process.kill(in_turn=step.how == "in a turn")
 
     def bus_off(self, step: Step) -> None:
@@ -303,6 +337,7 @@ class Plant:
             bus.enter(ControllerState.BUS_OFF)
         self.oracle.bus_off(now)
         self._disturbed()
+        self._loud_until = max(self._loud_until, now + step.seconds + _QUIET_S)
         buses = list(self.bridge.buses)
 
         def back() -> None:
@@ -313,10 +348,12 @@ class Plant:
         self.world.after(step.seconds, back)
 
     def cut(self, step: Step) -> None:
+        self._loud_until = max(self._loud_until, self.world.now + step.seconds + _QUIET_S)
         self.wire.is_cut = True
         self.world.after(step.seconds, lambda: setattr(self.wire, "is_cut", False))
 
     def noise(self, step: Step) -> None:
+        self._loud_until = max(self._loud_until, self.world.now + step.seconds + _QUIET_S)
         self.wire.loss = float(step.how)
         self.world.after(step.seconds, lambda: setattr(self.wire, "loss", 0.0))
 
@@ -329,48 +366,6 @@ class Plant:
         node = self.nodes[step.which % len(self.nodes)]
         node.speaks = False
         self.world.after(step.seconds, lambda: setattr(node, "speaks", True))
-
-    def intrude(self, step: Step) -> None:
-        """A tool commands a node for a while; afterwards an operator starts what was stopped for it."""
-        drive = DRIVES[step.which % len(DRIVES)]
-        intruder = Intruder(self.world, self.wire, drive, step.how)
-        now = self.world.now
-        if not (self.wire.is_cut or self.wire.loss):
-            what = f"an intruder's {step.how} at {drive.path}"
-            bus = self._project.site.bus[0].name
-            self.causes.owes(EventKind.INTRUDER, bus, now, now + _FOUND_S + step.seconds, what)
-
-        def goes_on() -> None:
-            self.oracle.intruded(drive, self.world.now)
-            if self.world.now < now + step.seconds:
-                self.world.after(_LOOK_S, goes_on)
-
-        def leave() -> None:
-            intruder.leave()
-            self.oracle.intruded(drive, self.world.now)
-            self.world.after(_ORDER_S, self._put_in_order)
-
-        goes_on()
-        self.world.after(step.seconds, leave)
-
-    def _put_in_order(self) -> None:
-        self.operator.start_nodes(sorted({drive.node for drive in DRIVES}))
-
-    def second_bridge(self, step: Step) -> None:
-        """Another bridge with the same site file, which no controller knows."""
-        if self.second is not None:
-            return
-        wires = {self._project.site.bus[0].name: self.wire}
-        second = self.second = Bridge(
-            self.world, self._project, wires, "two", Random(f"{self.plan.seed} second {step.at}")
-        )
-
-        def leave() -> None:
-            second.process.kill(in_turn=False)
-            self.second = None
-            self.world.after(_ORDER_S, self._put_in_order)
-
-        self.world.after(step.seconds, leave)
 
     def slow(self, step: Step) -> None:
         """The machine is busy: whatever the bridge does takes longer."""
@@ -390,7 +385,6 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "release": Plant.release,
     "jog": Plant.jog,
     "acknowledges": Plant.acknowledge_always,
-    "starts by command": Plant.start_by_command,
     "stop": Plant.stop,
     "stranger": Plant.stranger,
     "backlog": Plant.backlog,
@@ -401,8 +395,8 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "noise": Plant.noise,
     "node reset": Plant.reset_node,
     "node silent": Plant.silence_node,
-    "intruder": Plant.intrude,
-    "second bridge": Plant.second_bridge,
     "box slow": Plant.slow,
     "clock stepped": Plant.step_clock,
+    "outputs stopped": stop_outputs,
+    **MORE,
 }

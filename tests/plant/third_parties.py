@@ -13,14 +13,14 @@ from tests.proof.drives import Drive
 _EACH_S: Final = 0.02
 _NMT: Final = 0x000
 _SDO: Final = 0x600
-_PRE_OPERATIONAL: Final = 0x80
+_START, _PRE_OPERATIONAL = 0x01, 0x80
 _WRITE_P105: Final = bytes.fromhex("2B 69 20 01 F4 01 00 00")
 
 
 class Intruder:
     """A tool that commands a node beside the bridge: ``how`` is one of ``WAYS``."""
 
-    WAYS: Final = ("rpdo", "nmt", "sdo")
+    WAYS: Final = ("rpdo", "nmt", "sdo", "master")
 
     def __init__(self, world: World, wire: Wire, drive: Drive, how: str) -> None:
         self._world = world
@@ -32,6 +32,8 @@ class Intruder:
 
     def _cycle(self) -> None:
         if self._is_there:
+            if self._how == "master":
+                self._port.send(Frame(_NMT, bytes((_START, self._drive.node_id))))
             self._port.send(self._frame())
             self._world.after(_EACH_S, self._cycle)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.master.standstill import StoodStill
 from tests.plant.machine import Process
 from tests.plant.world import BEGIN_S, World
 
@@ -95,3 +96,39 @@ def test_who_looks_at_the_clock_from_outside_does_not_end_the_process(world: Wor
     assert not process.is_dead
     process.post(lambda: [process.clock()].clear())
     assert process.is_dead
+
+
+def test_a_pause_may_come_some_looks_later(world: World) -> None:
+    process = Process(world, Nobody(), [])
+    process.hang(1.0, in_turn=True, skips=2)
+    seen: list[float] = []
+    process.post(lambda: seen.extend(process.clock() - BEGIN_S for _ in range(4)))
+    assert [round(at) for at in seen] == [0, 0, 0, 1]
+
+
+def test_the_signal_of_an_alarm_comes_before_anything_else(world: World) -> None:
+    process = Process(world, Nobody(), [])
+    seen: list[str] = []
+
+    def turn() -> None:
+        process.alarm.set(0.5)
+        process.alarm.breaks_in = True
+        try:
+            process.clock()
+            seen.append("goes on")
+        except StoodStill:
+            seen.append("rang")
+
+    process.hang(1.0, in_turn=True)
+    process.post(turn)
+    assert seen == ["rang"]
+    assert process.alarm.rang
+
+
+@pytest.mark.parametrize(("seconds", "rang"), [(0.4, False), (0.6, True)])
+def test_an_alarm_that_breaks_nothing_off_is_known(world: World, seconds: float, rang: bool) -> None:
+    process = Process(world, Nobody(), [])
+    process.alarm.set(0.5)
+    process.hang(seconds, in_turn=False)
+    world.run_until(BEGIN_S + seconds)
+    assert process.alarm.rang is rang

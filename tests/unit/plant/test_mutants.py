@@ -1,0 +1,44 @@
+"""Plants of seeded faults: what they lean to is there, and each finding has a rule."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.plant.leaning import LEANS, SECONDS, leaning, plan
+from tests.plant.mutants import ELSEWHERE, rule_of
+from tests.plant.plan import KINDS
+from tests.proof.faults import FAULTS
+from tests.proof.mutants import load
+
+
+def test_each_kind_that_a_plan_leans_to_is_one() -> None:
+    assert {what for groups in LEANS.values() for group in groups for what in group} <= set(KINDS)
+    assert set(LEANS) <= {fault.name for fault in FAULTS}
+
+
+def test_a_plan_that_leans_has_these_kinds_alone() -> None:
+    steps = leaning(1, "bus process killed").steps
+    assert {step.what for step in steps} <= {"kill", "controller silent"}
+    assert all(8.0 < step.at < SECONDS for step in steps)
+
+
+def test_some_plans_lean_to_nothing() -> None:
+    kinds = {step.what for seed in range(1, 9) for step in plan(seed, "bus process killed").steps}
+    assert len(kinds) > 10
+
+
+def test_a_mutant_that_no_plant_finds_is_there() -> None:
+    assert set(ELSEWHERE) <= {mutant.name for mutant in load()}
+
+
+@pytest.mark.parametrize(
+    ("found", "rule"),
+    [
+        ("9.5 s: fan is enabled, and its controller has not asked for it since the bridge hung", "asked for"),
+        ("9.5 s: an intruder's rpdo at fan is not answered, since 9.0 s", "intruders are answered"),
+        ("something else", "?"),
+        ("", ""),
+    ],
+)
+def test_a_finding_has_a_rule(found: str, rule: str) -> None:
+    assert rule_of(found) == rule

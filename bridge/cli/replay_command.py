@@ -96,7 +96,7 @@ def _play(segment: Segment, until: float | None, *, step: bool) -> dict[str, Any
         "began": epoch_at(segment, segment.header.began),
         "seconds": played.time - segment.header.began,
         "turns": played.turns,
-        "outputs": played.tape.outputs,
+        "outputs": played.tape.told,
         "hash": played.tape.hash.hexdigest(),
         "same": difference is None,
     }

@@ -67,8 +67,7 @@ class Plant:
     def __init__(
         self, catalogue: Catalogue, version: str, began: float = 0.0, turns: Turns | None = None
     ) -> None:
-        self.catalogue, self.began = catalogue, began
-        self.turns = turns or Turns()
+        self.catalogue, self.began, self.turns = catalogue, began, turns or Turns()
         self.image = Image(catalogue.points)
         self.audit = AuditTrail(self.image)
         self.eeprom_writes = Ledger()

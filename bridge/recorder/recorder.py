@@ -11,6 +11,7 @@ import logging
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,6 +20,7 @@ from typing import Final
 import bridge
 from bridge import __version__
 from bridge.base import clock
+from bridge.base.guard import Guard
 from bridge.can.interface import Bus
 from bridge.command import Event, EventKind, PlantView
 from bridge.command.plant import Plant
@@ -35,7 +37,9 @@ _log = logging.getLogger(__name__)
 _LOOK_S: Final = 0.2
 """Period of writing to the ring, seconds: what a killed process loses."""
 _SEGMENT_S: Final = 300.0
-_RETRY_S: Final = 2.0
+_RETRY_S, _LONGEST_RETRY_S = 2.0, 60.0
+_CLOSE_S: Final = 2.0
+"""Longest time at the end of the service for the checkpoint that is being written, seconds."""
 _CHECKPOINT_S: Final = 120
 """Longest time for writing a checkpoint, seconds."""
 _NICE: Final = 10
@@ -81,11 +85,14 @@ class Recorder:
         self._settings = settings
         self._turns: list[bytes] = []
         self._buses: list[TapedBus] = []
+        self._writes = False
         self._number = 0
         self._began: dict[int, float] = {}
         """Times at which the segments of this run have begun."""
         self._child: int | None = None
         self._retry_at = 0.0
+        self._retry_s = _RETRY_S
+        self._guard = Guard("recorder")
         self._core: tuple[Master, PlantView, Plant] | None = None
         self._incident: Event | None = None
         self._due = 0.0
@@ -112,20 +119,29 @@ class Recorder:
         except OSError as error:
             self._tell(error.strerror or str(error))
             return
-        self._begin()
+        self._writes = True
+        with self._guard:
+            self._begin()
 
     async def run(self) -> None:
         """Write, until cancelled."""
         while True:
             await asyncio.sleep(_LOOK_S)
-            self.look(clock.now())
+            # What records a plant must not end what moves it.
+            with self._guard:
+                self.look(clock.now())
 
     def close(self) -> None:
         """Write what waits, and an incident that is due."""
         self.tape.is_on = False
-        if not self._number:
+        if not self._writes:
             return
+        end = time.monotonic() + _CLOSE_S
+        while self._child is not None and time.monotonic() < end:
+            self._reap()
+            time.sleep(_LOOK_S / 10)
         if self._child is not None:
+            os.kill(self._child, signal.SIGKILL)
             os.waitpid(self._child, 0)
         self._flush()
         if self._incident:
@@ -142,16 +158,16 @@ class Recorder:
 
     def look(self, now: float) -> None:
         """Do what is due; called a few times a second, between two turns."""
-        if not self._number:
+        if not self._writes:
             return
-        self._reap(now)
+        self._reap()
         self._flush()
         if self._incident and now >= self._due:
             self._write_out(now)
         self._tell(self.ring.fault)
         if self._child is not None or now < self._retry_at:
             return
-        is_long = self.ring.is_long or now > self._began[self._number] + _SEGMENT_S
+        is_long = self.ring.is_long or now > self._began.get(self._number, now) + _SEGMENT_S
         is_broken = self.ring.has_lost or not self.tape.is_on
         # The state of a dialogue can be put into no checkpoint.
         if (is_long or is_broken) and self._core and not self._core[0].asks:
@@ -165,7 +181,8 @@ class Recorder:
         assert self._core is not None
         self._flush()
         now = clock.now()
-        self._retry_at = now + _RETRY_S
+        self._retry_at = now + self._retry_s
+        self._retry_s = min(2 * self._retry_s, _LONGEST_RETRY_S)
         number = self._number + 1
         header = Header(
             version=__version__,
@@ -188,7 +205,7 @@ class Recorder:
         self.tape.is_on = True
         self.ring.begin(number)
 
-    def _reap(self, now: float) -> None:
+    def _reap(self) -> None:
         """Look whether the checkpoint is written."""
         if self._child is None:
             return
@@ -201,8 +218,9 @@ class Recorder:
             self._tell("the checkpoint of this site is too large for recorder.size_mb")
         elif code not in (_DONE, _DIALOGUE):
             self._tell(f"no checkpoint could be written ({code})")
-        if code != _DONE:
-            self._retry_at = now + _RETRY_S
+        if code == _DONE:
+            self._retry_s = _RETRY_S
+        else:
             self.ring.has_lost = True
 
     # incidents
@@ -219,7 +237,7 @@ class Recorder:
         self._written_at = now
         since = event.time - self._settings.before_s
         later = [number for number, began in self._began.items() if began > since]
-        first = max((number for number in self._began if number not in later), default=min(self._began))
+        first = max((number for number in self._began if number not in later), default=min(later, default=0))
         at = datetime.fromtimestamp(clock.epoch_ns(event.time) / 1e9, UTC)
         source = event.source.replace("/", "-")
         name = f"{at:%Y%m%dT%H%M%SZ}-{event.kind}-{source}"

@@ -71,7 +71,8 @@ class PlayingTape(Tape):
         self.alarm = PlayedAlarm()
         self.time = 0.0
         """Time of the last look at the clock."""
-        self.outputs = 0
+        self.told = 0
+        """How many outputs it has been told of."""
         self.hash = sha256()
         self.nested: Callable[[Notes], None] = lambda notes: None
         """Does a turn within one."""
@@ -140,7 +141,7 @@ class PlayingTape(Tape):
         if told != _encode(noted):
             now = msgspec.msgpack.decode(told)
             raise Difference(f"{_said(noted)} was recorded, and the replay has {_said(now)}")
-        self.outputs += 1
+        self.told += 1
         self.hash.update(told)
         if note in (Note.EVENT, Note.OUTCOME):
             while self._comes(Note.TURN):

@@ -15,6 +15,7 @@ from typing import Any, Final, ParamSpec, TypeVar
 import msgspec
 
 from bridge.base import clock
+from bridge.base.guard import Guard
 from bridge.base.turns import Turn, Turns
 from bridge.can.burstend import Burst
 from bridge.can.interface import Bus, BusStatus, ControllerState
@@ -155,6 +156,7 @@ class RecordingTape(Tape):
         self._slept = slept
         self._chance = chance
         self._encode = msgspec.msgpack.Encoder().encode
+        self._guard = Guard("note")
 
     def run(
         self, turn: Turn, act: Callable[_Args, _Result], /, *args: _Args.args, **options: _Args.kwargs
@@ -182,15 +184,25 @@ class RecordingTape(Tape):
             result = act(*given, **options)
         except Exception as error:
             notes.append((Note.FAULT, type(error).__name__))
-            self._take(self._encode(notes))
+            self._end(notes)
             raise
         finally:
             self.notes = None
-        self._take(self._encode(notes))
+        self._end(notes)
         return result
 
+    def _end(self, notes: Notes) -> None:
+        try:
+            turn = self._encode(notes)
+        except (ValueError, TypeError, OverflowError):
+            self.is_on = False
+        else:
+            self._take(turn)
+
     def answered(self, number: int, outcome: Outcome) -> None:
-        super().answered(number, outcome)
+        # Whoever asked gets the outcome, whatever becomes of the note.
+        with self._guard:
+            super().answered(number, outcome)
         self.replies.pop(number)(outcome)
 
     def now(self) -> float:

@@ -14,17 +14,12 @@ import pytest
 
 import bridge
 from bridge.can.interface import BusStatus
-from bridge.can.virtual import VirtualWire
-from bridge.catalogue import Catalogue
-from bridge.command import Plant, PlantView
 from bridge.config import load_site
-from bridge.master.master import Master
-from bridge.master.network import Network
-from bridge.project import load_project
 from bridge.recorder.checkpoint import Outside, Unusable, is_core, load, save
 from bridge.recorder.replay import PlayedAlarm, PlayedBus, PlayingTape
-from bridge.recorder.tape import TapedBus, facts_of, machine_tape
+from bridge.recorder.tape import facts_of, machine_tape
 from tests.plant.plan import Plan
+from tests.support.core import core_of
 from tests.support.process import REPOSITORY
 from tests.support.recorded import RecordedPlant
 
@@ -166,20 +161,9 @@ password_file = "{tmp_path}/keys"
 
 
 @pytest.mark.parametrize("site", SITES, ids=lambda path: path.stem)
-def test_every_family_can_be_put_into_a_checkpoint(site: Path, tmp_path: Path) -> None:
+def test_every_family_can_be_put_into_a_checkpoint(site: Path) -> None:
     """Nothing that a core leads to is forgotten: what is neither of it nor around it would be named."""
-    project = load_project(site)
-    tape = machine_tape()
-    plant = Plant(Catalogue.of(project.site, project.families), "0", 0.0, tape)
-    lines = [
-        (
-            TapedBus(VirtualWire().end(table.name), tape),
-            Network(table, plant.side_of(table), tape.epoch_ns, project.downloads),
-        )
-        for table in project.site.bus
-    ]
-    master = Master([*lines], plant, tape.now)
-    view = PlantView(plant, tape.now, tape.epoch_ns, master.carry_out, master.wake)
-    _, _, again = loaded(save((master, view, plant)))
-    assert again.drives.keys() == plant.drives.keys()
-    assert again.nodes.keys() == plant.nodes.keys()
+    core = core_of(site, machine_tape())
+    _, _, again = loaded(save(tuple(core)))
+    assert again.drives.keys() == core.plant.drives.keys()
+    assert again.nodes.keys() == core.plant.nodes.keys()

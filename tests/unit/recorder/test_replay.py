@@ -66,7 +66,7 @@ def test_a_recording_from_the_start_of_the_service_replays(tmp_path: Path) -> No
     segment = plant.record(10.0)
     replay = played(segment)
     assert replay.turns == len(segment.turns) > 1000
-    assert replay.tape.outputs == outputs_in(segment) > 500
+    assert replay.tape.told == outputs_in(segment) > 500
 
 
 def test_a_recording_from_its_middle_replays(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_a_recording_from_its_middle_replays(tmp_path: Path) -> None:
     plant.run_until_calm()
     segment = plant.record(10.0)
     replay = played(segment)
-    assert replay.tape.outputs == outputs_in(segment) > 500
+    assert replay.tape.told == outputs_in(segment) > 500
     image, live = replay.core.view.image, plant.plant.bridge.plant.image
     drive = next(iter(replay.core.plant.drives))
     for leaf in ("status/state", "supervision/owner", "supervision/last_stop", "supervision/trips"):

@@ -72,7 +72,7 @@ class PlayingTape(Tape):
         self.time = 0.0
         """Time of the last look at the clock."""
         self.told = 0
-        """How many outputs it has been told of."""
+        """Number of outputs that it has been told of."""
         self.hash = sha256()
         self.nested: Callable[[Notes], None] = lambda notes: None
         """Does a turn within one."""

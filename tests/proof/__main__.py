@@ -112,6 +112,10 @@ def run(asked: argparse.Namespace) -> int:
                     samples += _round(rig, fault, errors)
             if rig.frames_lost:
                 errors.append(f"the witnesses have lost {rig.frames_lost} frames, and prove nothing")
+            replays = rig.replayed()
+            errors += replays.differences
+            errors += [] if replays.outputs else ["the bridge was not recorded"]
+            say(f"{replays.recordings} recordings replayed, {replays.outputs} outputs in all")
         except (Stuck, AssertionError) as error:
             errors.append(f"the plant is stuck: {error}")
         finally:

@@ -237,6 +237,7 @@ def write_site(path: Path, channel: str, state: Path, run: Path, *, others: Sequ
         *(_node(drives) for drives in nodes.values()),
         *others,
         *(servers[protocol] for protocol in SERVED),
+        "[recorder]\nsize_mb = 4\nblack_box_mb = 4",
     ]
     path.write_text("\n".join(text) + "\n", encoding="utf-8")
     return path

@@ -28,6 +28,7 @@ from tests.proof.drives import (
     write_site,
 )
 from tests.proof.recovery import Recovery
+from tests.proof.replays import Replays, replay_all
 from tests.proof.waits import follow
 from tests.proof.witness import Clock, Witness
 from tests.support.process import REPOSITORY, Process, running
@@ -149,6 +150,10 @@ class Rig:
         """Findings by yes or no that a slow machine may have brought about."""
         self.stopped_in_vain: list[str] = []
         """Drives that a fault stopped which did not concern them."""
+
+    def replayed(self) -> Replays:
+        """What comes of the recordings of its bridge."""
+        return replay_all(self._site, self.disk.folder / "state", self.folder)
 
     @staticmethod
     def now() -> float:

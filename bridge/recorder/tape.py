@@ -34,7 +34,19 @@ _Args = ParamSpec("_Args")
 _Result = TypeVar("_Result")
 _OF_THE_CORE: Final = frozenset((Turn.TAKE_IN, Turn.PUMP))
 """Turns that the core itself begins within others."""
+_COUNTS: Final = (
+    "outages",
+    "tx_errors",
+    "rx_errors",
+    "frames_lost",
+    "frames_received",
+    "frames_expired",
+    "bits",
+    "error_frames",
+)
+"""Counters of a status, in the order of a note."""
 STATUS_EVERY_S: Final = 0.1
+"""Counters are noted no more often than this, seconds, and whatever concerns the core at once."""
 
 
 class Note(StrEnum):
@@ -316,34 +328,14 @@ class TapedBus:
 
 def facts_of(status: BusStatus) -> Sequence[Any]:
     """The fields of a status, for a note."""
-    return (
-        int(status.state),
-        status.outages,
-        status.tx_errors,
-        status.rx_errors,
-        status.frames_lost,
-        status.frames_received,
-        status.frames_expired,
-        status.bits,
-        status.error_frames,
-        status.bursts_refused,
-        msgspec.msgpack.encode(status.last_error),
-    )
+    counts = (getattr(status, name) for name in _COUNTS)
+    return int(status.state), *counts, status.bursts_refused, msgspec.msgpack.encode(status.last_error)
 
 
 def apply_facts(status: BusStatus, facts: Sequence[Any]) -> None:
     """The other way round."""
-    state, *counters, refused, error = facts
-    status.state = ControllerState(state)
-    (
-        status.outages,
-        status.tx_errors,
-        status.rx_errors,
-        status.frames_lost,
-        status.frames_received,
-        status.frames_expired,
-        status.bits,
-        status.error_frames,
-    ) = counters
-    status.bursts_refused = refused
+    state, *counts, refused, error = facts
+    status.state, status.bursts_refused = ControllerState(state), refused
+    for name, count in zip(_COUNTS, counts, strict=True):
+        setattr(status, name, count)
     status.note_error(msgspec.msgpack.decode(error, type=Said))

@@ -117,10 +117,11 @@ class Debts:
                     self._oracle.wrong(at, f"{track.drive.path} gets no stop though the service ends")
 
     def gives_way(self, since: float, back: float) -> None:
-        """A frame of a second bridge waits for one that has stood still since then."""
+        """A frame of a second bridge waits for one that has stood still since then. A drive that has said
+        since its stop that it is not enabled is owed none (docs: the debt ends when it has reported so)."""
         self._gave_way_at = back
         for node_id, tracks in self._of_node.items():
-            enabled_at = max(track.enabled_at for track in tracks)
+            enabled_at = max((one.enabled_at for one in tracks if not _has_followed(one)), default=-inf)
             if enabled_at > since - _JUST_S and not self._was_halted(node_id, enabled_at):
                 text = f"node {node_id} gets no NMT stop before the bridge gives way"
                 is_done = partial(self._was_halted, node_id, since)
@@ -234,3 +235,10 @@ class Debts:
             self._oracle.looks += 1
             if self._disturbed_at <= owed.since and self.is_quiet() and not owed.is_done():
                 self._oracle.wrong(owed.due, f"{owed.text}, since {owed.since - 1000.0:.3f} s")
+
+
+def _has_followed(track: Track) -> bool:
+    """Whether the drive has said that it is not enabled, since the stop that it was told last."""
+    told = next((at for at in track.stops if at > track.enabled_at), inf)
+    mask, value = track.drive.family.enabled
+    return any(at > told and word & mask != value for at, word in track.said)

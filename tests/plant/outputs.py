@@ -55,8 +55,8 @@ class Outputs:
             self._oracle.wrong(at, f"outputs that somebody has stopped get {self.sent.hex()}")
 
     def stopped(self, at: float, came: float, outcome: Outcome) -> None:
-        """Somebody's stop was answered. It is forwarded where words reach the outputs: not while their node is
-        stopped or booted, but then they are safe from their next word on all the same."""
+        """Somebody's stop was answered. It is forwarded where words reach the outputs: not while their node
+        is stopped or booted, but then they are safe from their next word on all the same."""
         if self._disturbed_at >= came - 1.0:
             return
         self._oracle.looks += 1

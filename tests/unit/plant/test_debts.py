@@ -80,6 +80,17 @@ def test_who_gives_way_stops_the_node(scene: Scene) -> None:
     assert "no NMT stop before the bridge gives way" in scene.wrong()
 
 
+@pytest.mark.parametrize("does_follow", [False, True])
+def test_but_not_where_its_drives_have_followed_a_stop(scene: Scene, does_follow: bool) -> None:
+    scene.gets(1030.02, FAMILY.ready)
+    if does_follow:
+        scene.oracle.frame(1030.05, DRIVE.tpdo, b"\0\0", of_bridge=False)
+    else:
+        scene.says(1030.05)
+    scene.debts.gives_way(1030.1, 1031.0)
+    assert bool(scene.wrong()) is not does_follow
+
+
 def test_an_nmt_stop_of_the_bridge_is_one(scene: Scene) -> None:
     scene.debts.gives_way(1030.1, 1031.0)
     scene.debts.frame(1031.1, 0, STOP_NODE, "bridge")

@@ -151,11 +151,18 @@ def twin(plant: Plant, step: Step) -> None:
 
 def end(plant: Plant, step: Step) -> None:
     """The service is ended by a signal, and begun anew."""
-    if not plant.bridge.process.is_dead:
-        plant.down_s = step.seconds
-        plant.bridge.end(
-            lambda: plant.debts.ending(plant.world.now), lambda: plant.debts.ended(plant.world.now)
-        )
+    if plant.bridge.process.is_dead or plant.bridge.is_ending:
+        return
+
+    def told() -> None:
+        # From now on nobody owns a drive, and each is stopped: nobody trips, and no setpoint goes out.
+        now = plant.world.now
+        plant.causes.disturbed(now)
+        plant.answers.disturbed(now)
+        plant.debts.ending(now)
+
+    plant.down_s = step.seconds
+    plant.bridge.end(told, lambda: plant.debts.ended(plant.world.now))
 
 
 def deaf(plant: Plant, step: Step) -> None:

@@ -204,8 +204,8 @@ class Plant:
         process = self.bridge.process
         now = self.world.now
         is_still = process.is_dead or process.still_since < now
-        self.answers.look(now, is_still=is_still)
-        self.causes.look(now, is_still=is_still)
+        self.answers.look(now, is_still=is_still or self.bridge.is_ending)
+        self.causes.look(now, is_still=is_still or self.bridge.is_ending)
         self.debts.look(now, is_still=is_still)
         if process.is_dead or process.still_since < now:
             for drive in DRIVES:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from tests.plant.debts import Debts
@@ -111,6 +113,15 @@ def test_a_service_that_ends_stops_its_drives(scene: Scene) -> None:
     assert "by a service that ends" in scene.wrong()
 
 
+def test_what_silence_stops_gets_nothing_even_then(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    drive = replace(DRIVE, reaction="silence")
+    monkeypatch.setattr(scene.oracle.tracks[DRIVE], "drive", drive)
+    scene.oracle.tracks[DRIVE].last_at = 1030.0 - PLANT.fieldbus_timeout_ms / 1000
+    scene.debts.ending(1030.1)
+    scene.debts.ended(1030.2)
+    assert not scene.wrong()
+
+
 @pytest.mark.parametrize(("word", "text"), [(FAMILY.run, "though the service ends"), (FAMILY.ready, "")])
 def test_it_ends_when_they_have_their_stop(scene: Scene, word: int, text: str) -> None:
     scene.debts.ending(1030.1)
@@ -145,6 +156,14 @@ def test_a_second_bridge_listens(scene: Scene) -> None:
 def test_an_intruder_is_answered(scene: Scene) -> None:
     scene.debts.intruded(DRIVE, "rpdo", 1030.1)
     assert "is not answered" in scene.wrong()
+
+
+def test_a_bridge_that_has_just_begun_may_listen(scene: Scene) -> None:
+    scene.debts.disturbed(1029.0)
+    scene.debts.intruded(DRIVE, "rpdo", 1030.1)
+    scene.debts.frame(1030.2, 0, START_NODE, "intruder")
+    scene.debts.master_left(DRIVE, 1030.2)
+    assert not scene.wrong()
 
 
 def test_the_last_word_is_the_bridges(scene: Scene) -> None:

@@ -296,6 +296,8 @@ class Plant:
         is_same = step.how == "same host" and drive.protocol == "modbus"
         host = f"127.0.1.{10 + drive.place}" if is_same else "127.0.3.200"
         stranger = Stranger(self.world, self.bridge, drive, host)
+        if is_same:
+            self.oracle.shared(drive, self.world.now + step.seconds)
         self.world.after(step.seconds, stranger.leave)
 
     def hang(self, step: Step) -> None:

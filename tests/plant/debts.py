@@ -88,8 +88,9 @@ class Debts:
 
     def _owe_stop(self, track: Track, since: float, now: float, why: str) -> None:
         def is_done() -> bool:
+            # A node that started anew just before has ended the debt, though the bursts went on.
             told = any(at >= since for at in track.stops)
-            return told or self._was_halted(track.drive.node_id, since)
+            return told or self._was_halted(track.drive.node_id, since - _JUST_S)
 
         text = f"{track.drive.path} gets no stop though {why}"
         self._owed.append(_Owed(now, now + _OWES_S, is_done, text))
@@ -124,7 +125,7 @@ class Debts:
             enabled_at = max((one.enabled_at for one in tracks if not _has_followed(one)), default=-inf)
             if enabled_at > since - _JUST_S and not self._was_halted(node_id, enabled_at):
                 text = f"node {node_id} gets no NMT stop before the bridge gives way"
-                is_done = partial(self._was_halted, node_id, since)
+                is_done = partial(self._was_halted, node_id, since - _JUST_S)
                 self._owed.append(_Owed(back, back + _OWES_S, is_done, text))
 
     def intruded(self, drive: Drive, how: str, at: float) -> None:

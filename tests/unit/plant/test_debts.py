@@ -66,6 +66,14 @@ def test_a_stop_pays_it(scene: Scene) -> None:
     assert not scene.wrong()
 
 
+def test_a_node_that_has_just_started_anew_ends_the_debt(scene: Scene) -> None:
+    scene.debts.frame(1030.05, HEARTBEAT, b"\0", "node")
+    scene.gets(1030.08, FAMILY.run)
+    scene.hangs(1030.1, 1031.0)
+    scene.debts.gives_way(1030.1, 1031.0)
+    assert not scene.wrong()
+
+
 def test_a_short_hang_owes_nothing(scene: Scene) -> None:
     scene.hangs(1030.1, 1030.1 + DEADMAN_S / 2)
     assert not scene.wrong()

@@ -86,7 +86,10 @@ class OutputWords:
         self.has_let_go = False
 
     def hold(self, raw: Mapping[str, int]) -> None:
-        """Take over what the node holds: integers without sign, by the name of an output that holds."""
+        """Take over what the node holds: integers without sign, by the name of an output that holds. Outputs
+        that somebody has stopped, perhaps while the node was booting, hold nothing."""
+        if self.has_let_go:
+            return
         words = list(self.held)
         for name, number in raw.items():
             self.put(words, self.places[name], number)

@@ -6,13 +6,14 @@ answer may be older than what it says, and is not judged.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from typing import Final
 
 from bridge.command import Outcome, Request, Write
 from tests.plant.oracle import REACTION_S, Oracle, Track
-from tests.proof.drives import Drive
+from tests.proof.drives import TPDO_MS, Drive
 from tests.proof.settings import PLANT
 
 _ANSWER_S: Final = 10.0
@@ -58,6 +59,8 @@ class Answers:
         self._claims: list[_Claim] = []
         self._disturbed_at = -inf
         """When the bridge last stood still, ended, or lost its bus."""
+        self.is_quiet: Callable[[], bool] = lambda: True
+        """Whether frames reach everybody."""
 
     # what happens
 
@@ -141,9 +144,17 @@ class Answers:
             is_there = any(claim.came <= at <= claim.due for at in track.stops)
             return "" if is_there else "no RPDO has told the drive to stop"
         is_overtaken = track.last_at > claim.came or track.since >= claim.came
-        if is_overtaken or track.sent_since(claim.setpoint, claim.came) >= claim.came:
+        is_sent = track.sent_since(claim.setpoint, claim.came) >= claim.came
+        if is_overtaken or is_sent or self._is_cut_off(claim, track):
             return ""
         return "its setpoint was not on the wire"
+
+    def _is_cut_off(self, claim: _Claim, track: Track) -> bool:
+        """The drive cannot be heard, and was stopped for that before a frame had the setpoint: what is done
+        within a round is sent once, at its end."""
+        is_told = any(claim.came <= at <= claim.due for at in track.stops)
+        heard_at = max((at for at, _ in track.said if at <= claim.answered), default=-inf)
+        return is_told and (not self.is_quiet() or heard_at < claim.answered - TPDO_MS / 1000)
 
     def last_stop(self, drive: Drive, at: float, before: float | None, said: float | None) -> None:
         """``supervision/last_stop`` as it was at the last look, and is now. A drive follows a ramp that it is

@@ -58,7 +58,8 @@ class Bridge:
         """Called with each request that is submitted, and its number; ``on_answer`` with its outcome."""
         self.on_answer: list[Callable[[int, Outcome], None]] = []
         self._requests = 0
-        self._ending: asyncio.Task[None] | None = None
+        self._endings: list[asyncio.Task[None]] = []
+        self._told_to_end: Process | None = None
         self.watchers: list[Watcher] = []
         self.tape: RecordingTape | None = None
         """Tape of the process that is on, where ``records`` has it recorded."""
@@ -160,8 +161,10 @@ class Bridge:
 
     def end(self, told: Callable[[], None], ended: Callable[[], None]) -> None:
         """End the service, as a signal does. ``told`` is called when it has been told, and ``ended`` when it
-        has done all that it does then."""
-        process = self.process
+        has done all that it does then. A second signal changes nothing (docs: "Ending")."""
+        if self.is_ending:
+            return
+        process = self._told_to_end = self.process
 
         async def ending() -> None:
             self.master.halt(process.clock())
@@ -172,9 +175,15 @@ class Bridge:
             process.kill(in_turn=False)
 
         def begin() -> None:
-            self._ending = asyncio.Task(ending(), loop=process.loop)
+            # One whose process is killed meanwhile is never done.
+            self._endings.append(asyncio.Task(ending(), loop=process.loop))
 
         process.post(begin)
+
+    @property
+    def is_ending(self) -> bool:
+        """Its process has been told to end, and is still there."""
+        return self._told_to_end is self.process and not self.process.is_dead
 
     def restart(self) -> None:
         """Another process in place of one that has ended."""

@@ -28,7 +28,8 @@ _HEARD_S, _GONE_S, _IN_CHARGE_S = 0.2, 0.5, 3.0
 """A bridge in charge sends at least each 0.1 s; so long after a silence somebody else may have taken over."""
 _OWES_S: Final = 0.5
 _PASSIVE_S: Final = 6.5
-"""So long after it has given way a bridge may listen, and sends nothing."""
+"""So long after it has begun, has failed or has given way a bridge may listen, and sends nothing: it takes an
+intruder's RPDO for one of a bridge in charge."""
 _ANSWERS_S: Final = 1.5
 """By then each frame of an intruder is answered, also one that brings nothing back."""
 
@@ -81,16 +82,15 @@ class Debts:
         if now - since < _DEADMAN_S + 0.05 or not self.is_quiet():
             return
         for track in self._oracle.tracks.values():
-            trips_at = track.last_at + PLANT.fieldbus_timeout_ms / 1000
-            is_silenced = track.drive.reaction == "silence" and now > trips_at - _JUST_S
             was_enabled = track.enabled_at > since - _JUST_S and track.intruded_at < since - 3.0
-            if was_enabled and not is_silenced:
+            if was_enabled and not _is_silenced(track, now):
                 self._owe_stop(track, since, now, "the bridge has hung")
 
     def _owe_stop(self, track: Track, since: float, now: float, why: str) -> None:
         def is_done() -> bool:
+            # A node that started anew just before has ended the debt, though the bursts went on.
             told = any(at >= since for at in track.stops)
-            return told or self._was_halted(track.drive.node_id, since)
+            return told or self._was_halted(track.drive.node_id, since - _JUST_S)
 
         text = f"{track.drive.path} gets no stop though {why}"
         self._owed.append(_Owed(now, now + _OWES_S, is_done, text))
@@ -107,30 +107,33 @@ class Debts:
         self._ending_since = at
 
     def ended(self, at: float) -> None:
-        """It is about to close its buses: by now it has stopped what it had enabled."""
+        """It is about to close its buses: by now it has stopped what it had enabled. What silence is to stop
+        gets nothing even then: a trip outlasts it."""
         since = self._ending_since
         for track in self._oracle.tracks.values():
-            is_told = any(when >= since for when in track.stops)
+            is_told = any(when >= since for when in track.stops) or _is_silenced(track, at)
             if track.enabled_at > since - _JUST_S and self.is_quiet() and self._disturbed_at < since - 1.0:
                 self._oracle.looks += 1
                 if not (is_told or self._was_halted(track.drive.node_id, since)):
                     self._oracle.wrong(at, f"{track.drive.path} gets no stop though the service ends")
 
     def gives_way(self, since: float, back: float) -> None:
-        """A frame of a second bridge waits for one that has stood still since then."""
+        """A frame of a second bridge waits for one that has stood still since then. A drive that has said
+        since its stop that it is not enabled is owed none (docs: the debt ends when it has reported so)."""
         self._gave_way_at = back
         for node_id, tracks in self._of_node.items():
-            enabled_at = max(track.enabled_at for track in tracks)
+            enabled_at = max((one.enabled_at for one in tracks if not _has_followed(one)), default=-inf)
             if enabled_at > since - _JUST_S and not self._was_halted(node_id, enabled_at):
                 text = f"node {node_id} gets no NMT stop before the bridge gives way"
-                is_done = partial(self._was_halted, node_id, since)
+                is_done = partial(self._was_halted, node_id, since - _JUST_S)
                 self._owed.append(_Owed(back, back + _OWES_S, is_done, text))
 
     def intruded(self, drive: Drive, how: str, at: float) -> None:
         """Somebody sends a frame beside the bridge that has its node stopped."""
         since, text = at - 1.0, f"an intruder's {how} at {drive.path} is not answered"
-        is_done = lambda: self._was_halted(drive.node_id, since) or at < self._gave_way_at + _PASSIVE_S  # noqa: E731
-        self._owed.append(_Owed(at, at + _ANSWERS_S, is_done, text))
+        if not self._may_listen(at):
+            is_done = lambda: self._was_halted(drive.node_id, since) or self._may_listen(at)  # noqa: E731
+            self._owed.append(_Owed(at, at + _ANSWERS_S, is_done, text))
 
     def master_left(self, drive: Drive, at: float) -> None:
         """One that has started a node again and again has ended: the last word is the bridge's."""
@@ -140,9 +143,11 @@ class Debts:
             return bool(last) and last[-1][3] and last[-1][1] in _HALTS
 
         text = f"the node of {drive.path} was started by an intruder, and nobody stops it"
-        if at < self._gave_way_at + _PASSIVE_S:
-            return
-        self._owed.append(_Owed(at, at + _OWES_S, is_done, text))
+        if not self._may_listen(at):
+            self._owed.append(_Owed(at, at + _OWES_S, is_done, text))
+
+    def _may_listen(self, at: float) -> bool:
+        return at < max(self._disturbed_at, self._gave_way_at) + _PASSIVE_S
 
     def deaf(self, drive: Drive, since: float, seconds: float) -> None:
         """It does not hear its RPDOs: where it is told to stop, its node has to be stopped by then."""
@@ -234,3 +239,16 @@ class Debts:
             self._oracle.looks += 1
             if self._disturbed_at <= owed.since and self.is_quiet() and not owed.is_done():
                 self._oracle.wrong(owed.due, f"{owed.text}, since {owed.since - 1000.0:.3f} s")
+
+
+def _is_silenced(track: Track, at: float) -> bool:
+    """Whether silence may be what stops it."""
+    trips_at = track.last_at + PLANT.fieldbus_timeout_ms / 1000
+    return track.drive.reaction == "silence" and at > trips_at - _JUST_S
+
+
+def _has_followed(track: Track) -> bool:
+    """Whether the drive has said that it is not enabled, since the stop that it was told last."""
+    told = next((at for at in track.stops if at > track.enabled_at), inf)
+    mask, value = track.drive.family.enabled
+    return any(at > told and word & mask != value for at, word in track.said)

@@ -53,6 +53,32 @@ def _node(plant: Plant, drive: Drive) -> FieldNode:
     return next(node for node in plant.nodes if node.device.node_id == drive.node_id)
 
 
+def half_open(plant: Plant, step: Step) -> None:
+    """Nothing gets through between the controller's machine and ours, and nobody is told."""
+    controller = plant.controller(step)
+    stream = controller.line.stream if controller.line else None
+    if stream is None:
+        plant.silence_controller(step)
+        return
+    stream.is_cut = True
+    plant.world.after(step.seconds, stream.mend)
+
+
+def backlog(plant: Plant, step: Step) -> None:
+    """A controller writes ahead while the bridge stands still for a moment, and hangs."""
+    controller = plant.controller(step)
+    plant.bridge.process.hang(PLANT.short_s, in_turn=False)
+    controller.write_ahead(int(step.how))
+    plant.world.after(step.seconds, controller.start)
+
+
+def slow(plant: Plant, step: Step) -> None:
+    """The machine is busy: whatever the bridge does takes longer."""
+    process = plant.bridge.process
+    usual_s, process.look_s = process.look_s, float(step.how)
+    plant.world.after(step.seconds, lambda: setattr(process, "look_s", usual_s))
+
+
 def start_by_command(plant: Plant, step: Step) -> None:
     """A controller starts its drive by a command and not by words."""
     able = [one for one in plant.controllers if one.line is None]
@@ -125,11 +151,18 @@ def twin(plant: Plant, step: Step) -> None:
 
 def end(plant: Plant, step: Step) -> None:
     """The service is ended by a signal, and begun anew."""
-    if not plant.bridge.process.is_dead:
-        plant.down_s = step.seconds
-        plant.bridge.end(
-            lambda: plant.debts.ending(plant.world.now), lambda: plant.debts.ended(plant.world.now)
-        )
+    if plant.bridge.process.is_dead or plant.bridge.is_ending:
+        return
+
+    def told() -> None:
+        # From now on nobody owns a drive, and each is stopped: nobody trips, and no setpoint goes out.
+        now = plant.world.now
+        plant.causes.disturbed(now)
+        plant.answers.disturbed(now)
+        plant.debts.ending(now)
+
+    plant.down_s = step.seconds
+    plant.bridge.end(told, lambda: plant.debts.ended(plant.world.now))
 
 
 def deaf(plant: Plant, step: Step) -> None:
@@ -284,6 +317,9 @@ def set_reserved(plant: Plant, step: Step) -> None:
 
 
 MORE: Final[dict[str, Callable[[Plant, Step], None]]] = {
+    "half open": half_open,
+    "backlog": backlog,
+    "box slow": slow,
     "starts by command": start_by_command,
     "intruder": intrude,
     "second bridge": second_bridge,

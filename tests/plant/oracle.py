@@ -92,6 +92,8 @@ class Track:
     """When it has released the drive: its silence is no fault from then on."""
     is_strangers: bool = False
     """The last setpoint on the wire was a stranger's, who has taken it over in a time without an owner."""
+    shared_until: float = -inf
+    """By then somebody else at its controller's address, who is the same owner, has left."""
     is_acknowledged: bool = False
     is_primed: bool = False
     """Its controller has sent a word that does not enable, since ``since``."""
@@ -255,6 +257,10 @@ class Oracle:
         self.tracks[drive].released_at = came
         self.interrupted(came, at + REACTION_S, "its controller released it", [drive])
 
+    def shared(self, drive: Drive, until: float) -> None:
+        """Somebody else at the address of its controller writes to it until then, over another connection."""
+        self.tracks[drive].shared_until = until + PLANT.fieldbus_timeout_ms / 1000
+
     def bus_off(self, at: float) -> None:
         """The bridge's controller sends nothing. A bridge that stands still does not see it, and its bursts
         go on when it is over."""
@@ -301,11 +307,16 @@ class Oracle:
         if not setpoint:
             return
         track.setpoints.append((at, setpoint))
+        was_strangers = track.is_strangers
         track.is_strangers = setpoint >= drive.family.setpoint + NUMBERS
         is_there = track.is_owned and at <= track.last_at + PLANT.fieldbus_timeout_ms / 1000
         if track.is_strangers and is_there:
             self.wrong(at, f"{drive.path} got the setpoint of a stranger: {data.hex()}")
         track.is_owned = not track.is_strangers and track.last_at > track.left_at
+        goes_on = not track.stops or track.stops[-1] < track.enabled_at
+        if was_strangers and not track.is_strangers and goes_on and at < track.shared_until:
+            # An identity goes on where its last connection was (docs: "Who owns a drive").
+            track.is_armed = True
 
     def _command(self, track: Track, at: float, data: bytes) -> None:
         drive = track.drive

@@ -16,6 +16,8 @@ from tests.proof.settings import PLANT
 if TYPE_CHECKING:
     from tests.plant.plant import Plant
 
+_NMT: Final = 0x000
+_START: Final = 0x01
 _ACKNOWLEDGE, _OUTPUTS = 11, 32
 """Holding registers (docs/reference/modbus.md)."""
 _HOST: Final = "127.0.0.40"
@@ -34,6 +36,8 @@ class Outputs:
         self._safe_from = inf
         self._disturbed_at = -inf
         self.sent = b""
+        self._sent_at = -inf
+        """When the bridge last sent them something, with their node where it was then."""
 
     def disturbed(self, at: float) -> None:
         """The bridge fails, or is back: then an acknowledge is enough for active values."""
@@ -41,18 +45,23 @@ class Outputs:
 
     def frame(self, at: float, can_id: int, data: bytes) -> None:
         """A frame of the bridge."""
+        if can_id == _NMT and data[0] != _START and data[1] in (0, BLOCK.node_id):
+            self._sent_at = -inf
         if can_id != BLOCK.rpdo:
             return
+        self._sent_at = at
         self.sent = data[: len(BLOCK.safe)]
         if at > self._safe_from and self.sent != BLOCK.safe:
             self._oracle.wrong(at, f"outputs that somebody has stopped get {self.sent.hex()}")
 
     def stopped(self, at: float, came: float, outcome: Outcome) -> None:
-        """Somebody's stop was answered."""
+        """Somebody's stop was answered. It is forwarded where words reach the outputs: not while their node
+        is stopped or booted, but then they are safe from their next word on all the same."""
         if self._disturbed_at >= came - 1.0:
             return
         self._oracle.looks += 1
-        if not (outcome.ok and outcome.forwarded):
+        is_sent = outcome.forwarded or self._sent_at < came - REACTION_S
+        if not (outcome.ok and is_sent):
             said = f"{outcome.code}{'' if outcome.forwarded else ', not forwarded'}"
             self._oracle.wrong(at, f"a stop of outputs that are active is answered {said}")
         self._safe_from = at + REACTION_S

@@ -29,7 +29,6 @@ from tests.plant.wire import Port, Wire
 from tests.plant.world import BEGIN_S, World
 from tests.proof.block import BLOCK
 from tests.proof.drives import DRIVES, Drive, write_site
-from tests.proof.settings import PLANT
 
 _BITRATE: Final = 1_000_000
 _LOOK_S: Final = 0.25
@@ -83,7 +82,7 @@ class Plant:
         self.answers = Answers(self.oracle, list(DRIVES))
         self.causes = Causes(self.oracle)
         self.debts = Debts(self.oracle)
-        self.debts.is_quiet = self.is_quiet
+        self.answers.is_quiet = self.debts.is_quiet = self.is_quiet
         self.ways = Ways(self.oracle)
         self.outputs = Outputs(self.oracle)
         self.has_outputs = False
@@ -205,8 +204,8 @@ class Plant:
         process = self.bridge.process
         now = self.world.now
         is_still = process.is_dead or process.still_since < now
-        self.answers.look(now, is_still=is_still)
-        self.causes.look(now, is_still=is_still)
+        self.answers.look(now, is_still=is_still or self.bridge.is_ending)
+        self.causes.look(now, is_still=is_still or self.bridge.is_ending)
         self.debts.look(now, is_still=is_still)
         if process.is_dead or process.still_since < now:
             for drive in DRIVES:
@@ -257,16 +256,6 @@ class Plant:
         self.oracle.left(controller.drive, self.world.now)
         self.world.after(step.seconds, controller.start)
 
-    def half_open(self, step: Step) -> None:
-        """Nothing gets through between the controller's machine and ours, and nobody is told."""
-        controller = self.controller(step)
-        stream = controller.line.stream if controller.line else None
-        if stream is None:
-            self.silence_controller(step)
-            return
-        stream.is_cut = True
-        self.world.after(step.seconds, stream.mend)
-
     def release(self, step: Step) -> None:
         controller = self.controller(step)
         controller.is_silent = True
@@ -307,14 +296,9 @@ class Plant:
         is_same = step.how == "same host" and drive.protocol == "modbus"
         host = f"127.0.1.{10 + drive.place}" if is_same else "127.0.3.200"
         stranger = Stranger(self.world, self.bridge, drive, host)
+        if is_same:
+            self.oracle.shared(drive, self.world.now + step.seconds)
         self.world.after(step.seconds, stranger.leave)
-
-    def backlog(self, step: Step) -> None:
-        """A controller writes ahead while the bridge stands still for a moment, and hangs."""
-        controller = self.controller(step)
-        self.bridge.process.hang(PLANT.short_s, in_turn=False)
-        controller.write_ahead(int(step.how))
-        self.world.after(step.seconds, controller.start)
 
     def hang(self, step: Step) -> None:
         def hang() -> None:
@@ -367,12 +351,6 @@ class Plant:
         node.speaks = False
         self.world.after(step.seconds, lambda: setattr(node, "speaks", True))
 
-    def slow(self, step: Step) -> None:
-        """The machine is busy: whatever the bridge does takes longer."""
-        process = self.bridge.process
-        usual_s, process.look_s = process.look_s, float(step.how)
-        self.world.after(step.seconds, lambda: setattr(process, "look_s", usual_s))
-
     def step_clock(self, step: Step) -> None:
         self.world.wall_step_s += step.seconds
 
@@ -381,13 +359,11 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "controller silent": Plant.silence_controller,
     "all controllers silent": Plant.silence_all,
     "controller crashed": Plant.crash_controller,
-    "half open": Plant.half_open,
     "release": Plant.release,
     "jog": Plant.jog,
     "acknowledges": Plant.acknowledge_always,
     "stop": Plant.stop,
     "stranger": Plant.stranger,
-    "backlog": Plant.backlog,
     "hang": Plant.hang,
     "kill": Plant.kill,
     "bus off": Plant.bus_off,
@@ -395,7 +371,6 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "noise": Plant.noise,
     "node reset": Plant.reset_node,
     "node silent": Plant.silence_node,
-    "box slow": Plant.slow,
     "clock stepped": Plant.step_clock,
     "outputs stopped": stop_outputs,
     **MORE,

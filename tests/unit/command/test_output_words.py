@@ -125,6 +125,14 @@ def test_what_the_node_holds_is_taken_over_by_name() -> None:
     assert words.held == (0, 1, 2, 20)
 
 
+def test_what_the_node_holds_takes_no_stop_back() -> None:
+    words = words_of()
+    words.let_go()
+    words.hold({"level": 0x0002_0001})
+    assert words.has_let_go
+    assert words.held == (0, 0, 0, 20)
+
+
 @given(st.integers(-(1 << 31), (1 << 31) - 1), st.integers(0, 255))
 def test_what_is_written_is_read(level: int, valves: int) -> None:
     words = words_of()

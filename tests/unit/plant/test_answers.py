@@ -67,6 +67,26 @@ def test_a_newer_telegram_may_have_taken_its_place(scene: Scene) -> None:
     assert not scene.wrong()
 
 
+@pytest.mark.parametrize(("heard_at", "is_quiet"), [(1009.0, True), (1010.0, False)])
+def test_a_drive_that_is_not_heard_may_have_got_a_stop_instead(
+    scene: Scene, heard_at: float, is_quiet: bool
+) -> None:
+    scene.answers.is_quiet = lambda: is_quiet
+    scene.oracle.frame(heard_at, DRIVE.tpdo, b"\0\0", of_bridge=False)
+    scene.asks()
+    scene.is_answered(OK)
+    scene.sees(1010.02, FAMILY.ready, 0)
+    assert not scene.wrong()
+
+
+def test_one_that_is_heard_has_not(scene: Scene) -> None:
+    scene.oracle.frame(1010.0, DRIVE.tpdo, b"\0\0", of_bridge=False)
+    scene.asks()
+    scene.is_answered(OK)
+    scene.sees(1010.02, FAMILY.ready, 0)
+    assert "its setpoint was not on the wire" in scene.wrong()
+
+
 @pytest.mark.parametrize("outcome", [NOT_FORWARDED, Outcome(Code.NOT_ALLOWED)])
 def test_what_was_not_forwarded_is_never_on_the_wire(scene: Scene, outcome: Outcome) -> None:
     scene.asks()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from tests.plant.debts import Debts
@@ -64,6 +66,14 @@ def test_a_stop_pays_it(scene: Scene) -> None:
     assert not scene.wrong()
 
 
+def test_a_node_that_has_just_started_anew_ends_the_debt(scene: Scene) -> None:
+    scene.debts.frame(1030.05, HEARTBEAT, b"\0", "node")
+    scene.gets(1030.08, FAMILY.run)
+    scene.hangs(1030.1, 1031.0)
+    scene.debts.gives_way(1030.1, 1031.0)
+    assert not scene.wrong()
+
+
 def test_a_short_hang_owes_nothing(scene: Scene) -> None:
     scene.hangs(1030.1, 1030.1 + DEADMAN_S / 2)
     assert not scene.wrong()
@@ -78,6 +88,17 @@ def test_a_bridge_that_fails_again_is_excused(scene: Scene) -> None:
 def test_who_gives_way_stops_the_node(scene: Scene) -> None:
     scene.debts.gives_way(1030.1, 1031.0)
     assert "no NMT stop before the bridge gives way" in scene.wrong()
+
+
+@pytest.mark.parametrize("does_follow", [False, True])
+def test_but_not_where_its_drives_have_followed_a_stop(scene: Scene, does_follow: bool) -> None:
+    scene.gets(1030.02, FAMILY.ready)
+    if does_follow:
+        scene.oracle.frame(1030.05, DRIVE.tpdo, b"\0\0", of_bridge=False)
+    else:
+        scene.says(1030.05)
+    scene.debts.gives_way(1030.1, 1031.0)
+    assert bool(scene.wrong()) is not does_follow
 
 
 def test_an_nmt_stop_of_the_bridge_is_one(scene: Scene) -> None:
@@ -98,6 +119,15 @@ def test_a_service_that_ends_stops_its_drives(scene: Scene) -> None:
     scene.debts.ending(1030.1)
     scene.gets(1030.5, FAMILY.run)
     assert "by a service that ends" in scene.wrong()
+
+
+def test_what_silence_stops_gets_nothing_even_then(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    drive = replace(DRIVE, reaction="silence")
+    monkeypatch.setattr(scene.oracle.tracks[DRIVE], "drive", drive)
+    scene.oracle.tracks[DRIVE].last_at = 1030.0 - PLANT.fieldbus_timeout_ms / 1000
+    scene.debts.ending(1030.1)
+    scene.debts.ended(1030.2)
+    assert not scene.wrong()
 
 
 @pytest.mark.parametrize(("word", "text"), [(FAMILY.run, "though the service ends"), (FAMILY.ready, "")])
@@ -134,6 +164,14 @@ def test_a_second_bridge_listens(scene: Scene) -> None:
 def test_an_intruder_is_answered(scene: Scene) -> None:
     scene.debts.intruded(DRIVE, "rpdo", 1030.1)
     assert "is not answered" in scene.wrong()
+
+
+def test_a_bridge_that_has_just_begun_may_listen(scene: Scene) -> None:
+    scene.debts.disturbed(1029.0)
+    scene.debts.intruded(DRIVE, "rpdo", 1030.1)
+    scene.debts.frame(1030.2, 0, START_NODE, "intruder")
+    scene.debts.master_left(DRIVE, 1030.2)
+    assert not scene.wrong()
 
 
 def test_the_last_word_is_the_bridges(scene: Scene) -> None:

@@ -152,6 +152,17 @@ def test_a_stop_stays_until_the_controller_enables_anew(scene: Scene) -> None:
     assert not scene.sees(1010.8)
 
 
+@pytest.mark.parametrize("is_same_address", [False, True])
+def test_a_controller_goes_on_where_another_connection_of_it_was(is_same_address: bool) -> None:
+    oracle = Oracle([DRIVE])
+    if is_same_address:
+        oracle.shared(DRIVE, 1010.5)
+    for at, setpoint in ((1010.0, FAMILY.setpoint + NUMBERS), (1010.6, FAMILY.setpoint)):
+        oracle.telegram(DRIVE, at - 0.01, FAMILY.run)
+        oracle.frame(at, DRIVE.rpdo, rpdo(FAMILY.run, setpoint), of_bridge=True)
+    assert bool(oracle.violations) is not is_same_address
+
+
 def test_a_stranger_has_no_setpoint(scene: Scene) -> None:
     assert "setpoint of a stranger" in scene.sees(1010.1, setpoint=FAMILY.setpoint + NUMBERS)
 

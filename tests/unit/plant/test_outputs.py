@@ -58,3 +58,15 @@ def test_a_bridge_that_has_failed_is_excused(scene: Scene) -> None:
 def test_a_stop_is_forwarded(outcome: Outcome) -> None:
     (text,) = Scene(outcome).oracle.violations
     assert "a stop of outputs that are active is answered" in text
+
+
+@pytest.mark.parametrize("is_reset", [False, True])
+def test_one_that_cannot_be_is_kept_all_the_same(is_reset: bool) -> None:
+    scene = Scene(Outcome(Code.OK))
+    if is_reset:
+        scene.outputs.frame(1010.1, 0x000, bytes((0x82, BLOCK.node_id)))
+    came = 1010.15 if is_reset else 1012.0
+    scene.outputs.stopped(came, came, Outcome(Code.OK, forwarded=False))
+    assert not scene.oracle.violations
+    (text,) = scene.gets(came + LATER_S, BLOCK.held)
+    assert "outputs that somebody has stopped" in text

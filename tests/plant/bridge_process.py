@@ -4,7 +4,8 @@ does, in a process that may stand still or end."""
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+import inspect
+from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
 from random import Random
 
@@ -58,7 +59,7 @@ class Bridge:
         """Called with each request that is submitted, and its number; ``on_answer`` with its outcome."""
         self.on_answer: list[Callable[[int, Outcome], None]] = []
         self._requests = 0
-        self._endings: list[asyncio.Task[None]] = []
+        self._endings: list[tuple[asyncio.Task[None], Coroutine[None, None, None]]] = []
         self._told_to_end: Process | None = None
         self.watchers: list[Watcher] = []
         self.tape: RecordingTape | None = None
@@ -149,6 +150,9 @@ class Bridge:
 
     def on_end(self, now: float) -> None:
         """The kernel closes what the process had open."""
+        for _, work in self._endings:
+            if inspect.getcoroutinestate(work) == inspect.CORO_CREATED:
+                work.close()
         if self._timer is not None:
             self._timer.cancel()
         for bus in self._buses:
@@ -176,7 +180,8 @@ class Bridge:
 
         def begin() -> None:
             # One whose process is killed meanwhile is never done.
-            self._endings.append(asyncio.Task(ending(), loop=process.loop))
+            work = ending()
+            self._endings.append((asyncio.Task(work, loop=process.loop), work))
 
         process.post(begin)
 

@@ -11,6 +11,7 @@ from bridge.command import Code, EventKind, Identity, Outcome, Request, SetTimeo
 from tests.plant.bridge_process import Bridge
 from tests.plant.clients import Line, read, writes
 from tests.plant.field import FieldNode
+from tests.plant.machine import LOOK_S
 from tests.plant.plan import Step
 from tests.plant.third_parties import Intruder
 from tests.proof.drives import DRIVES, Drive
@@ -75,8 +76,8 @@ def backlog(plant: Plant, step: Step) -> None:
 def slow(plant: Plant, step: Step) -> None:
     """The machine is busy: whatever the bridge does takes longer."""
     process = plant.bridge.process
-    usual_s, process.look_s = process.look_s, float(step.how)
-    plant.world.after(step.seconds, lambda: setattr(process, "look_s", usual_s))
+    process.look_s = float(step.how)
+    plant.world.after(step.seconds, lambda: setattr(process, "look_s", LOOK_S))
 
 
 def start_by_command(plant: Plant, step: Step) -> None:

@@ -15,7 +15,7 @@ from typing import Any, Final, Protocol
 from bridge.master.standstill import SignalAlarm
 from tests.plant.world import Act, World
 
-_LOOK_S: Final = 0.000_04
+LOOK_S: Final = 0.000_04
 """Time that passes from one look at the clock to the next: a turn takes as long as it has looks."""
 
 
@@ -69,7 +69,7 @@ class Process:
         self._pause_s = 0.0
         """Length of the pause that begins at the next look at the clock; ``inf`` ends the process there."""
         self._skips = 0
-        self.look_s = _LOOK_S
+        self.look_s = LOOK_S
         self.alarm = Alarm(world)
         self.loop = ProcessLoop(self, world, faults)
         self.still_since = inf

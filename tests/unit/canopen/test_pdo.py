@@ -325,6 +325,7 @@ def test_they_are_polled_again_when_it_falls_silent(tmp_path: Path) -> None:
     bench.run(2.0)
     reads = input_reads(bench)
     bench.node.slave._store.current.tpdo[4].enabled = False
+    bench.node.slave.touch()
     bench.node.image.inputs = 0b0010
     bench.run(2.0)
     assert input_reads(bench) > reads

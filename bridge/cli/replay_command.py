@@ -15,7 +15,7 @@ from bridge.base.errors import OperationFailed
 from bridge.cli.bus_runner import AsJson
 from bridge.cli.terminal import printable
 from bridge.image import Image, Quality, Reading
-from bridge.recorder.checkpoint import Unusable
+from bridge.recorder.core_names import Unusable
 from bridge.recorder.recorder import fingerprint
 from bridge.recorder.recording import Segment, read
 from bridge.recorder.replay import Difference, Replay

@@ -7,16 +7,12 @@ nothing (``.importlinter``, sans-io), so nothing in a checkpoint can.
 
 from __future__ import annotations
 
-import functools
 import importlib
-import importlib.util
-import inspect
 import io
 import pickle
 import pickletools
 import types
-from collections.abc import Callable, Iterator
-from importlib.abc import InspectLoader
+from collections.abc import Callable
 from struct import Struct
 from typing import Any, Final, cast
 
@@ -25,46 +21,9 @@ import msgspec
 from bridge.can.interface import Bus
 from bridge.config import Site
 from bridge.master.standstill import WatchdogTimer
+from bridge.recorder.core_names import Unusable, class_of, codes_of, function_of, is_core
 from bridge.recorder.tape import Tape, TapedBus
 
-_CORE: Final = (
-    "bridge.base.",
-    "bridge.can.",
-    "bridge.canopen.",
-    "bridge.catalogue.",
-    "bridge.command.",
-    "bridge.config.",
-    "bridge.drive.",
-    "bridge.eds.",
-    "bridge.image.",
-    "bridge.mapping.",
-    "bridge.master.",
-    "bridge.node.",
-    "bridge.parameter.",
-    "bridge.text.",
-)
-_SHELLS: Final = frozenset(
-    (
-        "bridge.base.clock",
-        "bridge.base.memory_lock",
-        "bridge.base.notify",
-        "bridge.base.quietlog",
-        "bridge.config.site_file",
-        "bridge.eds.device_file",
-        "bridge.eds.site_configurations",
-        "bridge.mapping.loader",
-        "bridge.mapping.merge",
-        "bridge.mapping.site_families",
-        "bridge.master.standstill",
-        "bridge.master.timer",
-        "bridge.parameter.backup_file",
-        "bridge.parameter.factory",
-        "bridge.parameter.ledger_file",
-        "bridge.parameter.set_file",
-        "bridge.text.templates",
-    )
-)
-"""Modules in those folders that open, wait or look at a clock."""
 _AROUND: Final = (
     "bridge.base.notify",
     "bridge.can.",
@@ -74,9 +33,10 @@ _AROUND: Final = (
     "bridge.northbound.",
     "bridge.recorder.",
     "bridge.service.",
+    "bridge.sim.",
+    "bridge.zenohlink.",
 )
 """Rooms of what listens to the core and asks it: they are left out."""
-_CORE_OF_CAN: Final = ("bridge.can.burstend", "bridge.can.errorframe", "bridge.can.interface")
 _PLAIN: Final = frozenset(
     (
         ("_struct", "Struct"),
@@ -100,19 +60,8 @@ _LOCALS: Final = "<locals>"
 _LAMBDA: Final = "<lambda>"
 
 
-class Unusable(Exception):
-    """A checkpoint that cannot be made, or holds what none may."""
-
-
 class DialogueIsOn(Unusable):
     """A node is being asked step by step at the moment: how far that is can be put into no checkpoint."""
-
-
-def is_core(module: str) -> bool:
-    """Whether objects of this module are of the core."""
-    if module.startswith("bridge.can."):
-        return module in _CORE_OF_CAN
-    return module.startswith(_CORE) and module not in _SHELLS
 
 
 class Outside:
@@ -169,7 +118,7 @@ def _check_codes(states: bytes) -> None:
 
 def _empty(module: str, name: str) -> Any:
     """An object of a class of the core, without its state."""
-    kind = _class(module, name)
+    kind = class_of(module, name)
     return kind.__new__(kind)
 
 
@@ -298,7 +247,7 @@ class _Unpickler(pickle.Unpickler):
             case ("object", int() as number):
                 return self._objects[number]
             case ("function", str() as module, str() as name):
-                return _function(module, name)
+                return function_of(module, name)
             case _:
                 raise Unusable(f"an unknown reference {pid!r}")
 
@@ -308,37 +257,13 @@ class _Unpickler(pickle.Unpickler):
         if module_name == _OWN and global_name in _RESTORERS:
             return _RESTORERS[global_name]
         if is_core(module_name):
-            return _class(module_name, global_name)
+            return class_of(module_name, global_name)
         if (module_name, global_name) == ("bridge.recorder.tape", "NumberedReply"):
             return super().find_class(module_name, global_name)
         raise Unusable(f"{module_name}.{global_name} is nothing that a checkpoint may have")
 
 
-def _class(module: str, name: str) -> Any:
-    """A class of the core."""
-    if is_core(module):
-        found: Any = importlib.import_module(module)
-        for part in name.split("."):
-            found = getattr(found, part, None)
-        if isinstance(found, type) and found.__module__ == module:
-            return found
-    raise Unusable(f"{module}.{name} is no class of the core")
-
-
 # code by its name
-
-
-def _function(module: str, name: str) -> Any:
-    """The function of a module of the core, or of a class in it."""
-    if not is_core(module):
-        raise Unusable(f"{module} is not of the core")
-    found: Any = importlib.import_module(module)
-    for part in name.split("."):
-        found = inspect.getattr_static(found, part)
-    found = getattr(found, "__func__", found)
-    if not isinstance(found, types.FunctionType) or found.__module__ != module:
-        raise Unusable(f"{module}.{name} is no function of the core")
-    return found
 
 
 def _method(owner: Any, name: str) -> object:
@@ -353,7 +278,7 @@ def _place_of(function: types.FunctionType) -> tuple[str, str, int]:
     """Module, qualified name and number of a nested function's or a lambda's code: the number counts those of
     the same name in the module."""
     code = function.__code__
-    same = _codes(function.__module__)[code.co_qualname]
+    same = codes_of(function.__module__)[code.co_qualname]
     return function.__module__, code.co_qualname, same.index(code)
 
 
@@ -366,7 +291,7 @@ def _around(function: types.FunctionType) -> tuple[Any, Any, Any]:
 def _closure(module: str, name: str, number: int, cells: Any, defaults: Any, by_keyword: Any) -> Any:
     if not is_core(module):
         raise Unusable(f"{module} is not of the core")
-    code = _codes(module)[name][number]
+    code = codes_of(module)[name][number]
     made = types.FunctionType(
         code,
         vars(importlib.import_module(module)),
@@ -384,22 +309,3 @@ def _same(one: object) -> object:
 
 
 _RESTORERS: Final[dict[str, Callable[..., Any]]] = {"_closure": _closure, "_method": _method, "_same": _same}
-
-
-@functools.cache
-def _codes(module: str) -> dict[str, list[types.CodeType]]:
-    """All code of a module by its qualified name, in the order of its lines."""
-    spec = importlib.util.find_spec(module)
-    loader = spec.loader if spec else None
-    assert isinstance(loader, InspectLoader)
-    found: dict[str, list[types.CodeType]] = {}
-    for code in _nested(loader.get_code(module)):
-        found.setdefault(code.co_qualname, []).append(code)
-    return found
-
-
-def _nested(code: types.CodeType | None) -> Iterator[types.CodeType]:
-    for one in code.co_consts if code else ():
-        if isinstance(one, types.CodeType):
-            yield one
-            yield from _nested(one)

@@ -27,6 +27,7 @@ from bridge.command.plant import Plant
 from bridge.config import Site
 from bridge.master.master import Master
 from bridge.recorder import checkpoint
+from bridge.recorder.core_names import Unusable
 from bridge.recorder.recording import Header, State, header_chunk, state_chunk
 from bridge.recorder.ring import Ring
 from bridge.recorder.tape import RecordedAlarm, TapedBus, machine_tape
@@ -45,6 +46,8 @@ _CHECKPOINT_S: Final = 120
 _NICE: Final = 10
 _FLAGS: Final = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC
 _MODE: Final = 0o640
+_WHY: Final = ".why"
+"""Suffix of a file in which the writer of a checkpoint says why there is none."""
 _DEPTH: Final = 100_000
 _BETWEEN_S: Final = 30.0
 """Shortest time between two files of the black box, seconds."""
@@ -97,7 +100,7 @@ class Recorder:
         self._incident: Event | None = None
         self._due = 0.0
         self._written_at = -_BETWEEN_S
-        self._fault = ""
+        self._fault = self._why_no_checkpoint = ""
 
     def alarm(self) -> RecordedAlarm:
         """The alarm for the master. To be made in the main thread."""
@@ -164,7 +167,7 @@ class Recorder:
         self._flush()
         if self._incident and now >= self._due:
             self._write_out(now)
-        self._tell(self.ring.fault)
+        self._tell(self._why_no_checkpoint or self.ring.fault)
         if self._child is not None or now < self._retry_at:
             return
         is_long = self.ring.is_long or now > self._began.get(self._number, now) + _SEGMENT_S
@@ -214,10 +217,14 @@ class Recorder:
             return
         self._child = None
         code = os.waitstatus_to_exitcode(status)
+        self._why_no_checkpoint = ""
         if code == _TOO_LARGE:
-            self._tell("the checkpoint of this site is too large for recorder.size_mb")
+            self._why_no_checkpoint = "the checkpoint of this site is too large for recorder.size_mb"
         elif code not in (_DONE, _DIALOGUE):
-            self._tell(f"no checkpoint could be written ({code})")
+            why = self.ring.state_path(self._number).with_suffix(_WHY)
+            said = why.read_text(encoding="utf-8") if why.exists() else f"its writer ended with {code}"
+            why.unlink(missing_ok=True)
+            self._why_no_checkpoint = f"no checkpoint could be written: {said}"
         if code == _DONE:
             self._retry_s = _RETRY_S
         else:
@@ -284,6 +291,9 @@ def _write_state(path: Path, header: Header, make: Callable[[], State], most: fl
         state = make()
     except checkpoint.DialogueIsOn:
         return _DIALOGUE
+    except Unusable as error:
+        path.with_suffix(_WHY).write_text(str(error), encoding="utf-8")
+        return _FAILED
     chunks = header_chunk(header) + state_chunk(state)
     if len(chunks) > most:
         return _TOO_LARGE

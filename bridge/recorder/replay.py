@@ -25,6 +25,7 @@ from bridge.master.standstill import StoodStill, WatchdogTimer
 from bridge.mirror import protocol
 from bridge.mirror.protocol import Connected, Rejected
 from bridge.recorder import checkpoint
+from bridge.recorder.core_names import Unusable
 from bridge.recorder.recording import Segment, notes_of
 from bridge.recorder.tape import Note, Notes, Tape, apply_facts
 
@@ -208,11 +209,11 @@ class PlayedBus:
 
 
 class Replay:
-    """The replay of one segment. Raises ``checkpoint.Unusable`` where its checkpoint cannot be used."""
+    """The replay of one segment. Raises ``Unusable`` where its checkpoint cannot be used."""
 
     def __init__(self, segment: Segment) -> None:
         if segment.state is None:
-            raise checkpoint.Unusable("the segment has no checkpoint")
+            raise Unusable("the segment has no checkpoint")
         self.tape = PlayingTape()
         self.tape.nested = self._do
         self.turns = 0

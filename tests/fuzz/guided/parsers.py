@@ -34,9 +34,9 @@ from bridge.northbound.gateway import cia309_types, syntax
 from bridge.northbound.modbus.connection import Conversation
 from bridge.northbound.zenoh.commands import BadCommand, Commands, identity_of
 from bridge.project import Project, load_project
-from bridge.recorder.checkpoint import Unusable
 from bridge.recorder.checkpoint import load as load_checkpoint
 from bridge.recorder.checkpoint import save as save_checkpoint
+from bridge.recorder.core_names import Unusable
 from bridge.recorder.recording import (
     MAGIC,
     SUFFIX,

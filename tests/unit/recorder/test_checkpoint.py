@@ -15,7 +15,8 @@ import pytest
 import bridge
 from bridge.can.interface import BusStatus
 from bridge.config import load_site
-from bridge.recorder.checkpoint import Outside, Unusable, is_core, load, save
+from bridge.recorder.checkpoint import Outside, load, save
+from bridge.recorder.core_names import Unusable, is_core
 from bridge.recorder.replay import PlayedAlarm, PlayedBus, PlayingTape
 from bridge.recorder.tape import facts_of, machine_tape
 from tests.plant.plan import Plan

@@ -10,20 +10,29 @@ from pathlib import Path
 
 import pytest
 
+from bridge.can.interface import BusStatus
+from bridge.can.virtual import VirtualWire
 from bridge.command import Event, EventKind, Identity, Outcome, Request, Source
 from bridge.command.messages.request import Action, command_of
 from bridge.config import load_site
+from bridge.project import load_project
 from bridge.recorder import recorder as module
+from bridge.recorder.checkpoint import load, save
+from bridge.recorder.core_names import Unusable
 from bridge.recorder.recorder import Recorder
 from bridge.recorder.recording import read
-from bridge.recorder.replay import Replay
+from bridge.recorder.replay import PlayedAlarm, PlayedBus, PlayingTape, Replay
 from bridge.recorder.ring import parts_of, segments_in, write_recording
+from bridge.recorder.tape import facts_of
+from bridge.service.bus_process import BusProcess
 from bridge.text import Text
 from tests.support import sites
 from tests.support.core import Core, core_of
+from tests.support.process import REPOSITORY
 
 _LONGEST_S = 60.0
 WHO = Identity(Source.MODBUS, "10.0.0.5")
+NOWHERE = PlayedBus("can0", PlayingTape(), facts_of(BusStatus()))
 
 
 class Recorded:
@@ -131,6 +140,33 @@ def test_another_segment_begins_where_a_checkpoint_failed(
     recorded.until(lambda: recorded.has_state(2))
     assert not recorded.has_state(1)
     recorded.recorder.close()
+
+
+def test_why_there_is_no_checkpoint_is_told_once(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_RETRY_S", 0.01)
+    monkeypatch.setattr(module, "_LONGEST_RETRY_S", 0.01)
+
+    def fail(root: object) -> bytes:
+        raise Unusable("a Pace is neither of the core nor around it")
+
+    monkeypatch.setattr(module.checkpoint, "save", fail)
+    events: list[Event] = []
+    recorded.core.plant.on_event(events.append)
+    recorded.start()
+    recorded.until(lambda: recorded.recorder.ring.state_path(3).with_suffix(".turns").exists())
+    [said] = [event.message for event in events if event.kind is EventKind.CONFIGURATION]
+    assert "a Pace is neither of the core nor around it" in said
+    recorded.recorder.close()
+
+
+def test_the_service_as_it_runs_can_be_recorded() -> None:
+    """With everything that listens to its core: servers, mirror, audit log, page."""
+    project = load_project(REPOSITORY / "bridge" / "demo" / "site.toml")
+    recorder = Recorder(project.site)
+    service = BusProcess(project, lambda table: VirtualWire().end(table.name), recorder=recorder)
+    root = service.master, service.view, service.plant
+    _, _, plant = load(save(root), PlayingTape(), lambda name: NOWHERE, PlayedAlarm())
+    assert plant.drives.keys() == service.plant.drives.keys()
 
 
 def test_no_process_can_be_started(recorded: Recorded, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -57,10 +57,13 @@ def lab_site(
     node: str = "",
     drives: tuple[str, ...] = (),
     more: str = "",
+    recorded: bool = False,
 ) -> LabSite:
     """Write a site with fu1, fu2, fu3 controlled as ``controls`` says, on free ports.
 
-    ``bus``, ``node`` and ``drives`` (for each) are further keys, ``more`` further nodes of the bus.
+    ``bus``, ``node`` and ``drives`` (for each) are further keys, ``more`` further nodes of the bus. Nothing
+    is recorded unless it is to be: in a user-mode kernel each page that a process writes after it has made
+    another one takes a hundred times as long.
     """
     ports = free_port(), free_port(), free_port()
     keys = (*drives, *[""] * len(controls))
@@ -70,5 +73,6 @@ def lab_site(
     ]
     servers = sites.modbus(ports[0]), sites.opcua(ports[1]), sites.zenoh(ports[2])
     on_vcan0 = sites.socketcan(sites.node(*tables, more=node), more, more=bus)
-    path = sites.write(folder, on_vcan0, *servers, name="lab")
+    recorder = f"[recorder]\nenabled = {'true' if recorded else 'false'}\n"
+    path = sites.write(folder, on_vcan0, *servers, recorder, name="lab")
     return LabSite(path, *ports)

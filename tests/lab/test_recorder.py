@@ -57,7 +57,7 @@ class Lab:
         self._folder = folder
         self._stack = stack
         self.site = site
-        self._starts = 0
+        self.starts = 0
         self.simulation = stack.enter_context(drivebridge(folder, "simulate", "simulate", str(site.path)))
         self.simulation.wait_output("simulating")
         self.bridge = self._started()
@@ -65,9 +65,9 @@ class Lab:
         stack.callback(self.owner.close)
 
     def _started(self) -> Process:
-        self._starts += 1
+        self.starts += 1
         command = "run", str(self.site.path), "--role", "bus"
-        name = f"run{self._starts}"
+        name = f"run{self.starts}"
         bridge = self._stack.enter_context(drivebridge(self._folder, name, *command, notify=True))
         bridge.wait_ready()
         bridge.wait_output("node operational")
@@ -107,14 +107,13 @@ INCIDENTS: dict[str, Callable[[Lab], None]] = {
     "somebody sends NMT": lambda lab: lab.send("000#8005"),
     "somebody commands the drive": lambda lab: lab.send("205#7F04002000000000"),
     "the drive says a fault": lambda lab: lab.send("085#1081110000000000"),
-    "the bridge is killed": Lab.kill,
 }
 
 
 @pytest.fixture
 def lab(tmp_path: Path) -> Iterator[Lab]:
     with ExitStack() as stack:
-        yield Lab(tmp_path, stack, lab_site(tmp_path, timeout_ms=200, controls=("modbus",)))
+        yield Lab(tmp_path, stack, lab_site(tmp_path, timeout_ms=200, controls=("modbus",), recorded=True))
 
 
 def replayed(recording: Path) -> Any:
@@ -124,16 +123,19 @@ def replayed(recording: Path) -> Any:
     return told
 
 
+@pytest.mark.timeout(400)
 def test_incidents_replay_to_the_same_outputs(lab: Lab, tmp_path: Path) -> None:
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         for happens in INCIDENTS.values():
             happens(lab)
             time.sleep(_PAUSE_S)
+        if not number:
+            lab.kill()
     lab.bridge.stop()
     whole, lines = tmp_path / "all.recording", tmp_path / "all.jsonl"
     assert drivebridge_called("record", str(lab.site.path), "-o", str(whole)).returncode == 0
     told = replayed(whole)
-    assert len(told["segments"]) >= 1 + ROUNDS, "one for each start at least"
+    assert len(told["segments"]) >= 2, "one for each start at least"
     assert sum(one["outputs"] for one in told["segments"]) > 1000
     assert drivebridge_called("record", str(whole), "-o", str(lines)).returncode == 0
     everything = map(json.loads, lines.read_text(encoding="utf-8").splitlines())

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from tests.proof.families import CIA402, LENZE, NORD, STOEBER, Family
-from tests.proof.settings import PLANT
+from tests.proof.settings import IS_RECORDED, PLANT
 
 PROTOCOLS: Final = ("modbus", "opcua", "zenoh")
 SERVERS: Final = {"modbus": "127.0.0.10", "opcua": "127.0.0.11", "zenoh": "127.0.0.12"}
@@ -237,7 +237,7 @@ def write_site(path: Path, channel: str, state: Path, run: Path, *, others: Sequ
         *(_node(drives) for drives in nodes.values()),
         *others,
         *(servers[protocol] for protocol in SERVED),
-        "[recorder]\nsize_mb = 4\nblack_box_mb = 4",
+        f"[recorder]\nenabled = {'true' if IS_RECORDED else 'false'}\nsize_mb = 4\nblack_box_mb = 4",
     ]
     path.write_text("\n".join(text) + "\n", encoding="utf-8")
     return path

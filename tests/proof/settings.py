@@ -80,3 +80,5 @@ CALM: Final = Settings(
 )
 PLANTS: Final = {plant.name: plant for plant in (FIRST, SECOND, FIRST_DEFAULTS, SECOND_DEFAULTS, CALM)}
 PLANT: Final = PLANTS[os.environ.get("PROOF_PLANT", FIRST.name)]
+IS_RECORDED: Final = "PROOF_RECORDED" in os.environ
+"""Whether the bridge is recorded, and what was recorded is replayed at the end: not in the short proof."""

@@ -20,7 +20,7 @@ from bridge.base.errors import Unavailable
 from bridge.can.interface import ControllerState
 from bridge.can.ownframes import OwnFrames
 from bridge.can.softbus import SoftBus
-from bridge.canopen.frame import EXTENDED, REMOTE, Frame
+from bridge.canopen.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
 from bridge.text import Text
 
 _MOST_WAITING: Final = 1 << 14
@@ -205,6 +205,24 @@ class PythonCanBus(SoftBus):
         if self._bus:
             _shut_down(self._bus)
             self._bus = None
+
+
+def message_of(
+    frame: Frame, at: float, channel: str | int | None = None, *, is_rx: bool = True
+) -> can.Message:
+    """A frame as python-can has it, ``at`` a time of whoever is to read it. A remote frame has a length and
+    no data."""
+    is_remote, is_extended = bool(frame.can_id & REMOTE), bool(frame.can_id & EXTENDED)
+    return can.Message(
+        timestamp=at,
+        arbitration_id=frame.can_id & (0x1FFF_FFFF if is_extended else STANDARD_MASK),
+        is_extended_id=is_extended,
+        is_remote_frame=is_remote,
+        data=None if is_remote else frame.data,
+        dlc=len(frame.data),
+        channel=channel,
+        is_rx=is_rx,
+    )
 
 
 def frame_of(message: can.Message, at: float) -> Frame:

@@ -10,9 +10,9 @@ from typing import Any, Final
 import can
 
 from bridge.base.errors import OperationFailed
-from bridge.canopen.frame import EXTENDED, REMOTE
+from bridge.can.pythoncan import message_of
 from bridge.recorder.recording import SUFFIX, Segment
-from bridge.recorder.told import TracedFrame, frames_of, lines_of
+from bridge.recorder.told import frames_of, lines_of
 
 _LINES: Final = ".jsonl"
 _TRACES: Final[dict[str, Callable[[Path], Any]]] = {
@@ -21,7 +21,6 @@ _TRACES: Final[dict[str, Callable[[Path], Any]]] = {
     ".blf": can.BLFWriter,
 }
 SUFFIXES: Final = (SUFFIX, *_TRACES, _LINES)
-_IDENTIFIER: Final = 0x1FFF_FFFF
 
 
 def write_as(segments: list[Segment], target: Path) -> int:
@@ -49,20 +48,5 @@ def _write_trace(segments: list[Segment], target: Path) -> int:
     frames = sorted(frames_of(segments), key=lambda one: one.frame.time)
     with _TRACES[target.suffix](target) as writer:
         for one in frames:
-            writer(_message(one))
+            writer(message_of(one.frame, one.frame.time, one.bus, is_rx=not one.is_ours))
     return len(frames)
-
-
-def _message(one: TracedFrame) -> can.Message:
-    frame = one.frame
-    is_remote = bool(frame.can_id & REMOTE)
-    return can.Message(
-        timestamp=frame.time,
-        arbitration_id=frame.can_id & _IDENTIFIER,
-        is_extended_id=bool(frame.can_id & EXTENDED),
-        is_remote_frame=is_remote,
-        data=None if is_remote else frame.data,
-        dlc=len(frame.data),
-        channel=one.bus,
-        is_rx=not one.is_ours,
-    )

@@ -138,7 +138,7 @@ def _fill(obj: Any, state: Any = None, items: Any = None, entries: Any = None) -
 
 
 def _has_identity(obj: object) -> bool:
-    """Whether an object is itself and not a value: only then it can be numbered."""
+    """True for an object that is itself and not a value: only then it can be numbered."""
     if not is_core(type(obj).__module__) or type(obj).__hash__ not in (object.__hash__, None):
         return False
     return not isinstance(obj, type | tuple | list | dict | set | BaseException)
@@ -210,7 +210,7 @@ def _is_bare(site: Site) -> bool:
 
 
 def _is_kept(obj: object) -> bool:
-    """Whether a checkpoint has an object, which is around the core otherwise. Raises ``Unusable`` for one of
+    """True for what a checkpoint has: the rest is around the core. Raises ``Unusable`` for one of
     which nobody knows."""
     kind = obj if isinstance(obj, type) else type(obj)
     if kind.__module__ == "builtins":

@@ -57,7 +57,7 @@ class Unusable(Exception):
 
 
 def is_core(module: str) -> bool:
-    """Whether objects of this module are of the core."""
+    """True if objects of this module are of the core."""
     if module.startswith("bridge.can."):
         return module in _CORE_OF_CAN
     return module.startswith(_CORE) and module not in _SHELLS

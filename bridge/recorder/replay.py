@@ -90,7 +90,7 @@ class PlayingTape(Tape):
             raise Difference(f"the recording goes on with {_said(self._notes[0])}")
 
     def comes(self, note: Note, bus: str) -> bool:
-        """Whether a note of this bus comes next."""
+        """True if a note of this bus comes next."""
         self._ring()
         return self._comes(note) and bool(self._notes[0][1] == bus)
 

@@ -103,7 +103,7 @@ class Ring:
 
     @property
     def is_long(self) -> bool:
-        """Whether another segment is due for the size of this one."""
+        """True if another segment is due for the size of this one."""
         return self.size > self._most_bytes * _SEGMENT_SHARE
 
     def state_path(self, number: int) -> Path:

@@ -7,6 +7,7 @@ A note is one value that MessagePack has: a float is a look at the clock, a list
 from __future__ import annotations
 
 import random
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -75,25 +76,25 @@ class Note(StrEnum):
     FAULT = "fault"
 
 
-class Tape(Turns):
+class Tape(Turns, ABC):
     """Surroundings of the core of one process: a clock, chance, and by name its buses. ``tell`` takes
     notes of outputs, and ``on_event`` the plant's events."""
 
+    @abstractmethod
     def now(self) -> float:
         """The clock, in monotonic seconds."""
-        raise NotImplementedError
 
+    @abstractmethod
     def epoch_ns(self, at: float) -> int:
         """The wall clock at a monotonic time, in ns."""
-        raise NotImplementedError
 
+    @abstractmethod
     def slept(self) -> float:
         """Seconds for which the machine was suspended since the last call."""
-        raise NotImplementedError
 
+    @abstractmethod
     def chance(self) -> float:
         """A random number from 0 to 1."""
-        raise NotImplementedError
 
     def reply_of(self, number: int) -> Reply:
         """The reply to the request of this number."""
@@ -106,8 +107,9 @@ class Tape(Turns):
         # The cause is found by what is not of the core.
         self.tell(Note.EVENT, protocol.encode(replace(event, because="")))
 
+    @abstractmethod
     def tell(self, note: Note, *facts: object) -> None:
-        raise NotImplementedError
+        """Take a note with its facts."""
 
 
 @dataclass(frozen=True, slots=True)

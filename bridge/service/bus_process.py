@@ -36,7 +36,7 @@ from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
 from bridge.project import Project, count
 from bridge.recorder.recorder import Recorder
-from bridge.recorder.tape import machine_tape
+from bridge.recorder.tape import RecordingTape, machine_tape
 from bridge.service.audit_log import AuditLog
 from bridge.service.event_log import log_event
 from bridge.service.front_process import Front
@@ -97,20 +97,7 @@ class BusProcess:
         self.wear = WearKeeper(self.plant.eeprom_writes, Path(site.site.state_dir))
         self.audit = AuditLog(self.plant, site, clock.now, clock.epoch_ns)
         self.notifier = Notifier()
-        buses = [make_bus(table) for table in site.bus]
-        networks = [
-            (
-                bus,
-                Network(
-                    bus_table,
-                    self.plant.side_of(bus_table),
-                    tape.epoch_ns,
-                    project.downloads,
-                    Standby(listen_s(bus_table), tape.chance),
-                ),
-            )
-            for bus_table, bus in zip(site.bus, buses, strict=True)
-        ]
+        networks = [(make_bus(table), self._network(table, tape)) for table in site.bus]
         self._networks = [network for _, network in networks]
         lines = [(recorder.taped(bus) if recorder else bus, network) for bus, network in networks]
         self.master = Master(lines, self.plant, tape.now, self.notifier.alive, alarm, tape.slept)
@@ -144,6 +131,11 @@ class BusProcess:
         for kind in fronts:
             if (settings := kind.settings(site)) is not None:
                 self._add_front(kind, settings)
+
+    def _network(self, table: BusTable, tape: RecordingTape) -> Network:
+        """The nodes of a bus, with the tape around them."""
+        side, listening = self.plant.side_of(table), Standby(listen_s(table), tape.chance)
+        return Network(table, side, tape.epoch_ns, self.project.downloads, listening)
 
     def _make_gateways(self, taps: Mapping[str, Path]) -> dict[str, GatewayServer]:
         """Gateways by bus; ``taps`` are the sockets on which the frames of each are passed on."""

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Iterable
-from typing import Any, Final
+from typing import Any
 
-from bridge.canopen.frame import EXTENDED, REMOTE, STANDARD_MASK, Frame
-
-_IDENTIFIER: Final = 0x1FFF_FFFF
+from bridge.canopen.frame import Frame
 
 
 class CaptureFile:
@@ -29,19 +27,10 @@ class CaptureFile:
         self._writer = ASCWriter(self._file) if form == "asc" else CanutilsLogWriter(self._file, channel)
 
     def add(self, frames: Iterable[Frame]) -> None:
-        import can
+        from bridge.can.pythoncan import message_of
 
         for frame in frames:
-            is_remote, is_extended = bool(frame.can_id & REMOTE), bool(frame.can_id & EXTENDED)
-            message = can.Message(
-                timestamp=self._epoch_ns(frame.time) / 1e9,
-                arbitration_id=frame.can_id & (_IDENTIFIER if is_extended else STANDARD_MASK),
-                is_extended_id=is_extended,
-                is_remote_frame=is_remote,
-                data=None if is_remote else frame.data,
-                dlc=len(frame.data),
-                channel=self._channel,
-            )
+            message = message_of(frame, self._epoch_ns(frame.time) / 1e9, self._channel)
             self._writer.on_message_received(message)
             self.frames += 1
 

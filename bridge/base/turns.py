@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from enum import StrEnum
-from typing import ParamSpec, TypeVar
-
-_Args = ParamSpec("_Args")
-_Result = TypeVar("_Result")
+from typing import Any, Final
 
 
 class Turn(StrEnum):
@@ -25,11 +23,18 @@ class Turn(StrEnum):
     LOOK = "look"
 
 
-class Turns:
-    """Turns that nobody listens to. One that is run within another is part of it."""
+UNHEARD: Final = nullcontext()
+"""A turn that nobody listens to, or that is part of another."""
 
-    def run(
-        self, turn: Turn, act: Callable[_Args, _Result], /, *args: _Args.args, **options: _Args.kwargs
-    ) -> _Result:
-        """Do ``act``, which is a turn of this kind."""
-        return act(*args, **options)
+
+class Turns:
+    """Turns that nobody listens to."""
+
+    def begin(self, turn: Turn, *arguments: object) -> AbstractContextManager[None]:
+        """A turn of this kind, as a context: what is done in it, and what it was called with. One that begins
+        within another is part of it."""
+        return UNHEARD
+
+    def heard(self, reply: Callable[[Any], None]) -> Callable[[Any], None]:
+        """The reply to the request of the turn that has just begun: whoever listens hears what it says."""
+        return reply

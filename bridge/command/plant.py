@@ -61,7 +61,7 @@ class Plant:
     """All drives of a site.
 
     ``began`` is the monotonic time of what is known from the start, such as the version. ``on_event``
-    callbacks get the events. ``turns`` runs what changes it.
+    callbacks get the events. ``turns`` has each change of it.
     """
 
     def __init__(
@@ -159,7 +159,8 @@ class Plant:
 
     def report(self, event: Event) -> None:
         """Tell the listeners of an event, after those that wait."""
-        self.turns.run(Turn.REPORT, self._report, event)
+        with self.turns.begin(Turn.REPORT, event):
+            self._report(event)
 
     def _report(self, event: Event) -> None:
         if self.events.waiting:
@@ -367,6 +368,7 @@ class PlantView:
         self._clock = clock
         self._carry_out = carry_out
         self._wake = wake
+        self._turns = plant.turns
         self.image: Image = plant.image
         self.epoch_ns = epoch_ns
         self.on_event, self.forget = plant.on_event, plant.forget
@@ -375,40 +377,31 @@ class PlantView:
         """Do nothing: changes are here at once anyway."""
 
     def look(self, drive: str) -> None:
-        self._plant.turns.run(Turn.LOOK, self._look, drive)
-
-    def _look(self, drive: str) -> None:
-        self._plant.members[drive].look(self._clock())
+        with self._turns.begin(Turn.LOOK, drive):
+            self._plant.members[drive].look(self._clock())
 
     def submit(self, request: Request, reply: Reply) -> None:
-        self._plant.turns.run(Turn.SUBMIT, self._submit, request, reply)
-
-    def _submit(self, request: Request, reply: Reply) -> None:
-        is_changed = True
-        try:
-            later = self._plant.reply_later(reply)
-            is_changed = self._plant.submit(request, self._clock(), later, self._carry_out)
-            # Of one telegram that is several requests, the bus gets what the last of them has left.
-            self._plant.deliver_outcomes()
-        finally:
-            if is_changed:
-                self._wake()
+        with self._turns.begin(Turn.SUBMIT, request):
+            is_changed = True
+            try:
+                later = self._plant.reply_later(self._turns.heard(reply))
+                is_changed = self._plant.submit(request, self._clock(), later, self._carry_out)
+                # Of one telegram that is several requests, the bus gets what the last of them has left.
+                self._plant.deliver_outcomes()
+            finally:
+                if is_changed:
+                    self._wake()
 
     def rejected(self, rejection: Rejection, at: float | None = None, count: int = 1) -> None:
         """Pass on ``count`` rejections of this kind, the last ``at`` a time of the plant's, or now."""
-        self._plant.turns.run(Turn.REJECTED, self._rejected, rejection, at, count)
-
-    def _rejected(self, rejection: Rejection, at: float | None, count: int) -> None:
-        self._plant.rejected(rejection, self._clock() if at is None else at, count)
+        with self._turns.begin(Turn.REJECTED, rejection, at, count):
+            self._plant.rejected(rejection, self._clock() if at is None else at, count)
 
     def count(self, leaf: str, by: int = 1) -> None:
-        self._plant.turns.run(Turn.COUNT, self._count, leaf, by)
-
-    def _count(self, leaf: str, by: int) -> None:
-        self._plant.count(leaf, self._clock(), by)
+        with self._turns.begin(Turn.COUNT, leaf, by):
+            self._plant.count(leaf, self._clock(), by)
 
     def on_connection(self, identity: Identity, *, is_there: bool, has_others: bool = False) -> None:
-        self._plant.turns.run(Turn.CONNECTION, self._on_connection, identity, is_there, has_others)
-
-    def _on_connection(self, identity: Identity, is_there: bool, has_others: bool) -> None:
-        self._plant.on_connection(identity, self._clock(), is_there=is_there, has_others=has_others)
+        with self._turns.begin(Turn.CONNECTION, identity, is_there, has_others):
+            now = self._clock()
+            self._plant.on_connection(identity, now, is_there=is_there, has_others=has_others)

@@ -101,11 +101,9 @@ class Master:
 
     def halt(self, now: float) -> None:
         """Take no more commands, and hand stopped words to the buses at once. May be called again."""
-        self._plant.turns.run(Turn.HALT, self._halt, now)
-
-    def _halt(self, now: float) -> None:
-        self._plant.close(now)
-        self.wake()
+        with self._plant.turns.begin(Turn.HALT, now):
+            self._plant.close(now)
+            self.wake()
 
     async def stop_drives(self, now: float) -> Ending:
         """Take no more commands and send stopped words until every drive follows, unless the master has
@@ -126,15 +124,13 @@ class Master:
 
     def stop_nodes(self) -> Ending:
         """Send NMT stop to the nodes of drives that do not follow."""
-        return self._plant.turns.run(Turn.STOP_NODES, self._stop_nodes)
-
-    def _stop_nodes(self) -> Ending:
-        ending = end(self._plant, can_send=self._running)
-        for enforcement in nmt_stops(self._plant, ending):
-            self._enforce(enforcement, self._clock())
-        if ending.nodes_stopped:
-            self.wake()
-        return ending
+        with self._plant.turns.begin(Turn.STOP_NODES):
+            ending = end(self._plant, can_send=self._running)
+            for enforcement in nmt_stops(self._plant, ending):
+                self._enforce(enforcement, self._clock())
+            if ending.nodes_stopped:
+                self.wake()
+            return ending
 
     async def close(self) -> None:
         """Stop every drive's process data and close the buses."""
@@ -175,7 +171,8 @@ class Master:
         its work. Each drive gets a last, stopped word if possible; the bursts end within the dead-man time,
         and ``failed`` says why."""
         if self._running:
-            self._plant.turns.run(turn, self._try, act)
+            with self._plant.turns.begin(turn):
+                self._try(act)
 
     def _try(self, act: Callable[[], None]) -> None:
         try:

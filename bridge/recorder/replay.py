@@ -79,8 +79,8 @@ class PlayingTape(Tape):
         """Does a turn within one."""
         self._notes: deque[Any] = deque()
 
-    def begin(self, notes: Notes) -> None:
-        """Take the notes of the next turn."""
+    def lay(self, notes: Notes) -> None:
+        """Lay the notes of the next turn on it."""
         self._notes = deque(notes)
 
     def end(self) -> None:
@@ -236,7 +236,7 @@ class Replay:
         notes = notes_of(self._segment.turns[self.turns])
         self.turns += 1
         kind, arguments, *rest = notes
-        self.tape.begin(rest)
+        self.tape.lay(rest)
         try:
             try:
                 self._do([kind, arguments])

@@ -9,15 +9,16 @@ from __future__ import annotations
 import random
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Any, Final, ParamSpec, TypeVar
+from typing import Any, Final, TypeVar
 
 import msgspec
 
 from bridge.base import clock
 from bridge.base.guard import Guard
-from bridge.base.turns import Turn, Turns
+from bridge.base.turns import UNHEARD, Turn, Turns
 from bridge.can.burstend import Burst
 from bridge.can.interface import Bus, BusStatus, ControllerState
 from bridge.canopen.frame import Frame
@@ -31,7 +32,6 @@ from bridge.text import Said
 Notes = list[Any]
 """The notes of one turn: its kind, its arguments, then the notes proper."""
 
-_Args = ParamSpec("_Args")
 _Result = TypeVar("_Result")
 _OF_THE_CORE: Final = frozenset((Turn.TAKE_IN, Turn.PUMP))
 """Turns that the core itself begins within others."""
@@ -123,10 +123,10 @@ class NumberedReply:
         self.tape.answered(self.number, outcome)
 
 
-def arguments(turn: Turn, *args: Any) -> list[Any]:
-    """The arguments of a turn as a tape has them; the reply of a request is not among them."""
-    match turn, args:
-        case Turn.SUBMIT, (Request() as request, _):
+def _told(turn: Turn, *arguments: Any) -> list[Any]:
+    """The arguments of a turn as a tape has them."""
+    match turn, arguments:
+        case Turn.SUBMIT, (Request() as request,):
             return [protocol.encode_request(request, 0.0)]
         case Turn.REJECTED, (Rejection() as rejection, at, count):
             return [protocol.encode(Rejected(at or 0.0, count, rejection)), at is None]
@@ -135,7 +135,7 @@ def arguments(turn: Turn, *args: Any) -> list[Any]:
         case Turn.REPORT, (Event() as event,):
             return [protocol.encode(event)]
         case ((Turn.HALT | Turn.COUNT | Turn.LOOK), _):
-            return list(args)
+            return list(arguments)
         case _:
             return []
 
@@ -172,38 +172,40 @@ class RecordingTape(Tape):
         self._encode = msgspec.msgpack.Encoder().encode
         self._guard = Guard("note")
 
-    def run(
-        self, turn: Turn, act: Callable[_Args, _Result], /, *args: _Args.args, **options: _Args.kwargs
-    ) -> _Result:
+    def begin(self, turn: Turn, *arguments: object) -> AbstractContextManager[None]:
         within = self.notes
         if not self.is_on or (within is not None and turn in _OF_THE_CORE):
-            return act(*args, **options)
+            return UNHEARD
         try:
-            told = arguments(turn, *args)
+            told = _told(turn, *arguments)
         except Malformed:
             self.is_on = False
-            return act(*args, **options)
-        given: Any = args
+            return UNHEARD
         if turn is Turn.SUBMIT:
-            request, reply = given
-            self.count += 1
-            told.append(self.count)
-            self.replies[self.count] = reply
-            given = request, self.reply_of(self.count)
+            told.append(self.count + 1)
         if within is not None:
             within.append((Note.TURN, turn, told))
-            return act(*given, **options)
-        notes = self.notes = [turn, told]
-        try:
-            result = act(*given, **options)
-        except Exception as error:
+            return UNHEARD
+        self.notes = [turn, told]
+        return self
+
+    def heard(self, reply: Reply) -> Reply:
+        if not self.is_on:
+            return reply
+        self.count += 1
+        self.replies[self.count] = reply
+        return self.reply_of(self.count)
+
+    def __enter__(self) -> None:
+        """Nothing: the turn has begun."""
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        notes, self.notes = self.notes, None
+        if notes is None or (error and not isinstance(error, Exception)):
+            return
+        if error:
             notes.append((Note.FAULT, type(error).__name__))
-            self._end(notes)
-            raise
-        finally:
-            self.notes = None
         self._end(notes)
-        return result
 
     def _end(self, notes: Notes) -> None:
         try:

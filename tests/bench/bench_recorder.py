@@ -52,7 +52,8 @@ def turns_of(bus: TapedBus | Source, turns: Turns, now: RecordingTape, count: in
         now.now()
 
     for _ in range(count):
-        turns.run(Turn.TAKE_IN, take_in)
+        with turns.begin(Turn.TAKE_IN):
+            take_in()
 
 
 def bench_recording(tmp_path: Path) -> None:

@@ -129,9 +129,9 @@ class BusyView(LocalView):
         self._waiting: list[asyncio.Task[None]] = []
 
     def submit(self, request: Request, reply: Reply) -> None:
-        self._waiting.append(asyncio.create_task(self._submit(request, reply)))
+        self._waiting.append(asyncio.create_task(self._carry(request, reply)))
 
-    async def _submit(self, request: Request, reply: Reply) -> None:
+    async def _carry(self, request: Request, reply: Reply) -> None:
         async with self._lock:
             await asyncio.sleep(0.02)
             super().submit(request, reply)

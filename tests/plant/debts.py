@@ -60,7 +60,7 @@ class Debts:
         """NMT commands: when, which, to whom, and whether by the bridge."""
         self._owed: list[_Owed] = []
         self._disturbed_at = -inf
-        self._still_since = inf
+        self._still_since, self._went_on_at = inf, -inf
         self._ending_since = inf
         self._is_new = False
         self._ours_at = self._ours_since = -inf
@@ -78,7 +78,7 @@ class Debts:
         self._still_since = now
 
     def on_going_on(self, since: float, now: float) -> None:
-        self._still_since = inf
+        self._still_since, self._went_on_at = inf, now
         if now - since < _DEADMAN_S + 0.05 or not self.is_quiet():
             return
         for track in self._oracle.tracks.values():
@@ -217,8 +217,11 @@ class Debts:
         if at > self._ending_since + REACTION_S:
             self._oracle.wrong(at, f"{drive.path} is enabled by a service that ends")
         sign = self._signs.get(drive.node_id, at)
-        bound_s = drive.family.lost_after_ms / 1000 + REACTION_S
-        if at > sign + bound_s:
+        lost_at = sign + drive.family.lost_after_ms / 1000
+        # One that stood still then has not seen it, and its bursts go on.
+        stands_still = self._still_since < lost_at + REACTION_S
+        seen_at = self._still_since + _DEADMAN_S if stands_still else max(lost_at, self._went_on_at)
+        if at > seen_at + REACTION_S:
             self._oracle.wrong(at, f"{drive.path} is enabled, and its node is silent for {at - sign:.3f} s")
 
     def _first_frame(self, at: float) -> None:

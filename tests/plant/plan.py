@@ -68,7 +68,7 @@ KINDS: Final[dict[str, Draw]] = {
     "hang": lambda rng: (
         rng.randrange(5),
         _around(rng, PLANT.deadman_ms, 1000),
-        rng.choice(("in a turn", "in a round", "between turns")),
+        rng.choice(("in a turn", "in a round", "in a telegram", "between turns")),
     ),
     "kill": lambda rng: (0, rng.uniform(0.05, 4.0), rng.choice(("in a turn", "between turns"))),
     "bus off": lambda rng: (0, rng.uniform(0.02, 2.0), ""),

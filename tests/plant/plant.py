@@ -82,6 +82,8 @@ class Plant:
         self.answers = Answers(self.oracle, list(DRIVES))
         self.causes = Causes(self.oracle)
         self.debts = Debts(self.oracle)
+        self.before_telegram: Callable[[], None] = lambda: None
+        """Called once before the bridge's next turn with a controller's telegram."""
         self.answers.is_quiet = self.debts.is_quiet = self.is_quiet
         self.ways = Ways(self.oracle)
         self.outputs = Outputs(self.oracle)
@@ -160,6 +162,8 @@ class Plant:
 
     def _on_telegram(self, drive: Drive, word: int) -> None:
         self.oracle.telegram(drive, self.world.now, word)
+        before, self.before_telegram = self.before_telegram, lambda: None
+        before()
 
     def _on_answer(self, number: int, outcome: Outcome) -> None:
         self.world.tell(f"request {number} {outcome.code} {outcome.forwarded}")
@@ -305,10 +309,13 @@ class Plant:
             in_turn = step.how != "between turns"
             self.bridge.process.hang(step.seconds, in_turn=in_turn, skips=step.which)
 
-        if step.how == "in a round":
-            self.bridge.before_round = hang
-        else:
-            hang()
+        match step.how:
+            case "in a round":
+                self.bridge.before_round = hang
+            case "in a telegram":
+                self.before_telegram = hang
+            case _:
+                hang()
 
     def kill(self, step: Step) -> None:
         if not self.bridge.process.is_dead:

@@ -146,6 +146,16 @@ def test_a_lost_node_is_not_commanded_on(scene: Scene) -> None:
     assert "its node is silent" in scene.wrong()
 
 
+def test_a_bridge_that_stands_still_knows_of_no_lost_node_and_then_stops_it(scene: Scene) -> None:
+    scene.debts.on_still(1030.5)
+    scene.gets(1030.9, FAMILY.run)
+    scene.debts.on_going_on(1030.5, 1030.94)
+    scene.gets(1030.95, FAMILY.run)
+    assert not scene.wrong()
+    scene.gets(1031.1, FAMILY.run)
+    assert "its node is silent" in scene.wrong()
+
+
 def test_after_a_boot_up_its_controller_has_to_ask_anew(scene: Scene) -> None:
     scene.debts.frame(1030.1, HEARTBEAT, b"\0", "node")
     scene.gets(1030.4, FAMILY.run)

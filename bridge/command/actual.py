@@ -97,7 +97,7 @@ class ActualData:
         self._telling = [
             (place, one) for place, one in self._can_tell if f"actual/{self._process[place]}" not in unserved
         ]
-        self._of_sets = {in_set: self._compiled(in_set) for in_set in self._channel.meanings.sets}
+        self._of_sets.clear()
         self._use(self.words[0])
 
     @property
@@ -134,8 +134,12 @@ class ActualData:
         )
 
     def _use(self, status_word: int) -> None:
-        """Use the meanings of the parameter set that the status word tells."""
-        compiled = self._of_sets[self._set.of(status_word)]
+        """Use the meanings of the parameter set that the status word tells, compiled when it does so for the
+        first time."""
+        in_set = self._set.of(status_word)
+        compiled = self._of_sets.get(in_set)
+        if compiled is None:
+            compiled = self._of_sets[in_set] = self._compiled(in_set)
         self._plain, self._others, self._judged = compiled.plain, compiled.others, compiled.judged
         self._speed = compiled.speed
         self._shown = None

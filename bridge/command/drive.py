@@ -106,7 +106,7 @@ class Drive(WordTiming):
         carried = [(word, f"command/{word}") for word in family.carried(self.slot)[0][1:]]
         self._setpoints = [(self._place(leaf), words.index(word), leaf) for word, leaf in carried]
         self._commands = codecs(family, self.slot, "command", words, self.table.parameters)
-        self._commands_in = self._compiled_commands()
+        self._commands_in: dict[int, list[_Command]] = {}
         (self._control_word,) = places("command", ("control_word",))
         self._faults = places("status", ("fault_text",)) + places("supervision", ("last_fault_text",))
         self._supervision = places("status", _FAULT) + places("supervision", _SUPERVISION)
@@ -180,7 +180,7 @@ class Drive(WordTiming):
     def in_force(self) -> dict[str, InForce]:
         """Scaled commands that are served under the control word in force, by their names."""
         setpoints = self.channel.setpoints
-        commands = self._commands_in[self._set.of(self.channel.control_word)]
+        commands = self._commands_of(self._set.of(self.channel.control_word))
         return {
             one.codec.model.name: in_force(one.codec, setpoints)
             for one in commands
@@ -197,21 +197,27 @@ class Drive(WordTiming):
 
     def compile(self) -> None:
         """Take over the meanings of its words that have been read."""
-        self._commands_in = self._compiled_commands()
+        self._commands_in.clear()
         self._actual.compile()
 
-    def _compiled_commands(self) -> dict[int, list[_Command]]:
-        """Scaled commands in each parameter set."""
+    def _commands_of(self, in_set: int) -> list[_Command]:
+        """Scaled commands in this parameter set, compiled when it is used for the first time."""
+        found = self._commands_in.get(in_set)
+        if found is None:
+            found = self._commands_in[in_set] = self._compiled_commands(in_set)
+        return found
+
+    def _compiled_commands(self, in_set: int) -> list[_Command]:
         meanings, words = self.channel.meanings, self.family.process.rpdo[1:]
 
-        def compiled(codec: ValueCodec, in_set: int) -> _Command:
+        def compiled(codec: ValueCodec) -> _Command:
             found, lack = meanings.codec(codec, in_set)
             carried = [codec.model.leaf, *(f"command/{words[place]}" for place in found.places)]
             why = next((why for leaf in carried if (why := self.channel.unserved.get(leaf))), None)
             lack = Lack(Quality.CONFIG_ERROR, why) if why else lack
             return _Command(self._place(codec.model.leaf), found, lack)
 
-        return {in_set: [compiled(codec, in_set) for codec in self._commands] for in_set in meanings.sets}
+        return [compiled(codec) for codec in self._commands]
 
     def on_own_supervision(self, own: OwnJudgement, now: float) -> None:
         """Take over its own reaction to a silent bridge, as the boot-up has read it."""
@@ -347,7 +353,7 @@ class Drive(WordTiming):
             quality = Quality.CONFIG_ERROR if why else Quality.GOOD
             image.set(index, setpoints[place], now, quality, why or "")
         in_set = self._set.of(channel.control_word)
-        for point, codec, lack in self._commands_in[in_set]:
+        for point, codec, lack in self._commands_of(in_set):
             value = codec.from_words(setpoints)
             why = channel.doubts.why(codec.model.name, setpoints)
             why = why or channel.meanings.doubt(codec.model, in_set)

@@ -47,6 +47,23 @@ class MeaningNews:
         self.is_to_be_asked = False
         """Something has happened after which the words may mean something else."""
 
+    def on_boot_up(self, settings: Mapping[Key, float | None], now: float) -> None:
+        """Take over the settings of parameters, each in one of its sets, that a boot-up has read.
+
+        Those read for the first time are compiled once for all of them: the other nodes of a bus wait for
+        their frames meanwhile.
+        """
+        meanings = self._drive.channel.meanings
+        asked = meanings.conditions.has_been_asked
+        first = [key for key in settings if not asked(meanings.conditions.key(*key))]
+        for name, in_set in first:
+            meanings.on_parameter(name, settings[name, in_set], in_set)
+        if first:
+            self._drive.compile()
+            self._drive.refresh(now)
+        for (name, in_set), setting in settings.items():
+            self.on_parameter(name, setting, now, in_set)
+
     def on_parameter(self, name: str, setting: float | None, now: float, in_set: int = 1) -> None:
         """Take over the setting of a parameter that decides the meaning of words, in the parameter's unit;
         None where the drive refuses to tell it."""

@@ -258,8 +258,7 @@ def connect(
         facts = result.words[drive.name]
         if drive.on_codes(facts.codes, facts.why_unread):
             drive.channel.start_anew(now)
-        for (name, in_set), setting in facts.parameters.items():
-            drive.news.on_parameter(name, setting, now, in_set)
+        drive.news.on_boot_up(facts.parameters, now)
         result.notes += [_of(drive, what) for what in drive.channel.meanings.unknown()]
         plan = result.drives[drive.name]
         if not plan.rpdos or not plan.tpdos or plan.problem:

@@ -34,6 +34,30 @@ def test_what_is_read_for_the_first_time_is_no_news(case: Case) -> None:
     assert case.told() == []
 
 
+def test_a_boot_up_says_what_its_parameters_say_one_by_one_and_compiles_once(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = {("P105", 1): 50.0, ("P105", 2): 60.0, ("P112", 1): 401.0}
+    other = Case()
+    for (name, in_set), setting in settings.items():
+        other.news.on_parameter(name, setting, 10.0, in_set)
+    compiled: list[float] = []
+    monkeypatch.setattr(case.drive, "compile", lambda compile=case.drive.compile: compiled.append(compile()))
+    case.news.on_boot_up(settings, 10.0)
+    assert len(compiled) == 1
+    assert case.told() == other.told() == []
+    assert list(case.plant.image) == list(other.plant.image)
+    case.news.on_boot_up(settings, 11.0)
+    assert len(compiled) == 1
+
+
+def test_a_boot_up_that_finds_another_scale_than_before_tells_it(case: Case) -> None:
+    case.news.on_boot_up({("P105", 1): 50.0}, 10.0)
+    case.news.on_boot_up({("P105", 1): 60.0, ("P112", 1): 401.0}, 11.0)
+    (message,) = case.told()
+    assert message.startswith("P105 of parameter set 1 is 60, it was 50: ")
+
+
 def test_a_scale_that_has_changed_is_told_with_both_and_with_what_it_is_for(case: Case) -> None:
     case.news.on_parameter("P105", 50.0, 10.0)
     case.news.on_parameter("P105", 50.0, 11.0)

@@ -49,17 +49,21 @@ class PointsChanged(OperationFailed):
 class MirrorClient:
     """The plant as ``front`` sees it; satisfies ``bridge.northbound.view.View``.
 
-    Times in the image and in events are seconds since 1970 UTC; ``clock`` is the machine's monotonic clock,
-    which is that of the bus process, too.
+    Times in the image and in events are seconds since 1970 UTC, as ``wall_clock`` tells; ``clock`` is the
+    machine's monotonic clock, which is that of the bus process, too.
     """
 
     def __init__(
-        self, endpoint: str, clock: Callable[[], float] = time.monotonic, front: str = "front"
+        self,
+        endpoint: str,
+        clock: Callable[[], float] = time.monotonic,
+        front: str = "front",
+        wall_clock: Callable[[], float] = time.time,
     ) -> None:
         self.gaps = 0
         """Deltas that were missed."""
         self.malformed = 0
-        self._clock = clock
+        self._clock, self._wall_clock = clock, wall_clock
         self._endpoint = endpoint
         self._request_key = protocol.key_of(protocol.REQUESTS, front)
         self._connection_key = protocol.key_of(protocol.CONNECTIONS, front)
@@ -357,7 +361,7 @@ class MirrorClient:
         self._pending.clear()
         _log.warning("mirror: %s", UNREACHABLE)
         everything = range(len(self.image.points))
-        self.image.judge(everything, Quality.DEAD, time.time(), UNREACHABLE)
+        self.image.judge(everything, Quality.DEAD, self._wall_clock(), UNREACHABLE)
         self._tell_waiting()
 
     def _on_token(self, _: str, is_alive: bool) -> None:

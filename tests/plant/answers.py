@@ -25,6 +25,10 @@ _FOLLOWED: Final = 2
 _STOPS: Final = ("stop", "quick_stop", "disable_voltage")
 
 
+Asking = tuple[str, int]
+"""A request by the front that it came to, empty for the bus process itself, and its number there."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Asked:
     """A request whose answer is still to come."""
@@ -55,7 +59,7 @@ class Answers:
     def __init__(self, oracle: Oracle, drives: list[Drive]) -> None:
         self._oracle = oracle
         self._drives = {drive.path: drive for drive in drives}
-        self._asked: dict[int, _Asked] = {}
+        self._asked: dict[Asking, _Asked] = {}
         self._claims: list[_Claim] = []
         self._disturbed_at = -inf
         """When the bridge last stood still, ended, or lost its bus."""
@@ -69,17 +73,32 @@ class Answers:
         self._disturbed_at = at
 
     def ended(self, at: float) -> None:
-        """The bridge is gone, and with it the answers that it owed."""
-        self._asked.clear()
+        """The bus process is gone, and with it the answers that it owed; a front answers for itself."""
+        self._asked = {asking: asked for asking, asked in self._asked.items() if asking[0]}
         self.disturbed(at)
 
-    def asked(self, number: int, request: Request, at: float) -> None:
-        self._asked[number] = _Asked(request, at)
+    def asked(self, asking: Asking, request: Request, at: float) -> None:
+        self._asked[asking] = _Asked(request, at)
 
-    def answered(self, number: int, outcome: Outcome, at: float) -> None:
-        asked = self._asked.pop(number, None)
+    def lost(self, asking: Asking) -> None:
+        """Who asked has lost its connection: nobody owes it an answer."""
+        self._asked.pop(asking, None)
+
+    def shown(
+        self, target: str, written: object, in_front: float | None, in_bridge: float | None, at: float
+    ) -> None:
+        """What the control word of a drive is in a front and in the bus process, as a telegram that wrote one
+        is answered well."""
+        self._oracle.looks += 1
+        if in_front not in (None, written) and in_bridge == written:
+            self._oracle.wrong(
+                at, f"{target}: {written} was written, and its front shows {in_front} after the answer"
+            )
+
+    def answered(self, asking: Asking, outcome: Outcome, at: float) -> None:
+        asked = self._asked.pop(asking, None)
         if asked is None:
-            self._oracle.wrong(at, f"request {number} is answered twice: {outcome.code}")
+            self._oracle.wrong(at, f"request {asking} is answered twice: {outcome.code}")
             return
         drive = self._drives.get(asked.request.target)
         if drive is None:
@@ -120,9 +139,9 @@ class Answers:
         """Judge what is due by ``now``; a bridge that stands still owes nothing."""
         if is_still:
             self._disturbed_at = now
-        for number, asked in list(self._asked.items()):
+        for asking, asked in list(self._asked.items()):
             if now - max(asked.came, self._disturbed_at) > _ANSWER_S:
-                del self._asked[number]
+                del self._asked[asking]
                 self._oracle.wrong(now, f"{asked.request} has no answer for {_ANSWER_S:.0f} s")
         due = [claim for claim in self._claims if claim.due <= now]
         self._claims = [claim for claim in self._claims if claim.due > now]

@@ -7,7 +7,9 @@ import asyncio
 import inspect
 from collections.abc import Callable, Coroutine, Mapping
 from functools import partial
+from pathlib import Path
 from random import Random
+from typing import cast
 
 from bridge.can import Bus
 from bridge.catalogue import Catalogue
@@ -18,14 +20,36 @@ from bridge.lint.own import WorstCase
 from bridge.master.master import Master
 from bridge.master.network import Network
 from bridge.master.standby import Standby, listen_s
+from bridge.mirror import MirrorPublisher, socket_endpoint
 from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
 from bridge.project import Project
 from bridge.recorder.tape import Note, RecordingTape, TapedBus
+from bridge.zenohlink import ZenohLink
 from tests.plant.machine import Process, Watcher
+from tests.plant.meeting import Link, Meeting
 from tests.plant.stream import Stream
 from tests.plant.wire import PlantBus, Wire
 from tests.plant.world import Timer, World
+
+
+class _Publisher(MirrorPublisher):
+    """The real one, over the plant's socket."""
+
+    def __init__(self, link: Link, view: PlantView, endpoint: str, clock: Callable[[], float]) -> None:
+        self._link_of_plant = link
+        super().__init__(view, endpoint, clock)
+
+    def _new_link(self) -> ZenohLink:
+        return cast("ZenohLink", self._link_of_plant)
+
+
+def socket_of(project: Project) -> str:
+    """The endpoint of this plant's socket, of which there is no more than a file."""
+    site = project.site.site
+    endpoint = socket_endpoint(Path(site.runtime_dir), site.name)
+    Path(endpoint.partition("/")[2]).touch()
+    return endpoint
 
 
 class Bridge:
@@ -39,8 +63,12 @@ class Bridge:
         name: str,
         rng: Random,
         records: Callable[[bytes], None] | None = None,
+        meeting: Meeting | None = None,
     ) -> None:
+        """``meeting``: where it meets its fronts."""
         self._world = world
+        self._meeting = meeting
+        self._link: Link | None = None
         self._project = project
         self._catalogue = Catalogue.of(project.site, project.families)
         self._worst_cases: list[WorstCase] = list(
@@ -113,6 +141,7 @@ class Bridge:
         if self._project.site.modbus:
             units = units_of(self._catalogue)
             self.modbus = ModbusServer(self.view, units, self._project.site.modbus, process.clock)
+        self._link = self._meeting.link(process) if self._meeting else None
         process.post(self._start)
         return process
 
@@ -122,6 +151,9 @@ class Bridge:
             commanded[case.drive].on_wire(case.wire, self._world.now)
         if self.modbus:
             self.modbus.pulse.start()
+        if self._link:
+            publisher = _Publisher(self._link, self.view, socket_of(self._project), self.process.clock)
+            self.process.loop.create_task(publisher.start())
         for bus in self._buses:
             bus.open(self.master.on_bus)
         self.master.attach(self._arm)
@@ -157,6 +189,8 @@ class Bridge:
             self._timer.cancel()
         for bus in self._buses:
             bus.end_kernel()
+        if self._link:
+            self._link.drop()
         streams, self._streams = self._streams, []
         for stream in streams:
             stream.close()

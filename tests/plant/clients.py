@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Protocol
 
 from bridge.command import Action, Identity, Outcome, Request, Source, Write, command_of
 from tests.plant.bridge_process import Bridge
@@ -40,6 +40,24 @@ Arrived = Callable[[Drive, int], None]
 Refused = Callable[[Drive, int, float, int], None]
 """Called with the setpoint of a telegram that was to enable, when it was sent, and the exception that it
 got."""
+
+
+class Door(Protocol):
+    """Where clients of OPC UA and zenoh ask: the bus process, or a front."""
+
+    on_start: list[Callable[[], None]]
+
+    def ask(
+        self,
+        request: Request,
+        delay_s: float,
+        arrived: Callable[[], None],
+        reply: Callable[[Outcome], None],
+    ) -> None: ...
+
+    def connected(self, identity: Identity, *, is_there: bool) -> None: ...
+
+    def good_number(self, name: str) -> float | None: ...
 
 
 class Line:
@@ -123,8 +141,9 @@ class Controller:
     and looks whether the drive moves."""
 
     def __init__(
-        self, world: World, bridge: Bridge, drive: Drive, arrived: Arrived, refused: Refused
+        self, world: World, bridge: Bridge, door: Door, drive: Drive, arrived: Arrived, refused: Refused
     ) -> None:
+        """``door`` is where its requests go that are not of Modbus."""
         self.drive = drive
         self.period_s = PLANT.owner_period_s
         self.is_silent = False
@@ -140,7 +159,7 @@ class Controller:
         self.is_invalid = False
         """Its words lack "control data valid"."""
         self._world = world
-        self._bridge = bridge
+        self._door = door
         self._arrived = arrived
         self._refused = refused
         self._number = 0
@@ -152,7 +171,7 @@ class Controller:
             self.line = Line(world, bridge, f"127.0.1.{10 + drive.place}", self._on_bytes)
             self.line.connect()
         else:
-            bridge.on_start.append(self._connected)
+            door.on_start.append(self._connected)
         world.after(drive.place * 0.013, self._cycle)
 
     @property
@@ -162,7 +181,7 @@ class Controller:
         return Identity(_SOURCES[self.drive.protocol], name, connection=f"session {self.drive.place}")
 
     def _connected(self) -> None:
-        self._bridge.connected(self.identity, is_there=True)
+        self._door.connected(self.identity, is_there=True)
 
     # the program
 
@@ -190,7 +209,7 @@ class Controller:
 
     def _do(self, action: Action, word: int) -> None:
         request = Request(self.identity, self.drive.path, command_of(action))
-        self._bridge.ask(request, _DELAY_S, lambda: self._arrived(self.drive, word), self._on_outcome)
+        self._door.ask(request, _DELAY_S, lambda: self._arrived(self.drive, word), self._on_outcome)
 
     def _word(self) -> int:
         family = self.drive.family
@@ -212,7 +231,7 @@ class Controller:
             self.line.ask(self.drive.unit, writes(_ACKNOWLEDGE, 1))
             return
         request = Request(self.identity, self.drive.path, command_of(Action.RESET_FAULT))
-        self._bridge.ask(request, _DELAY_S, lambda: None, lambda outcome: None)
+        self._door.ask(request, _DELAY_S, lambda: None, lambda outcome: None)
 
     def _write(self, word: int) -> None:
         self._number = (self._number + 1) % NUMBERS
@@ -230,7 +249,7 @@ class Controller:
             return
         values = {"control_word": word, "setpoint_1": setpoint}
         request = Request(self.identity, self.drive.path, Write(values))
-        self._bridge.ask(request, _DELAY_S, lambda: self._on_telegram(word), self._on_outcome)
+        self._door.ask(request, _DELAY_S, lambda: self._on_telegram(word), self._on_outcome)
 
     def _on_bytes(self, data: bytes) -> None:
         """Telegrams among what reaches the bridge's machine."""
@@ -250,7 +269,7 @@ class Controller:
         self._moves = not pdu[0] & _EXCEPTION and self._enabled(struct.unpack_from(">H", pdu, 2)[0])
 
     def _on_outcome(self, outcome: Outcome) -> None:
-        word = self._bridge.good_number(f"{self.drive.path}/status/drive_status_word")
+        word = self._door.good_number(f"{self.drive.path}/status/drive_status_word")
         self._moves = word is not None and self._enabled(int(word))
 
     def _enabled(self, word: int) -> bool:
@@ -284,7 +303,7 @@ class Controller:
             )
             return
         request = Request(self.identity, self.drive.path, command_of(Action.RELEASE_CONTROL))
-        self._bridge.ask(
+        self._door.ask(
             request, _DELAY_S, lambda: None, lambda outcome: released(came) if outcome.ok else None
         )
 
@@ -294,7 +313,7 @@ class Controller:
         if self.line is not None:
             self.line.leave()
         else:
-            self._bridge.connected(self.identity, is_there=False)
+            self._door.connected(self.identity, is_there=False)
 
     def start(self) -> None:
         """The program goes on, or a new one begins."""

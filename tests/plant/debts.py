@@ -111,7 +111,8 @@ class Debts:
         gets nothing even then: a trip outlasts it."""
         since = self._ending_since
         for track in self._oracle.tracks.values():
-            is_told = any(when >= since for when in track.stops) or _is_silenced(track, at)
+            # One whose owner has just stopped it has been told.
+            is_told = any(when > track.enabled_at for when in track.stops) or _is_silenced(track, at)
             if track.enabled_at > since - _JUST_S and self.is_quiet() and self._disturbed_at < since - 1.0:
                 self._oracle.looks += 1
                 if not (is_told or self._was_halted(track.drive.node_id, since)):

@@ -51,6 +51,7 @@ _STRANGERS: Final[tuple[Group, ...]] = (
 LEANS: Final[dict[str, tuple[Group, ...]]] = {
     "network cut": (("half open",), ("half open", "hang"), ("controller crashed",)),
     "client writes ahead and hangs": (("backlog",), ("backlog", "controller silent"), ("backlog", "hang")),
+    "OPC UA front stopped": (("front hangs",), ("front hangs", "hang"), ("front killed",)),
     "bus process paused": (("hang",), ("hang", "hang"), ("hang", "controller silent")),
     "bus process stopped as it sends": (("hang",), ("hang", "hang"), ("hang", "box slow")),
     "bus process stopped": _DEAD,

@@ -5,15 +5,19 @@ from __future__ import annotations
 
 import asyncio
 import contextvars
+import inspect
 import traceback
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from functools import partial
 from math import inf
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, TypeVar, cast
 
 from bridge.master.standstill import SignalAlarm
 from tests.plant.world import Act, World
+
+_Result = TypeVar("_Result")
 
 LOOK_S: Final = 0.000_04
 """Time that passes from one look at the clock to the next: a turn takes as long as it has looks."""
@@ -173,6 +177,7 @@ class Process:
             return
         self.is_dead = True
         self._waiting.clear()
+        self.loop.end()
         self._watcher.on_end(self._world.now)
 
 
@@ -180,9 +185,14 @@ class _Handle(asyncio.TimerHandle):
     """A turn that is to come."""
 
     def __init__(
-        self, when: float, call: Callable[..., object], args: tuple[Any, ...], loop: ProcessLoop
+        self,
+        when: float,
+        call: Callable[..., object],
+        args: tuple[Any, ...],
+        loop: ProcessLoop,
+        context: contextvars.Context | None,
     ) -> None:
-        self._act = partial(contextvars.copy_context().run, call, *args)
+        self._act = partial((context or contextvars.copy_context()).run, call, *args)
         super().__init__(when, call, args, loop)
 
     def run(self) -> None:
@@ -199,6 +209,7 @@ class ProcessLoop(asyncio.AbstractEventLoop):
         self._process = process
         self._world = world
         self._faults = faults
+        self._tasks: list[asyncio.Task[Any]] = []
 
     def time(self) -> float:
         return self._world.now
@@ -215,7 +226,7 @@ class ProcessLoop(asyncio.AbstractEventLoop):
     def call_soon(  # type: ignore[override]
         self, callback: Callable[..., object], *args: Any, context: contextvars.Context | None = None
     ) -> asyncio.TimerHandle:
-        return self.call_at(self._world.now, callback, *args)
+        return self.call_at(self._world.now, callback, *args, context=context)
 
     def call_later(  # type: ignore[override]
         self,
@@ -224,7 +235,7 @@ class ProcessLoop(asyncio.AbstractEventLoop):
         *args: Any,
         context: contextvars.Context | None = None,
     ) -> asyncio.TimerHandle:
-        return self.call_at(self._world.now + delay, callback, *args)
+        return self.call_at(self._world.now + delay, callback, *args, context=context)
 
     def call_at(  # type: ignore[override]
         self,
@@ -233,9 +244,28 @@ class ProcessLoop(asyncio.AbstractEventLoop):
         *args: Any,
         context: contextvars.Context | None = None,
     ) -> asyncio.TimerHandle:
-        handle = _Handle(when, callback, args, self)
+        handle = _Handle(when, callback, args, self, context)
         self._world.at(when, lambda: self._process.post(handle.run))
         return handle
+
+    def create_task(  # type: ignore[override]
+        self, coro: Coroutine[Any, Any, _Result], **options: Any
+    ) -> asyncio.Task[_Result]:
+        task = asyncio.Task(coro, loop=self, **options)
+        self._tasks = [*(one for one in self._tasks if not one.done()), task]
+        return task
+
+    def end(self) -> None:
+        """Nothing of its tasks is left."""
+        tasks, self._tasks = self._tasks, []
+        for task in tasks:
+            coro = cast("Coroutine[Any, Any, Any]", task.get_coro())
+            if inspect.getcoroutinestate(coro) == inspect.CORO_CREATED:
+                coro.close()
+            # A group of tasks waits for its tasks first, and then no more.
+            with suppress(BaseException):
+                while inspect.getcoroutinestate(coro) == inspect.CORO_SUSPENDED:
+                    coro.throw(DeadError)
 
     def create_future(self) -> asyncio.Future[Any]:
         return asyncio.Future(loop=self)
@@ -244,4 +274,6 @@ class ProcessLoop(asyncio.AbstractEventLoop):
         """A turn that was cancelled does nothing."""
 
     def call_exception_handler(self, context: dict[str, Any]) -> None:
-        self._faults.append(f"{context.get('message')}: {context.get('exception')!r}")
+        # With a process its tasks end, wherever they are.
+        if not self._process.is_dead:
+            self._faults.append(f"{context.get('message')}: {context.get('exception')!r}")

@@ -27,7 +27,6 @@ ELSEWHERE: Final = {
     "bursts outlive a bus-off": "the fault is in what the plant has a model of: the SocketCAN adapter",
     "bursts outlive an interface that is down": "the same",
     "a terminal that is closed": "no plant has signals",
-    "the mirror renews": "no plant has a front in a process of its own",
 }
 """Mutants that no plant can find, and why."""
 _HALVES: Final = ("first", "second")
@@ -59,6 +58,7 @@ _RULES: Final = (
     ("good is true", "is said to be good"),
     ("it stops by itself", "still runs"),
     ("answers are true", "', and "),
+    ("answers are true", "its front shows"),
     ("followed is true", "followed, and"),
     ("causes are told", "no event says so"),
     ("one answer", "has no answer"),

@@ -345,11 +345,12 @@ class Oracle:
                 at, f"{drive.path} is enabled, and its controller has not asked for it since {track.why}"
             )
 
-    def value(self, drive: Drive, at: float, word: int) -> None:
-        """The bridge says that this is the drive's status word, and that it is good."""
+    def value(self, drive: Drive, at: float, word: int, older_s: float = 0.0) -> None:
+        """The bridge says that this is the drive's status word, and that it is good; by ``older_s`` it may be
+        older than in the bus process."""
         self.looks += 1
         track = self.tracks[drive]
-        if not track.has_said(word, at - _AGE_S):
+        if not track.has_said(word, at - _AGE_S - older_s):
             last = (
                 f"{track.said[-1][1]:04X} {(at - track.said[-1][0]) * 1000:.0f} ms ago"
                 if track.said

@@ -71,6 +71,12 @@ KINDS: Final[dict[str, Draw]] = {
         rng.choice(("in a turn", "in a round", "in a telegram", "between turns")),
     ),
     "kill": lambda rng: (0, rng.uniform(0.05, 4.0), rng.choice(("in a turn", "between turns"))),
+    "front hangs": lambda rng: (
+        0,
+        _around(rng, PLANT.fieldbus_timeout_ms, 1000, 5000),
+        rng.choice(("in a turn", "between turns")),
+    ),
+    "front killed": lambda rng: (0, rng.uniform(0.05, 4.0), ""),
     "bus off": lambda rng: (0, rng.uniform(0.02, 2.0), ""),
     "bus cut": lambda rng: (0, _around(rng, PLANT.heartbeat_ms, 3000), ""),
     "noise": lambda rng: (0, rng.uniform(0.5, 5.0), rng.choice(("0.01", "0.1", "0.5"))),

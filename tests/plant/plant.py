@@ -12,7 +12,7 @@ from typing import Final
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.cli.simulation import simulated_nodes
-from bridge.command import EventKind, Outcome
+from bridge.command import EventKind, Outcome, Request, Write
 from bridge.project import Project, load_project
 from tests.plant.answers import Answers
 from tests.plant.bridge_process import Bridge
@@ -21,6 +21,8 @@ from tests.plant.clients import Controller, Operator, Stranger
 from tests.plant.debts import Debts
 from tests.plant.deeds import CALM, MORE
 from tests.plant.field import FieldNode
+from tests.plant.front import Front
+from tests.plant.meeting import Meeting
 from tests.plant.oracle import Oracle
 from tests.plant.outputs import Outputs, stop_outputs
 from tests.plant.plan import Plan, Step
@@ -35,6 +37,9 @@ _LOOK_S: Final = 0.25
 _SECOND: Final = "bridge two"
 _ROUND_S: Final = 0.05
 _QUIET_S: Final = 1.0
+_MIRROR_S: Final = 1.3
+"""By so much a value may be older in a front: after a second without news, and a look each 0.1 s, it says
+that the bus process is gone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,16 +100,31 @@ class Plant:
         self.nodes = [
             FieldNode(self.world, self.wire, device) for device in simulated_nodes(table, project.path)
         ]
-        self.bridge = Bridge(
-            self.world, project, {table.name: self.wire}, "one", Random(f"{plan.seed} bridge"), records
+        meeting = Meeting(self.world)
+        chance = Random(f"{plan.seed} bridge")
+        self.bridge = Bridge(self.world, project, {table.name: self.wire}, "one", chance, records, meeting)
+        self.front = Front(self.world, meeting, "opcua", self.bridge.faults)
+        self.front.on_request.append(
+            lambda number, asked: self.answers.asked(("opcua", number), asked, self.world.now)
         )
+        self.front.on_answer.append(self._on_fronts_answer)
+        self.front.on_lost.append(lambda number: self.answers.lost(("opcua", number)))
         self.bridge.on_start.append(self._on_start)
         self.bridge.on_event.append(lambda event: self.causes.told(event, self.world.now))
         self.bridge.watchers += [self.oracle, self.debts, self]
-        self.bridge.on_request.append(lambda number, asked: self.answers.asked(number, asked, self.world.now))
+        self.bridge.on_request.append(
+            lambda number, asked: self.answers.asked(("", number), asked, self.world.now)
+        )
         self.bridge.on_answer.append(lambda number, outcome: self._on_answer(number, outcome))
         self.controllers = [
-            Controller(self.world, self.bridge, drive, self._on_telegram, self._on_refused)
+            Controller(
+                self.world,
+                self.bridge,
+                self.front if drive.protocol == "opcua" else self.bridge,
+                drive,
+                self._on_telegram,
+                self._on_refused,
+            )
             for drive in DRIVES
         ]
         self._last_stops: dict[Drive, float | None] = dict.fromkeys(DRIVES)
@@ -126,6 +146,7 @@ class Plant:
         end = BEGIN_S + self.plan.seconds
         while self.world.now < end and not (to_first and (self.oracle.violations or self.bridge.faults)):
             self.world.run_until(min(end, self.world.now + _LOOK_S) if to_first else end)
+        self.front.end()
         return Result(
             self.plan,
             self.oracle.violations + self.bridge.faults,
@@ -165,9 +186,17 @@ class Plant:
         before, self.before_telegram = self.before_telegram, lambda: None
         before()
 
+    def _on_fronts_answer(self, number: int, asked: Request, outcome: Outcome) -> None:
+        self.world.tell(f"request {number} of the front {outcome.code} {outcome.forwarded}")
+        self.answers.answered(("opcua", number), outcome, self.world.now)
+        name = f"{asked.target}/command/control_word"
+        if outcome.ok and isinstance(asked.command, Write):
+            shown = self.front.good_number(name), self.bridge.good_number(name)
+            self.answers.shown(asked.target, asked.command.values["control_word"], *shown, self.world.now)
+
     def _on_answer(self, number: int, outcome: Outcome) -> None:
         self.world.tell(f"request {number} {outcome.code} {outcome.forwarded}")
-        self.answers.answered(number, outcome, self.world.now)
+        self.answers.answered(("", number), outcome, self.world.now)
 
     def _on_refused(self, drive: Drive, setpoint: int, sent: float, code: int) -> None:
         self.answers.refused(drive, setpoint, sent, self.world.now, code)
@@ -222,9 +251,12 @@ class Plant:
                 self.bridge.good_number(f"{at}/worst_case_stop_ms"),
                 self.bridge.good_number(f"{at}/worst_case_bridge_ms"),
             )
-            word = self.bridge.good_number(f"{drive.path}/status/drive_status_word")
+            name = f"{drive.path}/status/drive_status_word"
+            word, mirrored = self.bridge.good_number(name), self.front.good_number(name)
             if word is not None:
                 self.oracle.value(drive, now, int(word))
+            if mirrored is not None:
+                self.oracle.value(drive, now, int(mirrored), _MIRROR_S)
             said = self.bridge.good_number(f"{at}/last_stop")
             self.answers.last_stop(drive, now, self._last_stops[drive], said)
             self._last_stops[drive] = said
@@ -317,6 +349,15 @@ class Plant:
             case _:
                 hang()
 
+    def hang_front(self, step: Step) -> None:
+        self.front.process.hang(step.seconds, in_turn=step.how == "in a turn")
+
+    def kill_front(self, step: Step) -> None:
+        process = self.front.process
+        if not process.is_dead:
+            process.kill(in_turn=False)
+            self.world.after(step.seconds, self.front.start)
+
     def kill(self, step: Step) -> None:
         if not self.bridge.process.is_dead:
             self.down_s = step.seconds
@@ -373,6 +414,8 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "stranger": Plant.stranger,
     "hang": Plant.hang,
     "kill": Plant.kill,
+    "front hangs": Plant.hang_front,
+    "front killed": Plant.kill_front,
     "bus off": Plant.bus_off,
     "bus cut": Plant.cut,
     "noise": Plant.noise,

@@ -26,10 +26,10 @@ class Scene:
     def asks(self, command: Action | None = None, at: float = 1010.0) -> None:
         values = {"control_word": FAMILY.run, "setpoint_1": SETPOINT}
         asked = command_of(command) if command else Write(values)
-        self.answers.asked(1, Request(WHO, DRIVE.path, asked), at)
+        self.answers.asked(("", 1), Request(WHO, DRIVE.path, asked), at)
 
     def is_answered(self, outcome: Outcome, at: float = 1010.01) -> None:
-        self.answers.answered(1, outcome, at)
+        self.answers.answered(("", 1), outcome, at)
 
     def sees(self, at: float, word: int, setpoint: int = SETPOINT) -> None:
         data = word.to_bytes(FAMILY.control_bytes, "little") + setpoint.to_bytes(2, "little")

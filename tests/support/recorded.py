@@ -35,7 +35,7 @@ class RecordedPlant:
         return checkpoint.save((bridge.master, bridge.view, bridge.plant))
 
     def record(self, seconds: float) -> Segment:
-        """A segment of this length from now on."""
+        """A segment of this length from now on, the last that happens."""
         bridge, world = self.plant.bridge, self.plant.world
         assert bridge.tape
         buses = {bus.name: list(bus.facts()) for bus in bridge.taped}
@@ -45,4 +45,5 @@ class RecordedPlant:
         tape.is_on = True
         world.run_until(world.now + seconds)
         tape.is_on = False
+        self.plant.front.end()
         return Segment(header, state, list(self._turns))

@@ -28,6 +28,8 @@ _BOOT_UP, _STOPPED = 0x00, 0x04
 """NMT states in a heartbeat (CiA 301 §7.2.8.3.2.2)."""
 _UNSEEN_S: Final = 1.0
 """Time in seconds within which an enabled drive gets its next RPDO."""
+_WAITED_S: Final = 0.1
+"""Longest time in seconds for which a TPDO may have waited for the bus."""
 BLIND_S: Final = 5.0
 """Time in seconds without a reading after which the witness reports that it sees nothing of the owner."""
 
@@ -106,6 +108,8 @@ class BusJudge:
     # what comes
 
     def on_frame(self, can_id: int, data: bytes, at: float) -> None:
+        if can_id > 0x700 and data[:1] == b"\0":
+            self._services.on_restart(can_id - 0x700)
         if (track := self._by_rpdo.get(can_id)) is not None:
             self._on_rpdo(track, data, at)
         elif (track := self._by_tpdo.get(can_id)) is not None:
@@ -197,7 +201,9 @@ class BusJudge:
             return
         was_enabled, track.is_enabled = track.is_enabled, enabled
         track.tpdo_at = at
-        track.taken_out_at = track.taken_out_at if enabled else None
+        if track.taken_out_at is not None and (not enabled or at > track.taken_out_at + _WAITED_S):
+            # Its node is back in operation: what it says counts again.
+            track.taken_out_at = None
         track.told.discard(AlarmKind.UNHEARD)
         self._on_speed(track, data, at)
         if enabled and not was_enabled:

@@ -22,6 +22,7 @@ from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
 from bridge.project import Project
 from bridge.recorder.tape import Note, RecordingTape, TapedBus
+from bridge.service.plant_condition import LOOK_EVERY_S, PlantCondition
 from tests.plant.machine import Process, Watcher
 from tests.plant.stream import Stream
 from tests.plant.wire import PlantBus, Wire
@@ -109,6 +110,7 @@ class Bridge:
         ]
         self.master = Master(list(zip(buses, networks, strict=True)), self.plant, clock, alarm=process.alarm)
         self.view = PlantView(self.plant, clock, world.epoch_ns, self.master.carry_out, self.master.wake)
+        self.condition = PlantCondition(self.plant, process.clock, world.epoch_ns)
         self.modbus = None
         if self._project.site.modbus:
             units = units_of(self._catalogue)
@@ -126,9 +128,16 @@ class Bridge:
             bus.open(self.master.on_bus)
         self.master.attach(self._arm)
         self.master.wake()
+        self._judge()
         self.starts, self.started_at = self.starts + 1, self._world.now
         for tell in self.on_start:
             tell()
+
+    def _judge(self) -> None:
+        """Judge the condition of the plant, again and again, as ``PlantCondition.run`` does."""
+        self.condition.look()
+        process = self.process
+        self._world.after(LOOK_EVERY_S, lambda: process.post(self._judge))
 
     def _arm(self, at: float) -> None:
         if self._timer is not None:

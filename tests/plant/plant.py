@@ -26,6 +26,8 @@ from tests.plant.outputs import Outputs, stop_outputs
 from tests.plant.plan import Plan, Step
 from tests.plant.ways import Ways
 from tests.plant.wire import Port, Wire
+from tests.plant.witness import Witness
+from tests.plant.witnessed import Witnessed
 from tests.plant.world import BEGIN_S, World
 from tests.proof.block import BLOCK
 from tests.proof.drives import DRIVES, Drive, write_site
@@ -82,9 +84,11 @@ class Plant:
         self.answers = Answers(self.oracle, list(DRIVES))
         self.causes = Causes(self.oracle)
         self.debts = Debts(self.oracle)
-        self.answers.is_quiet = self.debts.is_quiet = self.is_quiet
         self.ways = Ways(self.oracle)
         self.outputs = Outputs(self.oracle)
+        self.witnessed = Witnessed(self.oracle, table.name)
+        Witness(self.world, self.wire, project, self.witnessed)
+        self.answers.is_quiet = self.debts.is_quiet = self.witnessed.is_quiet = self.is_quiet
         self.has_outputs = False
         """Whether the outputs have an owner."""
         self.oracle.on_trip = self._on_trip
@@ -146,6 +150,7 @@ class Plant:
     def _on_frame(self, frame: Frame, sender: Port) -> None:
         of_bridge = sender.name.startswith("bridge")
         self.world.tell_frame(sender.name, frame)
+        self.witnessed.sender = sender.name
         if sender.name == _SECOND:
             self.oracle.frame_of_other(frame.time, frame.can_id, frame.data)
             self.debts.frame_of_other(frame.time, frame.can_id)

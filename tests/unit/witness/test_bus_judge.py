@@ -352,6 +352,28 @@ def test_a_drive_whose_node_is_stopped_while_it_is_enabled_may_run_on() -> None:
     assert plant.kinds == [AlarmKind.UNHEARD]
 
 
+def test_a_node_that_has_restarted_may_be_asked_anew() -> None:
+    plant = heard()
+    question = 0x605, bytes.fromhex("40 00 10 00 00 00 00 00")
+    for frame in (question, (HEARTBEAT, b"\0"), question):
+        plant.watch.on_frame(*frame, plant.now)
+    plant.run(0.1)
+    assert not plant.alarms
+
+
+def test_who_is_back_in_operation_is_heard_though_it_is_enabled() -> None:
+    plant = heard()
+    plant.watch.on_frame(NMT, b"\x80\x05", plant.now)
+    plant.watch.take_findings()
+    # One TPDO waited for the bus, and says nothing of the node's state.
+    plant.run(0.01)
+    plant.tpdo = None
+    plant.run(0.5)
+    plant.tpdo = ENABLED
+    plant.run(6.0)
+    assert not plant.alarms
+
+
 @pytest.mark.parametrize(
     ("drive", "state"), [(HEARD, b"\x00"), (replace(HEARD, nmt_stops=True), b"\x04"), (HEARD, None)]
 )

@@ -158,8 +158,8 @@ class SdoChannel:
         return True
 
     def flush(self, now: float) -> None:
-        """End all transfers, because the node or the bus is gone. Nothing more is sent; a server that is asked
-        again so soon that it may still answer is told then that the transfer has ended."""
+        """End all transfers, because the node or the bus is gone. Nothing more is sent; a server that is
+        asked again so soon that it may still answer is told then that the transfer has ended."""
         if self._job and self._deadline is not None and not self._frames:
             self._left = self._job, self._deadline
         jobs = [self._job] if self._job else []

@@ -18,7 +18,7 @@ from bridge.witness.foreign_services import TAKES_OUT, Services
 from bridge.witness.jogging import Jogs
 from bridge.witness.output_judge import OutputJudge
 from bridge.witness.owner import WatchedOwner
-from bridge.witness.plan import RAMP_MS, UNKNOWN_MS, WatchedBus, WatchedDrive
+from bridge.witness.plan import FRESH_S, RAMP_MS, UNKNOWN_MS, WatchedBus, WatchedDrive
 from bridge.witness.rate import Rate
 
 _TURNS_S: Final = 0.5
@@ -59,6 +59,11 @@ class _Track:
         self.told: set[AlarmKind] = set()
         """Alarms raised for a state that lasts: each is raised once."""
 
+    def is_told_to_run(self, at: float) -> bool:
+        """True if its RPDOs keep it running."""
+        fresh_s = max(FRESH_S, 2 * self.drive.rpdo_ms / 1000)
+        return self.tells_run and self.rpdo_at is not None and at - self.rpdo_at <= fresh_s
+
 
 class BusJudge:
     """One bus. The caller takes the ``findings``. ``asks`` is true where telegrams' numbers are asked for."""
@@ -94,7 +99,7 @@ class BusJudge:
     def _told_to_run(self, node_id: int, at: float) -> str:
         """Text on a drive that is told to run, or outputs told to be active, of a node; empty where there are
         none."""
-        if any(one.tells_run for one in self._tracks.values() if one.drive.node_id == node_id):
+        if any(one.is_told_to_run(at) for one in self._tracks.values() if one.drive.node_id == node_id):
             return "a drive of it is told to run"
         is_active = any(one.is_told(at) for one in self._outputs if one.node_id == node_id)
         return "its outputs are told to be active" if is_active else ""

@@ -278,3 +278,8 @@ class Bridge:
         reading = self.plant.image.read(name)
         is_number = reading.quality is Quality.GOOD and isinstance(reading.value, int | float)
         return reading.value if is_number else None  # type: ignore[return-value]
+
+    def text(self, name: str) -> str:
+        """Text of a point; nothing where it has none."""
+        value = self.plant.image.read(name).value
+        return value if isinstance(value, str) else ""

@@ -138,10 +138,7 @@ class Debts:
     def master_left(self, drive: Drive, at: float) -> None:
         """One that has started a node again and again has ended: the last word is the bridge's."""
 
-        def is_done() -> bool:
-            last = [one for one in self._commands if one[2] in (0, drive.node_id)]
-            return bool(last) and last[-1][3] and last[-1][1] in _HALTS
-
+        is_done = partial(self.is_halted, drive.node_id)
         text = f"the node of {drive.path} was started by an intruder, and nobody stops it"
         if not self._may_listen(at):
             self._owed.append(_Owed(at, at + _OWES_S, is_done, text))
@@ -151,18 +148,26 @@ class Debts:
 
     def deaf(self, drive: Drive, since: float, seconds: float) -> None:
         """It does not hear its RPDOs: where it is told to stop, its node has to be stopped by then."""
-        track = self._oracle.tracks[drive]
-        mask, value = drive.family.enabled
 
         def is_done() -> bool:
-            told = [at for at in track.stops if at > since]
-            is_kept = track.said and all(word & mask == value for at, word in track.said if at > since)
-            if not told or not is_kept:
-                return True
-            return self._was_halted(drive.node_id, since)
+            return not self.ignores(drive, since) or self._was_halted(drive.node_id, since)
 
         text = f"{drive.path} ignores its stop, and its node goes on"
         self._owed.append(_Owed(since, since + seconds, is_done, text))
+
+    def ignores(self, drive: Drive, since: float) -> bool:
+        """Whether the drive was told to stop since then, and has not said anything but that it is enabled."""
+        track = self._oracle.tracks[drive]
+        mask, value = drive.family.enabled
+        told = any(at > since for at in track.stops)
+        return (
+            told and bool(track.said) and all(word & mask == value for at, word in track.said if at > since)
+        )
+
+    def is_halted(self, node_id: int) -> bool:
+        """Whether the last word to it is a stop of the bridge's."""
+        last = [one for one in self._commands if one[2] in (0, node_id)]
+        return bool(last) and last[-1][3] and last[-1][1] in _HALTS
 
     def _was_halted(self, node_id: int, since: float) -> bool:
         """Whether it was told to stop since then, or has started anew."""

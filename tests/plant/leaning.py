@@ -3,8 +3,8 @@ wrong.
 
     python -m tests.plant.leaning --first FAULT [--seed N] [--seconds S] [--until S]
 
-``FAULT`` is one of the proof's (tests/proof/faults.py). Prints one line of JSON; ``--until`` plays the plan
-of ``--seed`` alone, and no longer than that.
+``FAULT`` is one of the proof's (tests/proof/faults.py), or a kind of step. Prints one line of JSON;
+``--until`` plays the plan of ``--seed`` alone, and no longer than that.
 """
 
 from __future__ import annotations
@@ -79,11 +79,16 @@ LEANS: Final[dict[str, tuple[Group, ...]]] = {
     "second connection of the owner's address": (("stranger",), ("stranger", "jog")),
     "what moves a drive as a parameter": (("reserved parameter",),),
 }
-"""What is done first where the proof would begin with this fault; ``_SILENT`` for any other."""
+"""What is done first where the proof would begin with this fault; ``_SILENT`` for any other that is no kind
+of step itself."""
 _EACH_OF: Final = {
     "deaf drive": 16.0,
     "deaf drive whose owner jogs": 38.0,
     "stop asked for in a silence": 10.0,
+    "dead bridge": 16.0,
+    "deaf": 22.0,
+    "bus cut": 24.0,
+    "hang": 10.0,
 }
 """Seconds from one group to the next, where that takes longer."""
 
@@ -91,7 +96,7 @@ _EACH_OF: Final = {
 def leaning(seed: int, first: str, seconds: float = SECONDS) -> Plan:
     """A plan of these kinds of steps, in groups one after the other."""
     rng = Random(f"{seed} {first}")
-    groups = LEANS.get(first, _SILENT)
+    groups = LEANS.get(first) or (((first,),) if first in KINDS else _SILENT)
     steps: list[Step] = []
     at = _FIRST_S
     while at < seconds - _LAST_S:

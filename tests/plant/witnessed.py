@@ -34,6 +34,7 @@ _HEARD: Final = (
 """What a drive hears and watches."""
 _OWN_S: Final = 3.0
 """From the last RPDO, where the drive's own time-out is not in the site file."""
+_FRESH_S: Final = 0.5
 _FOLLOW_S: Final = (3 * TPDO_MS + 5000) / 1000
 _LOST_S: Final = 1.0
 """By so much a node may be silent for longer than its supervision time."""
@@ -49,6 +50,8 @@ _REPEATED: Final = 2.0 * _WINDOW_S * 1000 / PLANT.rpdo_period_ms + 6
 _TURNS: Final = 5
 _TURNING_S: Final = 0.6
 """An RPDO that turns so often between run and stop is told, whoever's it is."""
+_ONCE: Final = 2
+"""What lasts is told once by each of the two ways to find it."""
 _JUST_S: Final = 0.05
 """A TPDO may have waited for the wire when its node was taken out of operation."""
 
@@ -77,6 +80,10 @@ class _Heard:
     turns: deque[float] = field(default_factory=lambda: deque[float](maxlen=_TURNS))
     """Times at which its RPDO turned between run and stop."""
     deaf_until: float = -inf
+
+    def is_told_at(self, at: float) -> bool:
+        """It is kept running: the bridge has not been silent for so long that it may have been restarted."""
+        return self.is_told and at - self.rpdo_at < _FRESH_S
 
     @property
     def stop_at(self) -> float:
@@ -246,7 +253,7 @@ class Witnessed:
         for node_id, drives in self._of_node.items():
             if to not in (0, node_id):
                 continue
-            told = [one for one in drives if one.is_told]
+            told = [one for one in drives if one.is_told_at(at)]
             if any(one.is_strangers for one in told):
                 self._strange_at = at
             if is_foreign and told and command in (*_TAKES_OUT, _START):
@@ -262,7 +269,7 @@ class Witnessed:
                 self._outputs.out = 0
 
     def _on_foreign_request(self, node_id: int, at: float, data: bytes) -> None:
-        told = [one for one in self._of_node.get(node_id, []) if one.is_told]
+        told = [one for one in self._of_node.get(node_id, []) if one.is_told_at(at)]
         index = int.from_bytes(data[1:3], "little")
         if told and data[0] & 0xE0 == _DOWNLOAD and any(index in part for part in _HEARD):
             text = f"somebody writes {index:04X}h of a node whose {told[0].drive.path} is to run"
@@ -282,7 +289,10 @@ class Witnessed:
     def told(self, source: str, kind: str, at: float, message: str) -> None:
         """The witness raises an alarm."""
         self._oracle.looks += 1
-        self._alarms.setdefault((kind, source), deque(maxlen=100)).append(at)
+        times = self._alarms.setdefault((kind, source), deque(maxlen=100))
+        times.append(at)
+        if kind != "intruder" and len(times) > _ONCE and at - times[-1 - _ONCE] < _WINDOW_S:
+            self._oracle.wrong(at, f"the witness says {kind!r} of {source} again and again")
         if not self._is_right(source, kind, at):
             self._oracle.wrong(at, f"the witness says {kind!r} of {source} ({message}), which is not so")
 

@@ -18,8 +18,12 @@ from tests.proof.drives import Drive
 from tests.proof.settings import PLANT
 
 _NMT: Final = 0x000
+_SYNC: Final = 0x080
 _ERROR_CONTROL: Final = range(0x701, 0x780)
 _START, _STOP, _PRE_OPERATIONAL = 0x01, 0x02, 0x80
+_OPERATIONAL: Final = 0x05
+_CANCELS: Final = (_STOP, _PRE_OPERATIONAL, 0x82)
+"""NMT commands that leave Operational with drives that may go on as they were told."""
 _HALTS: Final = (_STOP, 0x81, 0x82)
 """NMT commands after which a node does not move its drives: stop and the resets."""
 _DEADMAN_S: Final = PLANT.deadman_ms / 1000
@@ -54,6 +58,8 @@ class Debts:
         for track in oracle.tracks.values():
             self._of_node.setdefault(track.drive.node_id, []).append(track)
         self._signs: dict[int, float] = {}
+        self._states: dict[int, int] = {}
+        self._sync_at = -inf
         self._began_anew: dict[int, float] = {}
         self._gave_way_at = -inf
         self._commands: deque[tuple[float, int, int, bool]] = deque(maxlen=400)
@@ -188,11 +194,26 @@ class Debts:
             return
         if can_id == _NMT and len(data) == 2:
             self._commands.append((at, data[0], data[1], who == "bridge"))
+            if who == "bridge" and data[0] in _CANCELS:
+                self._leaves(at, data[1])
         if who == "bridge":
             self._of_bridge(at, can_id, data)
 
+    def _leaves(self, at: float, node_id: int) -> None:
+        """The bridge takes a node out of operation: a stop that waits for SYNC is taken over before."""
+        if self._states.get(node_id) != _OPERATIONAL or not self.is_quiet() or self._disturbed_at > at - 1.0:
+            return
+        for track in self._of_node.get(node_id, []):
+            mask, value = track.drive.family.enabled
+            is_enabled = track.said and track.said[-1][1] & mask == value and track.said[-1][0] > at - 0.4
+            told = next((stop for stop in track.stops if stop > track.enabled_at), inf)
+            if track.drive.syncs and is_enabled and self._sync_at < told < inf:
+                self._oracle.looks += 1
+                self._oracle.wrong(at, f"{track.drive.path} has its node stopped before SYNC brings its stop")
+
     def _sign(self, node_id: int, at: float, data: bytes) -> None:
         self._signs[node_id] = at
+        self._states[node_id] = data[0] & 0x7F if data else 0
         if data[:1] == b"\0":
             self._began_anew[node_id] = at
         if data[:1] == b"\0" and self.is_quiet():
@@ -210,6 +231,8 @@ class Debts:
         if at > self._ours_at + _GONE_S:
             self._ours_since = at
         self._ours_at = at
+        if can_id == _SYNC:
+            self._sync_at = at
         if self._is_new:
             self._is_new = False
             self._first_frame(at)

@@ -41,6 +41,7 @@ _RULES: Final = (
     ("owed stops", "gets no stop though"),
     ("owed stops", "gets no NMT stop"),
     ("owed stops", "by a service that ends"),
+    ("owed stops", "before SYNC brings"),
     ("dead is silent", "a dead bridge sends"),
     ("lost nodes", "its node is silent"),
     ("intruders are answered", "is not answered"),

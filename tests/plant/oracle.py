@@ -162,6 +162,8 @@ class Oracle:
         self.violations: list[str] = []
         self.on_trip: Callable[[Drive, float, float], None] = lambda drive, since, due: None
         """Called with a drive whose controller was silent for too long, and from when to when it may trip."""
+        self.on_stop: Callable[[Drive, float], None] = lambda drive, at: None
+        """Called with a drive that is told to stop, and was told to run before."""
         self.looks = 0
         """How many frames and values were judged."""
         self._still_since = inf
@@ -322,6 +324,8 @@ class Oracle:
         drive = track.drive
         self.looks += 1
         if not drive.enabling(data):
+            if track.enabled_at > (track.stops[-1] if track.stops else -inf):
+                self.on_stop(drive, at)
             track.stops.append(at)
             track.stop_word = drive.control_word(data)
             return

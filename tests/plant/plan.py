@@ -15,7 +15,7 @@ FIRST_S: Final = 8.0
 _LAST_S: Final = 12.0
 """So long nothing is done at the end."""
 _STOPS: Final = ("stop", "quick_stop", "disable_voltage")
-_DEAF: Final = ("silent", "silent", "jogs", "to everything")
+_DEAF: Final = ("silent", "jogs", "to everything")
 _WHILE_DEAD: Final = ("runs on", "taken out", "kept running", "outputs are active")
 _NODES: Final = len({drive.node for drive in DRIVES})
 

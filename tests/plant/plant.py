@@ -97,6 +97,7 @@ class Plant:
         self.has_outputs = False
         """Whether the outputs have an owner."""
         self.oracle.on_trip = self._on_trip
+        self.oracle.on_stop = self._on_stop
         self.second: Bridge | None = None
         self.project = project
         self.names = {node.id: node.name for node in table.node}
@@ -213,6 +214,15 @@ class Plant:
     def _on_trip(self, drive: Drive, since: float, due: float) -> None:
         what = f"the controller of {drive.path} was silent for too long"
         self.causes.owes(EventKind.WATCHDOG, drive.path, since - _ROUND_S, due + _ROUND_S, what)
+
+    def _on_stop(self, drive: Drive, told: float) -> None:
+        def look() -> None:
+            process, now = self.bridge.process, self.world.now
+            if not (process.is_dead or process.still_since < now):
+                said = self.bridge.good_number(f"{drive.path}/supervision/last_stop")
+                self.answers.still_running(drive, told, now, said)
+
+        self.world.after(_ROUND_S, look)
 
     def _look(self) -> None:
         self.world.after(_LOOK_S, self._look)

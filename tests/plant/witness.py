@@ -35,7 +35,7 @@ class Witness:
         # A frame with flags is none of its identifiers, as in the filters of its socket.
         if frame.can_id in self._identifiers:
             self._core.on_frame(frame.can_id, frame.data, frame.time)
-            self._judge.heard(frame.time, frame.can_id, frame.data)
+        self._judge.heard(frame.time, frame.can_id, frame.data)
 
     def _turn(self) -> None:
         now = self._world.now

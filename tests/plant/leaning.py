@@ -3,8 +3,9 @@ wrong.
 
     python -m tests.plant.leaning --first FAULT [--seed N] [--seconds S] [--until S]
 
-``FAULT`` is one of the proof's (tests/proof/faults.py), or a kind of step, such as ``deaf`` or ``deaf: jogs``.
-Prints one line of JSON; ``--until`` plays the plan of ``--seed`` alone, and no longer than that.
+``FAULT`` is one of the proof's (tests/proof/faults.py), or a kind of step, such as ``deaf``, or
+``deaf: jogs``. Prints one line of JSON; ``--until`` plays the plan of ``--seed`` alone, and no longer than
+that.
 """
 
 from __future__ import annotations

@@ -42,6 +42,8 @@ _SAYS_S: Final = 0.3
 """What has to be said is said so soon: it looks each 50 ms."""
 _CLEAR_S: Final = 0.4
 """What exceeds a bound by less need not be said, for what comes next may end it: a TPDO, say."""
+_LASTS_S: Final = 0.1
+"""Who comes back enabled after a long silence, and stops at once, does not run on."""
 _WINDOW_S: Final = 2.0
 _STRANGE_S: Final = 3.0
 """So long after a frame of somebody else the witness may still speak of it: it counts for two seconds."""
@@ -70,6 +72,8 @@ class _Heard:
     node_at: float = -inf
     is_enabled: bool = False
     enabled_since: float = inf
+    beyond: tuple[float, float] = (inf, inf)
+    """Since when its bound runs that is exceeded, and when it has first said that it is enabled beyond it."""
     out_at: float = inf
     """When its node was taken out of operation, if it has not been heard since."""
     rpdo: bytes = b""
@@ -207,14 +211,16 @@ class Witnessed:
 
     def _on_enabled(self, one: _Heard, at: float) -> None:
         """Judge a drive that has just said that it is enabled."""
-        path = one.drive.path
-        if one.stopped_at < inf:
-            if at - one.stop_at > _FOLLOW_S + _CLEAR_S:
-                text = f"{path} is enabled {at - one.stop_at:.2f} s after it was told to stop"
-                self._owe_once("stop ignored", path, one.stop_at, at, text)
-        elif at - one.rpdo_at > _OWN_S + _CLEAR_S:
-            text = f"{path} is enabled {at - one.rpdo_at:.2f} s after its last RPDO"
-            self._owe_once("runs on", path, one.rpdo_at, at, text)
+        is_stopped = one.stopped_at < inf
+        kind, since = ("stop ignored", one.stop_at) if is_stopped else ("runs on", one.rpdo_at)
+        if at - since <= (_FOLLOW_S if is_stopped else _OWN_S) + _CLEAR_S:
+            return
+        if one.beyond[0] != since:
+            one.beyond = since, at
+        elif at - one.beyond[1] > _LASTS_S:
+            after = "it was told to stop" if is_stopped else "its last RPDO"
+            text = f"{one.drive.path} is enabled {at - since:.2f} s after {after}"
+            self._owe_once(kind, one.drive.path, since, at, text)
 
     def _on_guard(self, node_id: int, at: float, data: bytes) -> None:
         if node_id not in self._of_node or not data:

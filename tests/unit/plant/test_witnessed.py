@@ -89,6 +89,16 @@ def test_what_is_told_is_told(
     assert not scene.wrong
 
 
+@pytest.mark.parametrize("rpdo", [RUN, STOP])
+def test_who_comes_back_enabled_and_stops_at_once_need_not_be_told(scene: Scene, rpdo: bytes) -> None:
+    scene.sends(DRIVE.rpdo, rpdo)
+    scene.now += 10.0
+    scene.says(ENABLED)
+    scene.now += 0.02
+    scene.says(bytes(4))
+    assert not scene.wrong
+
+
 @pytest.mark.parametrize("kind", ["runs on", "stop ignored", "unheard", "enabled untold", "late", "blind"])
 def test_what_is_not_so_is_a_false_alarm(scene: Scene, kind: str) -> None:
     scene.goes_on(2.0, rpdo=RUN, tpdo=ENABLED)

@@ -89,7 +89,7 @@ _EACH_OF: Final = {
     "dead bridge": 16.0,
     "deaf": 22.0,
     "bus cut": 24.0,
-    "hang": 10.0,
+    "hang": 16.0,
 }
 """Seconds from one group to the next, where that takes longer."""
 

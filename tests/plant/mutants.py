@@ -32,6 +32,8 @@ ELSEWHERE: Final = {
 """Mutants that no plant can find, and why."""
 _HALVES: Final = ("first", "second")
 _RULES: Final = (
+    ("a whole is as bad", "a whole is said"),
+    ("a whole is as bad", "condition is said to be"),
     ("the reaction", "is to react by"),
     ("the reaction", "is to hold, and"),
     ("the reaction", "its setpoint is sent on"),
@@ -52,10 +54,6 @@ _RULES: Final = (
     ("nobody but the owner", "is set by who may not"),
     ("the witness speaks", "the witness does not say"),
     ("the witness is right", "the witness says"),
-    ("a whole is as bad", "a whole is said"),
-    ("a whole is as bad", "is said to be 0"),
-    ("a whole is as bad", "is said to be 1"),
-    ("a whole is as bad", "is said to be 2"),
     ("in order again", "everything is in order"),
     ("causes first", "stands beside it"),
     ("causes first", "is not said to be silent"),

@@ -39,7 +39,7 @@ _LOOK_S: Final = 0.25
 _SECOND: Final = "bridge two"
 _ROUND_S: Final = 0.05
 _QUIET_S: Final = 1.0
-_SETTLES_S: Final = 9.0
+_SETTLES_S: Final = 5.0
 """What a step has left behind is put in order by then."""
 
 

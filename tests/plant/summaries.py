@@ -32,7 +32,7 @@ that it has a fault before it says which."""
 _AFTER_S: Final = 8.0
 """So long after a cut its consequences are looked at; by then all are acknowledged."""
 _BOOTED_S: Final = 8.0
-_ORDER_S: Final = 9.0
+_ORDER_S: Final = 7.0
 """So long after the last step everything is in order again, where nothing wants an acknowledge."""
 _INTRUDER_S: Final = 600.0
 """An intruder is shown for so long."""

@@ -111,7 +111,7 @@ def test_a_silent_controller_is_an_alarm(scene: Scene) -> None:
 def test_everything_is_in_order_again(scene: Scene) -> None:
     scene.summaries.busy(scene.now)
     scene.bridge.said = dict.fromkeys((BUS, ALL), 1)
-    assert not scene.later(8.0, runs=True)
+    assert not scene.later(6.0, runs=True)
     assert "everything is in order" in scene.later(3.0, runs=True)
 
 

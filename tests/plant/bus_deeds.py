@@ -56,8 +56,8 @@ def silence_node(plant: Plant, step: Step) -> None:
     node_id = node.device.node_id
 
     def is_missed() -> bool:
-        """It is silent, and is not meant to be stopped."""
-        return not (node.speaks or plant.debts.is_halted(node_id))
+        """It is silent, and would be operational otherwise."""
+        return not node.speaks and plant.debts.is_operational(node_id)
 
     node.speaks = False
     plant.summaries.silenced(plant.names[node_id], plant.world.now, step.seconds, is_missed)

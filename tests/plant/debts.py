@@ -170,6 +170,10 @@ class Debts:
             told and bool(track.said) and all(word & mask == value for at, word in track.said if at > since)
         )
 
+    def is_operational(self, node_id: int) -> bool:
+        """Whether the node has said so last, and has not been told otherwise by the bridge."""
+        return self._states.get(node_id) == _OPERATIONAL and not self.is_halted(node_id)
+
     def is_halted(self, node_id: int) -> bool:
         """Whether the last word to it is a stop of the bridge's."""
         last = [one for one in self._commands if one[2] in (0, node_id)]

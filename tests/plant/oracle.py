@@ -25,6 +25,7 @@ _WIRE_S: Final = 0.01
 _KERNEL_S: Final = 0.002
 """Each period of the kernel's is a little longer than it should be."""
 REACTION_S: Final = (PLANT.rpdo_period_ms + REACTION_MS) / 1000 + _WIRE_S
+_SILENT_S: Final = 3 * PLANT.rpdo_period_ms / 1000
 _SEEN_S: Final = 0.02
 """Frames that were on their way when the bus went off."""
 _GONE_S: Final = 0.5
@@ -324,7 +325,9 @@ class Oracle:
         drive = track.drive
         self.looks += 1
         if not drive.enabling(data):
-            if track.enabled_at > (track.stops[-1] if track.stops else -inf):
+            latest = track.stops[-1] if track.stops else -inf
+            # Who was told nothing for a while has been stopped by that.
+            if track.enabled_at > max(latest, at - _SILENT_S):
                 self.on_stop(drive, at)
             track.stops.append(at)
             track.stop_word = drive.control_word(data)

@@ -28,6 +28,8 @@ _HALTS: Final = (_STOP, 0x81, 0x82)
 """NMT commands after which a node does not move its drives: stop and the resets."""
 _DEADMAN_S: Final = PLANT.deadman_ms / 1000
 _JUST_S: Final = 0.3
+_STOPS_S: Final = 0.1
+"""By then a drive that is told to run has said that it does."""
 _HEARD_S, _GONE_S, _IN_CHARGE_S = 0.2, 0.5, 3.0
 """A bridge in charge sends at least each 0.1 s; so long after a silence somebody else may have taken over."""
 _OWES_S: Final = 0.5
@@ -96,7 +98,9 @@ class Debts:
         def is_done() -> bool:
             # A node that started anew just before has ended the debt, though the bursts went on.
             told = any(at >= since for at in track.stops)
-            return told or self._was_halted(track.drive.node_id, since - _JUST_S)
+            # A bridge that gives way owes nothing to a drive that it has seen stopped.
+            is_stopped = self._gave_way_at >= since and _has_followed(track)
+            return told or is_stopped or self._was_halted(track.drive.node_id, since - _JUST_S)
 
         text = f"{track.drive.path} gets no stop though {why}"
         self._owed.append(_Owed(now, now + _OWES_S, is_done, text))
@@ -280,7 +284,8 @@ def _is_silenced(track: Track, at: float) -> bool:
 
 
 def _has_followed(track: Track) -> bool:
-    """Whether the drive has said that it is not enabled, since the stop that it was told last."""
-    told = next((at for at in track.stops if at > track.enabled_at), inf)
+    """Whether the drive has said that it is not enabled, since the stop that it was told last, or since the
+    last word that enables it: it has stopped by itself then."""
+    told = next((at for at in track.stops if at > track.enabled_at), track.enabled_at + _STOPS_S)
     mask, value = track.drive.family.enabled
     return any(at > told and word & mask != value for at, word in track.said)

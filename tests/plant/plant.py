@@ -218,7 +218,9 @@ class Plant:
     def _on_stop(self, drive: Drive, told: float) -> None:
         def look() -> None:
             process, now = self.bridge.process, self.world.now
-            if not (process.is_dead or process.still_since < now):
+            # A node in Stopped may be all that a drive has to say.
+            is_told = not self.debts.is_halted(drive.node_id)
+            if is_told and not (process.is_dead or process.still_since < now):
                 said = self.bridge.good_number(f"{drive.path}/supervision/last_stop")
                 self.answers.still_running(drive, told, now, said)
 

@@ -182,6 +182,7 @@ class Plant:
 
     def _on_start(self) -> None:
         self.oracle.started()
+        self.witnessed.restarted(self.world.now)
         self.debts.started()
         self.disturbed()
 

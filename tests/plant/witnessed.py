@@ -154,6 +154,12 @@ class Witnessed:
         self._seen: set[tuple[str, str, float]] = set()
         """What has been owed for a state that lasts."""
         self._strange_at = -inf
+        self._restarted_at = -inf
+
+    def restarted(self, at: float) -> None:
+        """The bridge begins. One that was there half a second ago is not known to be another one: what it
+        does with a node that its predecessor has commanded or asked is taken for somebody else's."""
+        self._restarted_at = at
 
     def deaf(self, drive: Drive, until: float) -> None:
         """It does not hear its RPDO until then: its owner may jog, and it gets no slower."""
@@ -306,6 +312,7 @@ class Witnessed:
         if kind == "intruder":
             # Who has not heard a stop or an answer takes what follows for somebody else's.
             is_strange = at < self._strange_at + _STRANGE_S or not self.is_quiet()
+            is_strange |= at < self._restarted_at + 2 * _FRESH_S
             return is_strange or self._turns(source, at)
         if source == BLOCK.path:
             return self._is_right_of_outputs(kind, at)

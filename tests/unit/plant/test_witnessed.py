@@ -153,6 +153,12 @@ def test_an_intruder_whom_nobody_has_sent_is_a_false_alarm(scene: Scene) -> None
     assert "the witness says 'intruder' of can0" in scene.wrong
 
 
+def test_a_bridge_that_is_there_again_at_once_is_taken_for_one(scene: Scene) -> None:
+    scene.witnessed.restarted(scene.now - 0.5)
+    scene.alarm("intruder", BUS)
+    assert not scene.wrong
+
+
 def test_who_has_missed_a_frame_may_take_the_next_for_somebody_elses(scene: Scene) -> None:
     scene.witnessed.is_quiet = lambda: False
     scene.alarm("intruder", BUS)

@@ -97,6 +97,8 @@ class SdoChannel:
         self._owed: _Owed | None = None
         self._asked_at = 0.0
         self._hold_until: float | None = None
+        self._left: tuple[SdoJob, float] | None = None
+        """The transfer that a flush has ended without a word to the server, and its deadline."""
 
     @property
     def waiting(self) -> int:
@@ -156,7 +158,10 @@ class SdoChannel:
         return True
 
     def flush(self, now: float) -> None:
-        """End all transfers, because the node or the bus is gone. Nothing more is sent."""
+        """End all transfers, because the node or the bus is gone. Nothing more is sent; a server that is
+        asked again so soon that it may still answer is told then that the transfer has ended."""
+        if self._job and self._deadline is not None and not self._frames:
+            self._left = self._job, self._deadline
         jobs = [self._job] if self._job else []
         jobs += self._queue
         self._queue.clear()
@@ -262,6 +267,10 @@ class SdoChannel:
         if job.may_begin is not None and not job.may_begin():
             self._end(SdoError(job.index, job.sub, abort.GENERAL, by_server=False), now)
             return
+        left, self._left = self._left, None
+        if left and now < left[1]:
+            # A server has one transfer at a time (CiA 301 §7.2.4.1).
+            self._tell_abort(left[0], abort.GENERAL)
         transfer = self._transfer = job.start(self._block)
         self._resume(next, transfer, now)
 

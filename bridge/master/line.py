@@ -144,6 +144,16 @@ class BusLine:
         before are stale. The next round finds the gap."""
         return (self.clock() - since) * 1000 > self.network.bus.deadman_ms
 
+    def let_bus_work(self, now: float) -> None:
+        """Have the bus do what is due, unless the process was stopped since ``now`` for so long that what it
+        would send is stale: right after its look at the clock, too, which the signal tells."""
+        due = self.bus.next_deadline()
+        is_due = due is not None and now >= due
+        if is_due:
+            self.alarm.set(self.burst_s)
+        if not (self.stood_still(now) or (is_due and self.alarm.rang)):
+            self.bus.on_time(now)
+
     def flush(self, now: float) -> None:
         """Hand to the bus what is to be sent and repeated now."""
         bus, network = self.bus, self.network

@@ -18,7 +18,7 @@ from bridge.witness.foreign_services import TAKES_OUT, Services
 from bridge.witness.jogging import Jogs
 from bridge.witness.output_judge import OutputJudge
 from bridge.witness.owner import WatchedOwner
-from bridge.witness.plan import RAMP_MS, UNKNOWN_MS, WatchedBus, WatchedDrive
+from bridge.witness.plan import FRESH_S, RAMP_MS, UNKNOWN_MS, WatchedBus, WatchedDrive
 from bridge.witness.rate import Rate
 
 _TURNS_S: Final = 0.5
@@ -28,6 +28,8 @@ _BOOT_UP, _STOPPED = 0x00, 0x04
 """NMT states in a heartbeat (CiA 301 §7.2.8.3.2.2)."""
 _UNSEEN_S: Final = 1.0
 """Time in seconds within which an enabled drive gets its next RPDO."""
+_WAITED_S: Final = 0.1
+"""Longest time in seconds for which a TPDO may have waited for the bus."""
 BLIND_S: Final = 5.0
 """Time in seconds without a reading after which the witness reports that it sees nothing of the owner."""
 
@@ -56,6 +58,11 @@ class _Track:
         """Time at which its node was taken out of operation by NMT while it said "enabled"."""
         self.told: set[AlarmKind] = set()
         """Alarms raised for a state that lasts: each is raised once."""
+
+    def is_told_to_run(self, at: float) -> bool:
+        """True if its RPDOs keep it running."""
+        fresh_s = max(FRESH_S, 2 * self.drive.rpdo_ms / 1000)
+        return self.tells_run and self.rpdo_at is not None and at - self.rpdo_at <= fresh_s
 
 
 class BusJudge:
@@ -92,7 +99,7 @@ class BusJudge:
     def _told_to_run(self, node_id: int, at: float) -> str:
         """Text on a drive that is told to run, or outputs told to be active, of a node; empty where there are
         none."""
-        if any(one.tells_run for one in self._tracks.values() if one.drive.node_id == node_id):
+        if any(one.is_told_to_run(at) for one in self._tracks.values() if one.drive.node_id == node_id):
             return "a drive of it is told to run"
         is_active = any(one.is_told(at) for one in self._outputs if one.node_id == node_id)
         return "its outputs are told to be active" if is_active else ""
@@ -106,6 +113,8 @@ class BusJudge:
     # what comes
 
     def on_frame(self, can_id: int, data: bytes, at: float) -> None:
+        if can_id > 0x700 and data[:1] == b"\0":
+            self._services.on_restart(can_id - 0x700)
         if (track := self._by_rpdo.get(can_id)) is not None:
             self._on_rpdo(track, data, at)
         elif (track := self._by_tpdo.get(can_id)) is not None:
@@ -197,7 +206,9 @@ class BusJudge:
             return
         was_enabled, track.is_enabled = track.is_enabled, enabled
         track.tpdo_at = at
-        track.taken_out_at = track.taken_out_at if enabled else None
+        if track.taken_out_at is not None and (not enabled or at > track.taken_out_at + _WAITED_S):
+            # Its node is back in operation: what it says counts again.
+            track.taken_out_at = None
         track.told.discard(AlarmKind.UNHEARD)
         self._on_speed(track, data, at)
         if enabled and not was_enabled:

@@ -33,6 +33,8 @@ _HEARD: Final = (
 )
 """Objects for communication and control of a node: SYNC, the identifier of emergencies, guarding and
 heartbeats, SDO and PDO parameters, NMT startup, the control word (CiA 301 §7.5, CiA 402)."""
+_WAITED_S: Final = 0.05
+"""Longest time in seconds for which a question may have waited for the bus: its time-out runs meanwhile."""
 _DOWNLOAD, _UPLOAD, _ABORT = 0x20, 0x40, 0x80
 """Command specifiers in the three highest bits (CiA 301 §7.2.4.3)."""
 
@@ -54,6 +56,8 @@ class Services:
         self._starts: dict[int, deque[float]] = {node: deque() for node in nodes}
         self._asked: dict[int, float] = {}
         """Time of the question without an answer yet, by node."""
+        self._stopped: set[int] = set()
+        """Nodes that were told to stop last: they answer no questions (CiA 301 §7.3.2.2.4)."""
 
     @property
     def identifiers(self) -> set[int]:
@@ -80,11 +84,24 @@ class Services:
         if node and node not in self._nodes:
             return f"NMT {what} of node {node}, which the site does not have: somebody else sends it"
         for one in (node,) if node else tuple(self._nodes):
+            self._on_told(one, data[0])
             if told := self._told_to_run(one, at):
                 return f"NMT {what} of node {one} while {told}: somebody else sends it"
             if data[0] == START and self._starts_too_often(one, at):
                 return f"NMT start of node {one} again and again: somebody else sends it"
         return ""
+
+    def _on_told(self, node: int, command: int) -> None:
+        if command == STOP:
+            self._stopped.add(node)
+        else:
+            self._stopped.discard(node)
+        if command in (STOP, RESET, RESET_COMMUNICATION):
+            self.on_restart(node)
+
+    def on_restart(self, node: int) -> None:
+        """Take a node that answers nothing any more of what it was asked before."""
+        self._asked.pop(node, None)
 
     def _starts_too_often(self, node: int, at: float) -> bool:
         starts = self._starts[node]
@@ -104,8 +121,10 @@ class Services:
             self._asked.pop(node, None)
         if kind not in (_DOWNLOAD, _UPLOAD):
             return ""
-        asked_at, self._asked[node] = self._asked.get(node), at
-        if asked_at is not None and at - asked_at < self._nodes[node]:
+        asked_at = self._asked.get(node)
+        if node not in self._stopped:
+            self._asked[node] = at
+        if asked_at is not None and at - asked_at < self._nodes[node] - _WAITED_S:
             return f"two SDO requests to node {node} at once: somebody else sends one of them"
         is_heard = index in self._written.get(node, ()) or any(index in part for part in _HEARD)
         if kind == _DOWNLOAD and is_heard and (told := self._told_to_run(node, at)):

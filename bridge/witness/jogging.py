@@ -67,4 +67,6 @@ class Jogs:
         brakes = self._slower * self._ramp_s * _RAMPS >= self._braked_s
         text = f"enabled and no slower in {self._time_s:.1f} s of {self._stops} stops"
         self._reset()
+        # What is left of this stop counts from here.
+        self._stops, self._last_at = 1, at
         return "" if brakes else text

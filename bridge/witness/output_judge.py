@@ -13,15 +13,13 @@ from bridge.witness.findings import Alarm, AlarmKind, Cause, Finding, Stop
 from bridge.witness.foreign_services import RESET, RESET_COMMUNICATION, START, STOP, TAKES_OUT
 from bridge.witness.output_plan import Values
 from bridge.witness.owner import WatchedOwner
-from bridge.witness.plan import RAMP_MS, UNKNOWN_MS, WatchedOutputs
+from bridge.witness.plan import FRESH_S, RAMP_MS, UNKNOWN_MS, WatchedOutputs
 from bridge.witness.rate import SPARE, Rate
 
 _BOOT_UP, _OPERATIONAL = 0x00, 0x05
 """NMT states in a heartbeat (CiA 301 §7.2.8.3.2.2)."""
 _UNSEEN_S: Final = 1.0
 """Time in seconds within which commanded outputs get their next RPDO."""
-_FRESH_S: Final = 0.5
-"""Silence in seconds after which the bridge may have been restarted."""
 
 
 class _Rpdo:
@@ -80,7 +78,7 @@ class OutputJudge:
 
     def is_told(self, at: float) -> bool:
         """True if one of them is kept active."""
-        return self._is_active and self._rpdo_at is not None and at - self._rpdo_at <= _FRESH_S
+        return self._is_active and self._rpdo_at is not None and at - self._rpdo_at <= FRESH_S
 
     def take_findings(self) -> list[Finding]:
         findings, self._findings = self._findings, []
@@ -169,7 +167,7 @@ class OutputJudge:
     def _on_off_by_itself(self, at: float) -> None:
         """Note that the node is not operational any more, and makes them safe then."""
         silent_s = 0.0 if self._rpdo_at is None else at - self._rpdo_at
-        if self._is_active and silent_s > _FRESH_S / 2:
+        if self._is_active and silent_s > FRESH_S / 2:
             bound_ms = self._watched.silent_ms or None
             self._findings.append(
                 Stop(self._watched.name, Cause.BRIDGE, at, None, None, _ms(silent_s), bound_ms)

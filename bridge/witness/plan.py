@@ -32,6 +32,8 @@ RAMP_MS: Final = 5000
 """Longest time for a drive to stand still in ms, where the site file sets none."""
 UNKNOWN_MS: Final = 3000
 """Longest time in ms from the last RPDO to a stopped drive, where its own time-out is not known."""
+FRESH_S: Final = 0.5
+"""Silence in seconds after which the bridge may have been restarted."""
 _SWITCH_MS: Final = 500
 """Longest time for an output to switch, ms."""
 _LOST_MS: Final = 1000

@@ -21,6 +21,8 @@ _ANSWER_S: Final = 10.0
 _NEVER_S: Final = 3.0
 """So long the wire is watched for what was not forwarded. Numbers of telegrams come again after eleven."""
 _PERIOD_S: Final = PLANT.rpdo_period_ms / 1000
+_ON_WIRE_S: Final = 0.03
+"""A word is handed over a little before it is on the wire."""
 _FOLLOWED: Final = 2
 _STOPS: Final = ("stop", "quick_stop", "disable_voltage")
 
@@ -191,3 +193,16 @@ class Answers:
         ]
         if not any(word & mask != value for word in latest):
             self._oracle.wrong(at, f"{drive.path}: followed, and the drive has not said that it is stopped")
+
+    def still_running(self, drive: Drive, told: float, at: float, said: float | None) -> None:
+        """``supervision/last_stop`` shortly after the first word that stops the drive, at ``told``: what it
+        has said before is no answer to it."""
+        if said != _FOLLOWED or self._disturbed_at >= told - _PERIOD_S:
+            return
+        mask, value = drive.family.enabled
+        self._oracle.looks += 1
+        if not any(
+            when >= told - _ON_WIRE_S and word & mask != value
+            for when, word in self._oracle.tracks[drive].said
+        ):
+            self._oracle.wrong(at, f"{drive.path}: followed, and the drive has said nothing since its stop")

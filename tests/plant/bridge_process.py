@@ -25,6 +25,7 @@ from bridge.northbound.modbus.server import ModbusServer
 from bridge.northbound.modbus.units import units_of
 from bridge.project import Project
 from bridge.recorder.tape import Note, RecordingTape, TapedBus
+from bridge.service.plant_condition import LOOK_EVERY_S, PlantCondition
 from bridge.zenohlink import ZenohLink
 from tests.plant.machine import Process, Watcher
 from tests.plant.meeting import Link, Meeting
@@ -137,6 +138,7 @@ class Bridge:
         ]
         self.master = Master(list(zip(buses, networks, strict=True)), self.plant, clock, alarm=process.alarm)
         self.view = PlantView(self.plant, clock, world.epoch_ns, self.master.carry_out, self.master.wake)
+        self.condition = PlantCondition(self.plant, process.clock, world.epoch_ns)
         self.modbus = None
         if self._project.site.modbus:
             units = units_of(self._catalogue)
@@ -158,9 +160,16 @@ class Bridge:
             bus.open(self.master.on_bus)
         self.master.attach(self._arm)
         self.master.wake()
+        self._judge()
         self.starts, self.started_at = self.starts + 1, self._world.now
         for tell in self.on_start:
             tell()
+
+    def _judge(self) -> None:
+        """Judge the condition of the plant, again and again, as ``PlantCondition.run`` does."""
+        self.condition.look()
+        process = self.process
+        self._world.after(LOOK_EVERY_S, lambda: process.post(self._judge))
 
     def _arm(self, at: float) -> None:
         if self._timer is not None:
@@ -303,3 +312,8 @@ class Bridge:
         reading = self.plant.image.read(name)
         is_number = reading.quality is Quality.GOOD and isinstance(reading.value, int | float)
         return reading.value if is_number else None  # type: ignore[return-value]
+
+    def text(self, name: str) -> str:
+        """Text of a point; nothing where it has none."""
+        value = self.plant.image.read(name).value
+        return value if isinstance(value, str) else ""

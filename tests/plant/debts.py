@@ -18,12 +18,18 @@ from tests.proof.drives import Drive
 from tests.proof.settings import PLANT
 
 _NMT: Final = 0x000
+_SYNC: Final = 0x080
 _ERROR_CONTROL: Final = range(0x701, 0x780)
 _START, _STOP, _PRE_OPERATIONAL = 0x01, 0x02, 0x80
+_OPERATIONAL: Final = 0x05
+_CANCELS: Final = (_STOP, _PRE_OPERATIONAL, 0x82)
+"""NMT commands that leave Operational with drives that may go on as they were told."""
 _HALTS: Final = (_STOP, 0x81, 0x82)
 """NMT commands after which a node does not move its drives: stop and the resets."""
 _DEADMAN_S: Final = PLANT.deadman_ms / 1000
 _JUST_S: Final = 0.3
+_STOPS_S: Final = 0.1
+"""By then a drive that is told to run has said that it does."""
 _HEARD_S, _GONE_S, _IN_CHARGE_S = 0.2, 0.5, 3.0
 """A bridge in charge sends at least each 0.1 s; so long after a silence somebody else may have taken over."""
 _OWES_S: Final = 0.5
@@ -54,6 +60,8 @@ class Debts:
         for track in oracle.tracks.values():
             self._of_node.setdefault(track.drive.node_id, []).append(track)
         self._signs: dict[int, float] = {}
+        self._states: dict[int, int] = {}
+        self._sync_at = -inf
         self._began_anew: dict[int, float] = {}
         self._gave_way_at = -inf
         self._commands: deque[tuple[float, int, int, bool]] = deque(maxlen=400)
@@ -90,7 +98,9 @@ class Debts:
         def is_done() -> bool:
             # A node that started anew just before has ended the debt, though the bursts went on.
             told = any(at >= since for at in track.stops)
-            return told or self._was_halted(track.drive.node_id, since - _JUST_S)
+            # A bridge that gives way owes nothing to a drive that it has seen stopped.
+            is_stopped = self._gave_way_at >= since and _has_followed(track)
+            return told or is_stopped or self._was_halted(track.drive.node_id, since - _JUST_S)
 
         text = f"{track.drive.path} gets no stop though {why}"
         self._owed.append(_Owed(now, now + _OWES_S, is_done, text))
@@ -139,10 +149,7 @@ class Debts:
     def master_left(self, drive: Drive, at: float) -> None:
         """One that has started a node again and again has ended: the last word is the bridge's."""
 
-        def is_done() -> bool:
-            last = [one for one in self._commands if one[2] in (0, drive.node_id)]
-            return bool(last) and last[-1][3] and last[-1][1] in _HALTS
-
+        is_done = partial(self.is_halted, drive.node_id)
         text = f"the node of {drive.path} was started by an intruder, and nobody stops it"
         if not self._may_listen(at):
             self._owed.append(_Owed(at, at + _OWES_S, is_done, text))
@@ -152,18 +159,30 @@ class Debts:
 
     def deaf(self, drive: Drive, since: float, seconds: float) -> None:
         """It does not hear its RPDOs: where it is told to stop, its node has to be stopped by then."""
-        track = self._oracle.tracks[drive]
-        mask, value = drive.family.enabled
 
         def is_done() -> bool:
-            told = [at for at in track.stops if at > since]
-            is_kept = track.said and all(word & mask == value for at, word in track.said if at > since)
-            if not told or not is_kept:
-                return True
-            return self._was_halted(drive.node_id, since)
+            return not self.ignores(drive, since) or self._was_halted(drive.node_id, since)
 
         text = f"{drive.path} ignores its stop, and its node goes on"
         self._owed.append(_Owed(since, since + seconds, is_done, text))
+
+    def ignores(self, drive: Drive, since: float) -> bool:
+        """Whether the drive was told to stop since then, and has not said anything but that it is enabled."""
+        track = self._oracle.tracks[drive]
+        mask, value = drive.family.enabled
+        told = any(at > since for at in track.stops)
+        return (
+            told and bool(track.said) and all(word & mask == value for at, word in track.said if at > since)
+        )
+
+    def is_operational(self, node_id: int) -> bool:
+        """Whether the node has said so last, and has not been told otherwise by the bridge."""
+        return self._states.get(node_id) == _OPERATIONAL and not self.is_halted(node_id)
+
+    def is_halted(self, node_id: int) -> bool:
+        """Whether the last word to it is a stop of the bridge's."""
+        last = [one for one in self._commands if one[2] in (0, node_id)]
+        return bool(last) and last[-1][3] and last[-1][1] in _HALTS
 
     def _was_halted(self, node_id: int, since: float) -> bool:
         """Whether it was told to stop since then, or has started anew."""
@@ -184,11 +203,26 @@ class Debts:
             return
         if can_id == _NMT and len(data) == 2:
             self._commands.append((at, data[0], data[1], who == "bridge"))
+            if who == "bridge" and data[0] in _CANCELS:
+                self._leaves(at, data[1])
         if who == "bridge":
             self._of_bridge(at, can_id, data)
 
+    def _leaves(self, at: float, node_id: int) -> None:
+        """The bridge takes a node out of operation: a stop that waits for SYNC is taken over before."""
+        if self._states.get(node_id) != _OPERATIONAL or not self.is_quiet() or self._disturbed_at > at - 1.0:
+            return
+        for track in self._of_node.get(node_id, []):
+            mask, value = track.drive.family.enabled
+            is_enabled = track.said and track.said[-1][1] & mask == value and track.said[-1][0] > at - 0.4
+            told = next((stop for stop in track.stops if stop > track.enabled_at), inf)
+            if track.drive.syncs and is_enabled and self._sync_at < told < inf:
+                self._oracle.looks += 1
+                self._oracle.wrong(at, f"{track.drive.path} has its node stopped before SYNC brings its stop")
+
     def _sign(self, node_id: int, at: float, data: bytes) -> None:
         self._signs[node_id] = at
+        self._states[node_id] = data[0] & 0x7F if data else 0
         if data[:1] == b"\0":
             self._began_anew[node_id] = at
         if data[:1] == b"\0" and self.is_quiet():
@@ -206,6 +240,8 @@ class Debts:
         if at > self._ours_at + _GONE_S:
             self._ours_since = at
         self._ours_at = at
+        if can_id == _SYNC:
+            self._sync_at = at
         if self._is_new:
             self._is_new = False
             self._first_frame(at)
@@ -252,7 +288,8 @@ def _is_silenced(track: Track, at: float) -> bool:
 
 
 def _has_followed(track: Track) -> bool:
-    """Whether the drive has said that it is not enabled, since the stop that it was told last."""
-    told = next((at for at in track.stops if at > track.enabled_at), inf)
+    """Whether the drive has said that it is not enabled, since the stop that it was told last, or since the
+    last word that enables it: it has stopped by itself then."""
+    told = next((at for at in track.stops if at > track.enabled_at), track.enabled_at + _STOPS_S)
     mask, value = track.drive.family.enabled
     return any(at > told and word & mask != value for at, word in track.said)

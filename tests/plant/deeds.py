@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from random import Random
 from typing import TYPE_CHECKING, Final
 
@@ -10,11 +11,12 @@ from bridge.canopen.frame import Frame
 from bridge.command import Code, EventKind, Identity, Outcome, Request, SetTimeout, Source, WriteParameter
 from tests.plant.bridge_process import Bridge
 from tests.plant.clients import Line, read, writes
-from tests.plant.field import FieldNode
 from tests.plant.machine import LOOK_S
 from tests.plant.plan import Step
+from tests.plant.summaries import ALARM, DANGER
 from tests.plant.third_parties import Intruder
-from tests.proof.drives import DRIVES, Drive
+from tests.proof.block import BLOCK
+from tests.proof.drives import DRIVES
 from tests.proof.families import CIA402, NORD
 from tests.proof.settings import PLANT
 
@@ -42,16 +44,15 @@ process that is late takes."""
 _EARLY_S: Final = 0.04
 _JOGS_S: Final = 25.0
 """By then the stops of one that jogs come to as much."""
+_FOR_GOOD_S: Final = 11.5
+"""So long one goes on that nothing stops: by then the witness has told, too."""
+_NMT: Final = 0x000
 _VICTIMS: Final = tuple(drive for drive in DRIVES if drive.family is CIA402)
 """They watch the bridge's heartbeat, and no RPDO: so nothing but their words stops them."""
 _RESERVED: Final = tuple(drive for drive in DRIVES if drive.family.reserved)
 _NORDS: Final = tuple(drive for drive in DRIVES if drive.family is NORD)
 _SILENT: Final = tuple(drive for drive in DRIVES if drive.reaction == "silence") or DRIVES
 _REACHES_NODE: Final = (Code.OK, Code.REFUSED_BY_DRIVE, Code.TIMED_OUT)
-
-
-def _node(plant: Plant, drive: Drive) -> FieldNode:
-    return next(node for node in plant.nodes if node.device.node_id == drive.node_id)
 
 
 def half_open(plant: Plant, step: Step) -> None:
@@ -98,14 +99,19 @@ def intrude(plant: Plant, step: Step) -> None:
     drive = DRIVES[step.which % len(DRIVES)]
     intruder = Intruder(plant.world, plant.wire, drive, step.how)
     now = plant.world.now
+    quiet = partial(bool, plant.is_quiet())
     if plant.is_quiet() and now > plant.intruder_at + _TOLD_EACH_S:
         what = f"an intruder's {step.how} at {drive.path}"
         plant.causes.owes(EventKind.INTRUDER, plant.wire.name, now, now + _FOUND_S + step.seconds, what)
     if plant.is_quiet() and step.how != "nmt":
         plant.debts.intruded(drive, step.how, now)
 
+    shown_at = now + _FOUND_S + step.seconds
+    plant.summaries.wrong(None, ALARM, now, shown_at, shown_at + _ORDER_S, f"an intruder's {step.how}", quiet)
+
     def goes_on() -> None:
         plant.intruder_at = plant.world.now
+        plant.summaries.intruded(plant.world.now)
         plant.oracle.intruded(drive, plant.world.now)
         if plant.world.now < now + step.seconds:
             plant.world.after(_ROUND_S, goes_on)
@@ -127,6 +133,7 @@ def second_bridge(plant: Plant, step: Step) -> None:
         return
     rng = Random(f"{plant.plan.seed} second {step.at}")
     wires = {plant.wire.name: plant.wire}
+    plant.summaries.intruded(plant.world.now + step.seconds)
     second = plant.second = Bridge(plant.world, plant.project, wires, "two", rng)
 
     def leave() -> None:
@@ -144,6 +151,7 @@ def twin(plant: Plant, step: Step) -> None:
     since = process.still_since
     if since != world.now or not plant.is_quiet():
         return
+    plant.summaries.intruded(world.now + step.seconds)
     port = plant.wire.port("twin", lambda frame: None)
     world.after(step.seconds / 2, lambda: port.send(Frame(_HEARTBEAT, _PRE_OPERATIONAL)))
     world.after(step.seconds, lambda: plant.debts.gives_way(since, world.now))
@@ -167,30 +175,40 @@ def end(plant: Plant, step: Step) -> None:
 
 
 def deaf(plant: Plant, step: Step) -> None:
-    """A drive does not hear its RPDO any more, and its controller is silent, or jogs."""
+    """A drive does not hear its RPDO any more, and its controller is silent, or jogs; or it hears no NMT
+    either, and nothing stops it."""
     drive = _VICTIMS[step.which % len(_VICTIMS)]
-    node, controller, now = _node(plant, drive), plant.controllers[drive.place], plant.world.now
-    node.deaf_to = drive.rpdo
+    node, controller, now = plant.node_of(drive), plant.controllers[drive.place], plant.world.now
+    node.deaf_to = (drive.rpdo, _NMT) if step.how == "to everything" else (drive.rpdo,)
     if step.how == "jogs":
         controller.stops_long = True
         plant.debts.deaf(drive, now, _JOGS_S)
     else:
         controller.is_silent = True
         plant.debts.deaf(drive, now, _TIMEOUT_S + _DEAF_S)
+    lasts_s = max(step.seconds, {"jogs": _JOGS_S + 1.0, "to everything": _FOR_GOOD_S}.get(step.how, 0.0))
+    plant.witnessed.deaf(drive, now + lasts_s)
+    plant.summaries.busy(now + lasts_s + 2 * _ORDER_S)
+    if step.how == "to everything":
+        ignores = partial(plant.debts.ignores, drive, now)
+        text = f"{drive.path} ignores its stop"
+        plant.summaries.wrong(
+            drive.node, DANGER, now, now + _TIMEOUT_S + _DEAF_S, now + lasts_s, text, ignores
+        )
 
     def hears() -> None:
-        node.deaf_to = None
+        node.deaf_to = ()
         controller.stops_long = False
         put_in_order(plant)
         controller.start()
 
-    plant.world.after(max(step.seconds, _JOGS_S + 1.0 if step.how == "jogs" else 0.0), hears)
+    plant.world.after(lasts_s, hears)
 
 
 def unbooted(plant: Plant, step: Step) -> None:
     """The bridge starts anew, and cannot boot a node that runs and knows of nothing."""
     drive = _VICTIMS[step.which % len(_VICTIMS)]
-    node, world = _node(plant, drive), plant.world
+    node, world = plant.node_of(drive), plant.world
     if plant.bridge.process.is_dead:
         return
     begins = plant.bridge.starts
@@ -301,20 +319,22 @@ def stop_in_silence(plant: Plant, step: Step) -> None:
 
 
 def set_reserved(plant: Plant, step: Step) -> None:
-    """Somebody who is no engineer sets, as parameters, what moves a drive and what stops it."""
+    """Somebody who is no engineer sets, as parameters, what moves a drive or outputs and what stops them."""
     drive = _RESERVED[step.which % len(_RESERVED)]
     who = Identity(Source.ZENOH, "colleague", sets_parameters=True)
 
-    def answered(name: str, outcome: Outcome) -> None:
-        if outcome.code in _REACHES_NODE:
-            text = f"{drive.path}: {name} is set by who may not ({outcome.code})"
-            plant.oracle.wrong(plant.world.now, text)
+    def sets(path: str, name: str, value: int) -> None:
+        def answered(outcome: Outcome) -> None:
+            if outcome.code in _REACHES_NODE:
+                text = f"{path}: {name} is set by who may not ({outcome.code})"
+                plant.oracle.wrong(plant.world.now, text)
+
+        plant.bridge.ask(Request(who, path, WriteParameter(name, value)), _DELAY_S, lambda: None, answered)
 
     for one in drive.family.reserved:
-        request = Request(who, drive.path, WriteParameter(one.name, one.value))
-        plant.bridge.ask(
-            request, _DELAY_S, lambda: None, lambda outcome, name=one.name: answered(name, outcome)
-        )
+        sets(drive.path, one.name, one.value)
+    for name in BLOCK.reserved:
+        sets(BLOCK.path, name, 0)
 
 
 MORE: Final[dict[str, Callable[[Plant, Step], None]]] = {

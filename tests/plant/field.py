@@ -23,15 +23,15 @@ class FieldNode:
         self.speaks = True
         self.is_mute = False
         """Nothing of it but its heartbeat reaches its wire."""
-        self.deaf_to: int | None = None
-        """An identifier that it does not hear."""
+        self.deaf_to: tuple[int, ...] = ()
+        """Identifiers that it does not hear."""
 
     def power_on(self) -> None:
         self.device.start(self._world.now)
         self.serve()
 
     def _take(self, frame: Frame) -> None:
-        if frame.can_id & STANDARD_MASK in self.device.heard and frame.can_id != self.deaf_to:
+        if frame.can_id & STANDARD_MASK in self.device.heard and frame.can_id not in self.deaf_to:
             self.device.on_frame(frame, frame.time)
             self.serve()
 

@@ -22,7 +22,7 @@ from bridge.command.leg import deeds
 from bridge.command.leg.table import TABLE, Deed
 from bridge.command.stop_check import step
 from bridge.command.stop_check.table import OUTCOME_TABLE, PLACE_TABLE, PlaceDeed
-from tests.plant.plan import KINDS, Plan, Step
+from tests.plant.plan import KINDS, Plan, Step, length_s
 from tests.plant.plant import Result
 
 _SHORT_S: Final = 0.5
@@ -121,8 +121,7 @@ _PAIRS: Final = [_pair(*pair) for pair in combinations_with_replacement(KINDS, 2
 
 
 def _length_s(step: Step) -> float:
-    is_length = step.what != "clock stepped"
-    return max(step.seconds, _SHORT_S) if is_length else _SHORT_S
+    return max(length_s(step), _SHORT_S)
 
 
 def summary(figures: Figures) -> str:

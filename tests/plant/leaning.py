@@ -3,8 +3,9 @@ wrong.
 
     python -m tests.plant.leaning --first FAULT [--seed N] [--seconds S] [--until S]
 
-``FAULT`` is one of the proof's (tests/proof/faults.py). Prints one line of JSON; ``--until`` plays the plan
-of ``--seed`` alone, and no longer than that.
+``FAULT`` is one of the proof's (tests/proof/faults.py), or a kind of step, such as ``deaf``, or
+``deaf: jogs``. Prints one line of JSON; ``--until`` plays the plan of ``--seed`` alone, and no longer than
+that.
 """
 
 from __future__ import annotations
@@ -80,11 +81,16 @@ LEANS: Final[dict[str, tuple[Group, ...]]] = {
     "second connection of the owner's address": (("stranger",), ("stranger", "jog")),
     "what moves a drive as a parameter": (("reserved parameter",),),
 }
-"""What is done first where the proof would begin with this fault; ``_SILENT`` for any other."""
+"""What is done first where the proof would begin with this fault; ``_SILENT`` for any other that is no kind
+of step itself."""
 _EACH_OF: Final = {
     "deaf drive": 16.0,
     "deaf drive whose owner jogs": 38.0,
     "stop asked for in a silence": 10.0,
+    "dead bridge": 16.0,
+    "deaf": 22.0,
+    "bus cut": 24.0,
+    "hang": 16.0,
 }
 """Seconds from one group to the next, where that takes longer."""
 
@@ -92,7 +98,8 @@ _EACH_OF: Final = {
 def leaning(seed: int, first: str, seconds: float = SECONDS) -> Plan:
     """A plan of these kinds of steps, in groups one after the other."""
     rng = Random(f"{seed} {first}")
-    groups = LEANS.get(first, _SILENT)
+    kind, _, always = first.partition(": ")
+    groups = LEANS.get(first) or (((kind,),) if kind in KINDS else _SILENT)
     steps: list[Step] = []
     at = _FIRST_S
     while at < seconds - _LAST_S:
@@ -100,10 +107,11 @@ def leaning(seed: int, first: str, seconds: float = SECONDS) -> Plan:
         which: int | None = None
         for what in group:
             drawn, length_s, how = KINDS[what](rng)
+            how = always if always and what == kind else how
             which = drawn if which is None else which
             begins = round(at + rng.uniform(0.0, rng.choice((0.1, 1.0, 2.7))), 4)
             steps.append(Step(begins, what, which, round(length_s, 4), how))
-        at += rng.uniform(0.7, 1.4) * _EACH_OF.get(first, _EACH_S)
+        at += rng.uniform(0.7, 1.4) * _EACH_OF.get(kind, _EACH_S)
     return Plan(seed, seconds, tuple(sorted(steps)))
 
 

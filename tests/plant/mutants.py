@@ -31,6 +31,8 @@ ELSEWHERE: Final = {
 """Mutants that no plant can find, and why."""
 _HALVES: Final = ("first", "second")
 _RULES: Final = (
+    ("a whole is as bad", "a whole is said"),
+    ("a whole is as bad", "condition is said to be"),
     ("the reaction", "is to react by"),
     ("the reaction", "is to hold, and"),
     ("the reaction", "its setpoint is sent on"),
@@ -40,6 +42,7 @@ _RULES: Final = (
     ("owed stops", "gets no stop though"),
     ("owed stops", "gets no NMT stop"),
     ("owed stops", "by a service that ends"),
+    ("owed stops", "before SYNC brings"),
     ("dead is silent", "a dead bridge sends"),
     ("lost nodes", "its node is silent"),
     ("intruders are answered", "is not answered"),
@@ -48,6 +51,11 @@ _RULES: Final = (
     ("stopped outputs", "outputs that"),
     ("nobody but the owner", "somebody else sets"),
     ("nobody but the owner", "is set by who may not"),
+    ("the witness speaks", "the witness does not say"),
+    ("the witness is right", "the witness says"),
+    ("in order again", "everything is in order"),
+    ("causes first", "stands beside it"),
+    ("causes first", "is not said to be silent"),
     ("in time", "ms after its controller's last telegram"),
     ("in time", "ms after the bridge fell silent"),
     ("asked for", "has not asked for it"),

@@ -25,6 +25,7 @@ _WIRE_S: Final = 0.01
 _KERNEL_S: Final = 0.002
 """Each period of the kernel's is a little longer than it should be."""
 REACTION_S: Final = (PLANT.rpdo_period_ms + REACTION_MS) / 1000 + _WIRE_S
+_SILENT_S: Final = 3 * PLANT.rpdo_period_ms / 1000
 _SEEN_S: Final = 0.02
 """Frames that were on their way when the bus went off."""
 _GONE_S: Final = 0.5
@@ -162,6 +163,8 @@ class Oracle:
         self.violations: list[str] = []
         self.on_trip: Callable[[Drive, float, float], None] = lambda drive, since, due: None
         """Called with a drive whose controller was silent for too long, and from when to when it may trip."""
+        self.on_stop: Callable[[Drive, float], None] = lambda drive, at: None
+        """Called with a drive that is told to stop, and was told to run before."""
         self.looks = 0
         """How many frames and values were judged."""
         self._still_since = inf
@@ -322,6 +325,10 @@ class Oracle:
         drive = track.drive
         self.looks += 1
         if not drive.enabling(data):
+            latest = track.stops[-1] if track.stops else -inf
+            # Who was told nothing for a while has been stopped by that.
+            if track.enabled_at > max(latest, at - _SILENT_S):
+                self.on_stop(drive, at)
             track.stops.append(at)
             track.stop_word = drive.control_word(data)
             return

@@ -15,6 +15,8 @@ FIRST_S: Final = 8.0
 _LAST_S: Final = 12.0
 """So long nothing is done at the end."""
 _STOPS: Final = ("stop", "quick_stop", "disable_voltage")
+_DEAF: Final = ("silent", "jogs", "to everything")
+_WHILE_DEAD: Final = ("runs on", "taken out", "kept running", "outputs are active")
 _NODES: Final = len({drive.node for drive in DRIVES})
 
 
@@ -28,6 +30,11 @@ class Step(NamedTuple):
     """Drive or node by its place, or a number of another kind."""
     seconds: float = 0.0
     how: str = ""
+
+
+def length_s(step: Step) -> float:
+    """How long it lasts."""
+    return 0.0 if step.what == "clock stepped" else step.seconds
 
 
 class Plan(NamedTuple):
@@ -86,7 +93,7 @@ KINDS: Final[dict[str, Draw]] = {
     "outputs stopped": lambda rng: (0, 0.0, rng.choice(("silent", "acknowledges"))),
     "twin": lambda rng: (0, rng.uniform(1.2, 3.0) * PLANT.deadman_ms / 1000, ""),
     "end": lambda rng: (0, rng.uniform(0.05, 4.0), ""),
-    "deaf": lambda rng: (_drive(rng), rng.uniform(8.0, 10.0), rng.choice(("silent", "silent", "jogs"))),
+    "deaf": lambda rng: (_drive(rng), rng.uniform(8.0, 10.0), rng.choice(_DEAF)),
     "unbooted": lambda rng: (_drive(rng), rng.uniform(2.0, 6.0), ""),
     "no acknowledge": lambda rng: (_drive(rng), rng.uniform(2.0, 6.0), ""),
     "pause at the deadline": lambda rng: (_drive(rng), rng.uniform(0.8, 1.5) * PLANT.deadman_ms / 1000, ""),
@@ -97,6 +104,7 @@ KINDS: Final[dict[str, Draw]] = {
     "reserved parameter": lambda rng: (_drive(rng), 0.0, ""),
     "second bridge": lambda rng: (0, rng.uniform(1.0, 8.0), ""),
     "box slow": lambda rng: (0, rng.uniform(1.0, 6.0), rng.choice(("0.0001", "0.0003"))),
+    "dead bridge": lambda rng: (_drive(rng), rng.uniform(6.8, 7.8), rng.choice(_WHILE_DEAD)),
     "clock stepped": lambda rng: (0, rng.uniform(-3600.0, 3600.0), ""),
 }
 """What can happen, and how it is drawn."""

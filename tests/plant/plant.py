@@ -9,15 +9,16 @@ from pathlib import Path
 from random import Random
 from typing import Final
 
-from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.cli.simulation import simulated_nodes
 from bridge.command import EventKind, Outcome, Request, Write
 from bridge.project import Project, load_project
 from tests.plant.answers import Answers
 from tests.plant.bridge_process import Bridge
+from tests.plant.bus_deeds import bus_off, cut, noise, reset_node, silence_node
 from tests.plant.causes import Causes
 from tests.plant.clients import Controller, Operator, Stranger
+from tests.plant.dead_bridge import be_dead
 from tests.plant.debts import Debts
 from tests.plant.deeds import CALM, MORE
 from tests.plant.field import FieldNode
@@ -25,9 +26,12 @@ from tests.plant.front import Front
 from tests.plant.meeting import Meeting
 from tests.plant.oracle import Oracle
 from tests.plant.outputs import Outputs, stop_outputs
-from tests.plant.plan import Plan, Step
+from tests.plant.plan import Plan, Step, length_s
+from tests.plant.summaries import Summaries
 from tests.plant.ways import Ways
 from tests.plant.wire import Port, Wire
+from tests.plant.witness import Witness
+from tests.plant.witnessed import Witnessed
 from tests.plant.world import BEGIN_S, World
 from tests.proof.block import BLOCK
 from tests.proof.drives import DRIVES, Drive, write_site
@@ -40,6 +44,8 @@ _QUIET_S: Final = 1.0
 _MIRROR_S: Final = 1.3
 """By so much a value may be older in a front: after a second without news, and a look each 0.1 s, it says
 that the bus process is gone."""
+_SETTLES_S: Final = 5.0
+"""What a step has left behind is put in order by then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,14 +95,19 @@ class Plant:
         self.debts = Debts(self.oracle)
         self.before_telegram: Callable[[], None] = lambda: None
         """Called once before the bridge's next turn with a controller's telegram."""
-        self.answers.is_quiet = self.debts.is_quiet = self.is_quiet
         self.ways = Ways(self.oracle)
         self.outputs = Outputs(self.oracle)
+        self.summaries = Summaries(self.oracle, table.name)
+        self.witnessed = Witnessed(self.oracle, table.name)
+        Witness(self.world, self.wire, project, self.witnessed)
+        self.answers.is_quiet = self.debts.is_quiet = self.witnessed.is_quiet = self.is_quiet
         self.has_outputs = False
         """Whether the outputs have an owner."""
         self.oracle.on_trip = self._on_trip
+        self.oracle.on_stop = self._on_stop
         self.second: Bridge | None = None
         self.project = project
+        self.names = {node.id: node.name for node in table.node}
         self.nodes = [
             FieldNode(self.world, self.wire, device) for device in simulated_nodes(table, project.path)
         ]
@@ -169,10 +180,11 @@ class Plant:
     def _on_frame(self, frame: Frame, sender: Port) -> None:
         of_bridge = sender.name.startswith("bridge")
         self.world.tell_frame(sender.name, frame)
+        self.witnessed.sender = sender.name
         if sender.name == _SECOND:
             self.oracle.frame_of_other(frame.time, frame.can_id, frame.data)
             self.debts.frame_of_other(frame.time, frame.can_id)
-            self._disturbed()
+            self.disturbed()
             return
         self.oracle.frame(frame.time, frame.can_id, frame.data, of_bridge=of_bridge)
         who = "bridge" if of_bridge else sender.name.partition(" ")[0]
@@ -203,26 +215,31 @@ class Plant:
 
     def _on_start(self) -> None:
         self.oracle.started()
+        self.witnessed.restarted(self.world.now)
         self.debts.started()
-        self._disturbed()
+        self.disturbed()
 
     def on_still(self, now: float) -> None:
         self._silent_since = now
-        self._disturbed()
+        self.disturbed()
 
     def on_going_on(self, since: float, now: float) -> None:
-        self._disturbed()
+        self.disturbed()
 
     def on_end(self, now: float) -> None:
         self._silent_since = now
         self.answers.ended(now)
-        self._disturbed()
+        self.disturbed()
         self.world.after(self.down_s, self.bridge.restart)
 
-    def _disturbed(self) -> None:
-        for judge in (self.answers, self.causes, self.debts, self.outputs):
+    def disturbed(self) -> None:
+        for judge in (self.answers, self.causes, self.debts, self.outputs, self.summaries):
             judge.disturbed(self.world.now)
         self.ways.excuse(self.world.now)
+
+    def loud(self, seconds: float) -> None:
+        """Frames may be lost from now on for so long."""
+        self._loud_until = max(self._loud_until, self.world.now + seconds + _QUIET_S)
 
     def is_quiet(self) -> bool:
         """Whether frames reach everybody, and have done so for a while."""
@@ -231,6 +248,17 @@ class Plant:
     def _on_trip(self, drive: Drive, since: float, due: float) -> None:
         what = f"the controller of {drive.path} was silent for too long"
         self.causes.owes(EventKind.WATCHDOG, drive.path, since - _ROUND_S, due + _ROUND_S, what)
+
+    def _on_stop(self, drive: Drive, told: float) -> None:
+        def look() -> None:
+            process, now = self.bridge.process, self.world.now
+            # A node in Stopped may be all that a drive has to say.
+            is_told = not self.debts.is_halted(drive.node_id)
+            if is_told and not (process.is_dead or process.still_since < now):
+                said = self.bridge.good_number(f"{drive.path}/supervision/last_stop")
+                self.answers.still_running(drive, told, now, said)
+
+        self.world.after(_ROUND_S, look)
 
     def _look(self) -> None:
         self.world.after(_LOOK_S, self._look)
@@ -260,6 +288,7 @@ class Plant:
             said = self.bridge.good_number(f"{at}/last_stop")
             self.answers.last_stop(drive, now, self._last_stops[drive], said)
             self._last_stops[drive] = said
+        self.summaries.look(now, self.bridge)
 
     # what happens
 
@@ -269,9 +298,14 @@ class Plant:
             self.world.tell(f"step {step.what} {step.which} {step.seconds} {step.how}")
             if step.what not in CALM:
                 self.ways.excuse(self.world.now + step.seconds)
+            if step.what != "bus cut":
+                self.summaries.busy(self.world.now + length_s(step) + _SETTLES_S)
             _STEPS[step.what](self, step)
 
         return do
+
+    def node_of(self, drive: Drive) -> FieldNode:
+        return next(node for node in self.nodes if node.device.node_id == drive.node_id)
 
     def controller(self, step: Step) -> Controller:
         return self.controllers[step.which % len(self.controllers)]
@@ -363,42 +397,6 @@ class Plant:
             self.down_s = step.seconds
             self.bridge.process.kill(in_turn=step.how == "in a turn")
 
-    def bus_off(self, step: Step) -> None:
-        now = self.world.now
-        for bus in self.bridge.buses:
-            bus.enter(ControllerState.BUS_OFF)
-        self.oracle.bus_off(now)
-        self._disturbed()
-        self._loud_until = max(self._loud_until, now + step.seconds + _QUIET_S)
-        buses = list(self.bridge.buses)
-
-        def back() -> None:
-            self._disturbed()
-            for bus in buses:
-                bus.enter(ControllerState.OK)
-
-        self.world.after(step.seconds, back)
-
-    def cut(self, step: Step) -> None:
-        self._loud_until = max(self._loud_until, self.world.now + step.seconds + _QUIET_S)
-        self.wire.is_cut = True
-        self.world.after(step.seconds, lambda: setattr(self.wire, "is_cut", False))
-
-    def noise(self, step: Step) -> None:
-        self._loud_until = max(self._loud_until, self.world.now + step.seconds + _QUIET_S)
-        self.wire.loss = float(step.how)
-        self.world.after(step.seconds, lambda: setattr(self.wire, "loss", 0.0))
-
-    def reset_node(self, step: Step) -> None:
-        node = self.nodes[step.which % len(self.nodes)]
-        node.device.power_cycle()
-        node.serve()
-
-    def silence_node(self, step: Step) -> None:
-        node = self.nodes[step.which % len(self.nodes)]
-        node.speaks = False
-        self.world.after(step.seconds, lambda: setattr(node, "speaks", True))
-
     def step_clock(self, step: Step) -> None:
         self.world.wall_step_s += step.seconds
 
@@ -416,12 +414,13 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "kill": Plant.kill,
     "front hangs": Plant.hang_front,
     "front killed": Plant.kill_front,
-    "bus off": Plant.bus_off,
-    "bus cut": Plant.cut,
-    "noise": Plant.noise,
-    "node reset": Plant.reset_node,
-    "node silent": Plant.silence_node,
+    "bus off": bus_off,
+    "bus cut": cut,
+    "noise": noise,
+    "node reset": reset_node,
+    "node silent": silence_node,
     "clock stepped": Plant.step_clock,
     "outputs stopped": stop_outputs,
+    "dead bridge": be_dead,
     **MORE,
 }

@@ -35,6 +35,8 @@ class Block:
     active: bytes = b"\xfe\x0f"
     held: bytes = b"\xfe\x00"
     safe: bytes = b"\x00\x00"
+    reserved: tuple[str, ...] = ("6200:01", "6206:01", "6207:01")
+    """What moves them, and what makes them safe where the bridge is silent (CiA 401)."""
 
     @property
     def path(self) -> str:

@@ -329,6 +329,18 @@ def test_a_flush_ends_every_transfer_and_sends_nothing(client: Client) -> None:
     assert client.channel.next_deadline() is None
 
 
+@pytest.mark.parametrize(("later_s", "is_told"), [(0.1, True), (1.1, False)])
+def test_a_server_that_may_still_answer_is_told_of_the_end_before_it_is_asked_again(
+    client: Client, later_s: float, is_told: bool
+) -> None:
+    client.read(0x1000)
+    client.sent()
+    client.channel.flush(0.0)
+    client.channel.read(0x1001, 0, later_s, client.results.append)
+    asked = "40 01 10 00 00 00 00 00"
+    assert client.sent() == (["80 00 10 00 00 00 00 08", asked] if is_told else [asked])
+
+
 def serve(data: bytes, client: Client) -> None:
     """A server that sends ``data`` segmented."""
     toggle, rest, pending = 0, data, b""

@@ -274,6 +274,32 @@ def test_a_process_stopped_at_the_end_of_its_last_look_at_the_clock_sends_nothin
     assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]
 
 
+@pytest.mark.parametrize("is_stopped", [False, True])
+def test_a_process_stopped_at_its_look_at_the_clock_has_the_bus_send_nothing_that_is_due(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, is_stopped: bool
+) -> None:
+    """Where the bridge itself repeats a frame, as it does in place of the kernel."""
+    running(bench)
+    alarm, look = WatchdogTimer(), BusLine.stood_still
+
+    def stand_still_after(line: BusLine, since: float) -> bool:
+        found = look(line, since)
+        alarm.rang = is_stopped and bool(alarm_is_set)
+        return found
+
+    alarm_is_set: list[float] = []
+    (line,) = bench.master._lines
+    due = bench.bus.next_deadline()
+    assert due is not None
+    bench.now = due
+    bench.log.clear()
+    monkeypatch.setattr(alarm, "set", alarm_is_set.append)
+    monkeypatch.setattr(line, "alarm", alarm)
+    monkeypatch.setattr(BusLine, "stood_still", stand_still_after)
+    line.let_bus_work(due)
+    assert bool(bench.log) is not is_stopped
+
+
 def test_a_process_stopped_on_the_way_to_the_kernel_hands_nothing_over(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -175,3 +175,20 @@ def test_a_start_begins_with_what_was_taken_and_not_with_what_was_refused(
     scene.oracle.telegram(DRIVE, 1013.0, START)
     scene.sees(1012.0, FAMILY.run)
     assert bool(scene.wrong()) is not is_good
+
+
+@pytest.mark.parametrize(("said_at", "is_wrong"), [(1009.5, True), (1010.03, False)])
+def test_what_a_drive_has_said_before_its_stop_is_no_answer(
+    scene: Scene, said_at: float, is_wrong: bool
+) -> None:
+    told: list[float] = []
+    scene.oracle.on_stop = lambda drive, at: told.append(at)
+    scene.sees(1009.9, FAMILY.run)
+    for at in (1010.0, 1010.05):
+        scene.sees(at, FAMILY.ready)
+    assert told == [1010.0], "the first word that stops"
+    scene.oracle.frame(said_at, DRIVE.tpdo, bytes(8), of_bridge=False)
+    scene.answers.still_running(DRIVE, 1010.0, 1010.05, 1.0)
+    assert not scene.oracle.violations
+    scene.answers.still_running(DRIVE, 1010.0, 1010.05, 2.0)
+    assert bool(scene.oracle.violations) is is_wrong

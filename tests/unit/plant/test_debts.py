@@ -221,3 +221,30 @@ def test_a_bridge_that_starts_begins_with_stops(scene: Scene) -> None:
     scene.says(1030.9)
     scene.debts.frame(1031.0, 0x77F, b"\0", "bridge")
     assert "it runs as the bridge starts" in scene.wrong()
+
+
+SYNCED = next(drive for drive in DRIVES if drive.syncs)
+
+
+@pytest.mark.parametrize(
+    ("sync_at", "state", "is_wrong"), [(1029.9, 5, True), (1030.1, 5, False), (1029.9, 4, False)]
+)
+def test_a_stop_that_waits_for_sync_is_brought_before_its_node_is_stopped(
+    sync_at: float, state: int, is_wrong: bool
+) -> None:
+    oracle = Oracle([SYNCED])
+    debts = Debts(oracle)
+    family = SYNCED.family
+    frames = [
+        (1029.0, 0x700 + SYNCED.node_id, bytes((state,)), "node"),
+        (1029.9, SYNCED.tpdo, family.enabled[1].to_bytes(2, "little"), "node"),
+        (1029.8, SYNCED.rpdo, family.run.to_bytes(2, "little") + bytes(2), "bridge"),
+        (1030.0, SYNCED.rpdo, family.ready.to_bytes(2, "little") + bytes(2), "bridge"),
+        (sync_at, 0x080, b"", "bridge"),
+    ]
+    for at, can_id, data, who in frames:
+        oracle.frame(at, can_id, data, of_bridge=who == "bridge")
+        debts.frame(at, can_id, data, who)
+    oracle.violations.clear()
+    debts.frame(1030.15, 0x000, bytes((2, SYNCED.node_id)), "bridge")
+    assert ("before SYNC brings its stop" in " ".join(oracle.violations)) is is_wrong

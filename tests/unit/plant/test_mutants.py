@@ -8,7 +8,10 @@ from tests.plant.leaning import LEANS, SECONDS, leaning, plan
 from tests.plant.mutants import ELSEWHERE, rule_of
 from tests.plant.plan import KINDS
 from tests.proof.faults import FAULTS
-from tests.proof.mutants import load
+from tests.proof.mutants import files_of, load
+from tests.support.process import REPOSITORY
+
+TAKEN_BACK = REPOSITORY / "tests" / "plant" / "taken_back"
 
 
 def test_each_kind_that_a_plan_leans_to_is_one() -> None:
@@ -42,3 +45,20 @@ def test_a_mutant_that_no_plant_finds_is_there() -> None:
 )
 def test_a_finding_has_a_rule(found: str, rule: str) -> None:
     assert rule_of(found) == rule
+
+
+@pytest.mark.parametrize(
+    ("first", "ways"), [("deaf", {"silent", "jogs", "to everything"}), ("deaf: jogs", {"jogs"})]
+)
+def test_a_plan_may_lean_to_a_kind_of_step_and_to_one_way_of_it(first: str, ways: set[str]) -> None:
+    steps = [step for seed in range(20) for step in leaning(seed, first).steps]
+    assert {(step.what, step.how) for step in steps} == {("deaf", how) for how in ways}
+
+
+def test_each_fault_that_is_taken_back_has_its_place_in_the_program_and_a_plan() -> None:
+    mutants = [mutant for path in sorted(TAKEN_BACK.glob("*.toml")) for mutant in load(path)]
+    assert len({mutant.name for mutant in mutants}) == len(mutants)
+    faults = {fault.name for fault in FAULTS}
+    for mutant in mutants:
+        assert files_of(mutant)
+        assert mutant.first in faults or mutant.first.partition(": ")[0] in KINDS

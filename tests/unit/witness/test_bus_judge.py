@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from bridge.witness.bus_judge import BLIND_S, UNKNOWN_MS, BusJudge
 from bridge.witness.findings import Alarm, AlarmKind, Cause, Sight, Stop
-from bridge.witness.plan import EnableWord, Speed, WatchedBus, WatchedDrive
+from bridge.witness.plan import FRESH_S, EnableWord, Speed, WatchedBus, WatchedDrive
 
 RPDO, TPDO, SYNC = 0x205, 0x185, 0x080
 CONTROL, STATUS = EnableWord(0, 2, 0x000F, 0x000F), EnableWord(0, 2, 0x007F, 0x0037)
@@ -352,6 +352,28 @@ def test_a_drive_whose_node_is_stopped_while_it_is_enabled_may_run_on() -> None:
     assert plant.kinds == [AlarmKind.UNHEARD]
 
 
+def test_a_node_that_has_restarted_may_be_asked_anew() -> None:
+    plant = heard()
+    question = 0x605, bytes.fromhex("40 00 10 00 00 00 00 00")
+    for frame in (question, (HEARTBEAT, b"\0"), question):
+        plant.watch.on_frame(*frame, plant.now)
+    plant.run(0.1)
+    assert not plant.alarms
+
+
+def test_who_is_back_in_operation_is_heard_though_it_is_enabled() -> None:
+    plant = heard()
+    plant.watch.on_frame(NMT, b"\x80\x05", plant.now)
+    plant.watch.take_findings()
+    # One TPDO waited for the bus, and says nothing of the node's state.
+    plant.run(0.01)
+    plant.tpdo = None
+    plant.run(0.5)
+    plant.tpdo = ENABLED
+    plant.run(6.0)
+    assert not plant.alarms
+
+
 @pytest.mark.parametrize(
     ("drive", "state"), [(HEARD, b"\x00"), (replace(HEARD, nmt_stops=True), b"\x04"), (HEARD, None)]
 )
@@ -417,6 +439,16 @@ def test_foreign_services_are_told(can_id: int, data: bytes) -> None:
     plant.run(0.01)
     assert plant.kinds == [AlarmKind.INTRUDER]
     assert "somebody else sends it" in plant.alarms[0].message
+
+
+def test_a_bridge_that_begins_again_is_nobody_else() -> None:
+    """It wakes a node that is stopped before it can send it a word."""
+    plant = heard()
+    plant.rpdo, plant.tpdo = None, READY
+    plant.run(FRESH_S + 0.1)
+    plant.watch.on_frame(NMT, b"\x80\x05", plant.now)
+    plant.run(0.01)
+    assert not plant.alarms
 
 
 def test_a_deaf_drive_whose_owner_jogs_is_told_once_in_a_while() -> None:

@@ -87,9 +87,39 @@ def test_after_the_answer_or_an_abort_the_next_may_follow(between: tuple[int, by
     assert not bus.told
 
 
-def test_after_its_time_out_a_request_may_be_repeated() -> None:
+@pytest.mark.parametrize("command", [0x02, 0x81, 0x82])
+def test_what_a_node_was_asked_before_it_was_stopped_has_no_answer(command: int) -> None:
     bus = Bus()
     bus.sees(0x605, READ, 1.0)
+    bus.sees(0x000, bytes((command, 5)), 1.1)
+    bus.sees(0x605, READ, 1.2)
+    assert not bus.told
+
+
+def test_a_stopped_node_answers_nothing_until_it_is_woken() -> None:
+    bus = Bus()
+    bus.sees(0x000, b"\x02\x00", 1.0)
+    for at in (1.1, 1.2):
+        bus.sees(0x605, READ, at)
+    bus.sees(0x000, b"\x80\x05", 1.3)
+    bus.sees(0x605, READ, 1.4)
+    assert not bus.told
+    assert "two SDO requests" in bus.sees(0x605, READ, 1.5)
+
+
+def test_nor_does_one_that_has_restarted() -> None:
+    bus = Bus()
+    bus.sees(0x605, READ, 1.0)
+    bus.services.on_restart(5)
+    bus.sees(0x605, READ, 1.1)
+    assert not bus.told
+
+
+@pytest.mark.parametrize("waited_s", [0.0, 0.03])
+def test_after_its_time_out_a_request_may_be_repeated(waited_s: float) -> None:
+    """The first of them may have waited for the bus."""
+    bus = Bus()
+    bus.sees(0x605, READ, 1.0 + waited_s)
     bus.sees(0x605, READ, 1.0 + TIMEOUT_S)
     bus.sees(0x606, READ, 1.0 + TIMEOUT_S)
     assert not bus.told

@@ -53,6 +53,14 @@ def test_a_drive_that_does_not_brake_is_told(run_s: float, stop_s: float, tpdo_s
     assert told.startswith("enabled and no slower in ")
 
 
+def test_it_is_told_again_only_when_it_has_not_braked_for_as_long_again() -> None:
+    drive = Drive(None)
+    drive.phase(2.0, stops=False)
+    drive.phase(4 * JUDGED_S + 0.5, stops=True)
+    assert len(drive.told) == 4
+    assert all(" of 1 stops" in told for told in drive.told)
+
+
 @pytest.mark.parametrize("noise", [1, 160])
 def test_noise_does_not_hide_it(noise: int) -> None:
     drive = Drive(None, noise=noise)

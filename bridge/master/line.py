@@ -144,6 +144,24 @@ class BusLine:
         before are stale. The next round finds the gap."""
         return (self.clock() - since) * 1000 > self.network.bus.deadman_ms
 
+    def do_due(self, now: float) -> None:
+        """Let the bus do what is due, unless the process was stopped: the next round finds the gap."""
+        due = self.bus.next_deadline()
+        if due is None or due > now:
+            if not self.stood_still(now):
+                self.bus.on_time(now)
+            return
+        self.alarm.set(self.burst_s)
+        try:
+            # As a hand-over: the process may be stopped right after it has read the clock.
+            self.alarm.breaks_in = True
+            if not (self.stood_still(now) or self.alarm.rang):
+                self.bus.on_time(now)
+        except StoodStill:
+            return
+        finally:
+            self.alarm.breaks_in = False
+
     def flush(self, now: float) -> None:
         """Hand to the bus what is to be sent and repeated now."""
         bus, network = self.bus, self.network

@@ -223,8 +223,7 @@ class Master:
             return
         # After what a round sends: a SYNC that is due makes it effective.
         for line in self._lines:
-            if not line.stood_still(now):
-                line.bus.on_time(now)
+            line.do_due(now)
         if self._lines_have_news():
             self.pump()
             return
@@ -272,8 +271,7 @@ class Master:
         self._run_timers(now)
         for line in self._lines:
             line.flush(now)
-            if not line.stood_still(now):
-                line.bus.on_time(now)
+            line.do_due(now)
         stop_due = self._plant.take_stop_due()
         if stop_due is not None:
             self._lateness.on_stop(stop_due, self._clock())

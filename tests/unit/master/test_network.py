@@ -274,6 +274,43 @@ def test_a_process_stopped_at_the_end_of_its_last_look_at_the_clock_sends_nothin
     assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]
 
 
+def test_a_process_stopped_as_a_bus_is_due_sends_nothing_that_was_right_before(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the end of the look at the clock before a burst's next frame, with no round due."""
+    running(bench)
+    alarm, look = WatchdogTimer(), BusLine.stood_still
+
+    def stand_still_after(line: BusLine, since: float) -> bool:
+        found = look(line, since)
+        bench.now += 1.0
+        alarm.rang = True
+        if alarm.breaks_in:
+            raise StoodStill
+        return found
+
+    (line,) = bench.master._lines
+    due = bench.bus.next_deadline()
+    while due is None or due > (bench.master._due or 0.0) - 0.001:
+        bench.run(0.002)
+        bench.write(control_word=0x047F, setpoint_1=0x2000)
+        due = bench.bus.next_deadline()
+    bench.now = due
+    bench.log.clear()
+    done: list[float] = []
+    with monkeypatch.context() as patched:
+        patched.setattr(line, "alarm", alarm)
+        patched.setattr(bench.bus, "on_time", done.append)
+        patched.setattr(BusLine, "stood_still", stand_still_after)
+        bench.master.take_in()
+    assert alarm.rang
+    assert not alarm.breaks_in
+    assert not done
+    bench.run(0.5)
+    assert bench.sent(RPDO1)
+    assert not [frame.data.hex() for frame in bench.sent(RPDO1) if frame.data[0] & 0x0F == 0x0F]
+
+
 def test_a_process_stopped_on_the_way_to_the_kernel_hands_nothing_over(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

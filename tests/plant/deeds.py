@@ -10,11 +10,12 @@ from bridge.canopen.frame import Frame
 from bridge.command import Code, EventKind, Identity, Outcome, Request, SetTimeout, Source, WriteParameter
 from tests.plant.bridge_process import Bridge
 from tests.plant.clients import Line, read, writes
-from tests.plant.field import FieldNode
+from tests.plant.hoist import position
+from tests.plant.keypad import answer_otherwise, change, run_in_other_set
 from tests.plant.machine import LOOK_S
 from tests.plant.plan import Step
 from tests.plant.third_parties import Intruder
-from tests.proof.drives import DRIVES, Drive
+from tests.proof.drives import DRIVES
 from tests.proof.families import CIA402, NORD
 from tests.proof.settings import PLANT
 
@@ -48,10 +49,6 @@ _RESERVED: Final = tuple(drive for drive in DRIVES if drive.family.reserved)
 _NORDS: Final = tuple(drive for drive in DRIVES if drive.family is NORD)
 _SILENT: Final = tuple(drive for drive in DRIVES if drive.reaction == "silence") or DRIVES
 _REACHES_NODE: Final = (Code.OK, Code.REFUSED_BY_DRIVE, Code.TIMED_OUT)
-
-
-def _node(plant: Plant, drive: Drive) -> FieldNode:
-    return next(node for node in plant.nodes if node.device.node_id == drive.node_id)
 
 
 def half_open(plant: Plant, step: Step) -> None:
@@ -169,7 +166,7 @@ def end(plant: Plant, step: Step) -> None:
 def deaf(plant: Plant, step: Step) -> None:
     """A drive does not hear its RPDO any more, and its controller is silent, or jogs."""
     drive = _VICTIMS[step.which % len(_VICTIMS)]
-    node, controller, now = _node(plant, drive), plant.controllers[drive.place], plant.world.now
+    node, controller, now = plant.node_of(drive), plant.controllers[drive.place], plant.world.now
     node.deaf_to = drive.rpdo
     if step.how == "jogs":
         controller.stops_long = True
@@ -190,7 +187,7 @@ def deaf(plant: Plant, step: Step) -> None:
 def unbooted(plant: Plant, step: Step) -> None:
     """The bridge starts anew, and cannot boot a node that runs and knows of nothing."""
     drive = _VICTIMS[step.which % len(_VICTIMS)]
-    node, world = _node(plant, drive), plant.world
+    node, world = plant.node_of(drive), plant.world
     if plant.bridge.process.is_dead:
         return
     begins = plant.bridge.starts
@@ -335,6 +332,11 @@ MORE: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "sets time-out": set_timeout,
     "stops in a silence": stop_in_silence,
     "reserved parameter": set_reserved,
+    "late answers": answer_otherwise,
+    "wrong answers": answer_otherwise,
+    "keypad": change,
+    "other set": run_in_other_set,
+    "positions": position,
 }
 """Kinds of steps (tests/plant/plan.py), and what they do."""
 CALM: Final = (
@@ -349,6 +351,11 @@ CALM: Final = (
     "stops in a silence",
     "outputs stopped",
     "reserved parameter",
+    "late answers",
+    "wrong answers",
+    "keypad",
+    "other set",
+    "positions",
     "clock stepped",
 )
 """Kinds beside which it is known why a drive is stopped."""

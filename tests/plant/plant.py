@@ -12,8 +12,9 @@ from typing import Final
 from bridge.can.interface import ControllerState
 from bridge.canopen.frame import Frame
 from bridge.cli.simulation import simulated_nodes
-from bridge.command import EventKind, Outcome, Request, Write
+from bridge.command import Event, EventKind, Outcome, Request, Write
 from bridge.project import Project, load_project
+from tests.plant import hoist
 from tests.plant.answers import Answers
 from tests.plant.bridge_process import Bridge
 from tests.plant.causes import Causes
@@ -26,6 +27,7 @@ from tests.plant.meeting import Meeting
 from tests.plant.oracle import Oracle
 from tests.plant.outputs import Outputs, stop_outputs
 from tests.plant.plan import Plan, Step
+from tests.plant.truths import truths_of
 from tests.plant.ways import Ways
 from tests.plant.wire import Port, Wire
 from tests.plant.world import BEGIN_S, World
@@ -63,7 +65,7 @@ def project(folder: Path) -> Project:
     for name in ("state", "run"):
         (folder / name).mkdir(exist_ok=True)
     site = folder / "site.toml"
-    others = (BLOCK.site(folder),)
+    others = BLOCK.site(folder), hoist.site()
     return load_project(write_site(site, "can0", folder / "state", folder / "run", others=others))
 
 
@@ -92,14 +94,15 @@ class Plant:
         self.answers.is_quiet = self.debts.is_quiet = self.is_quiet
         self.ways = Ways(self.oracle)
         self.outputs = Outputs(self.oracle)
-        self.has_outputs = False
-        """Whether the outputs have an owner."""
+        self.has_outputs = self.has_hoist = False
+        """Whether they have an owner."""
         self.oracle.on_trip = self._on_trip
         self.second: Bridge | None = None
         self.project = project
         self.nodes = [
             FieldNode(self.world, self.wire, device) for device in simulated_nodes(table, project.path)
         ]
+        self.nodes_by_id = {node.device.node_id: node for node in self.nodes}
         meeting = Meeting(self.world)
         chance = Random(f"{plan.seed} bridge")
         self.bridge = Bridge(self.world, project, {table.name: self.wire}, "one", chance, records, meeting)
@@ -110,7 +113,8 @@ class Plant:
         self.front.on_answer.append(self._on_fronts_answer)
         self.front.on_lost.append(lambda number: self.answers.lost(("opcua", number)))
         self.bridge.on_start.append(self._on_start)
-        self.bridge.on_event.append(lambda event: self.causes.told(event, self.world.now))
+        self.truths = truths_of(self)
+        self.bridge.on_event.append(self._on_event)
         self.bridge.watchers += [self.oracle, self.debts, self]
         self.bridge.on_request.append(
             lambda number, asked: self.answers.asked(("", number), asked, self.world.now)
@@ -130,7 +134,8 @@ class Plant:
         self._last_stops: dict[Drive, float | None] = dict.fromkeys(DRIVES)
         self.operator = Operator(self.world, self.bridge)
         for node in self.nodes:
-            node.power_on()
+            if node.device.node_id != hoist.NODE_ID:
+                node.power_on()
         self.counts: Counter[str] = Counter()
         self._silent_since = BEGIN_S
         self._loud_until = BEGIN_S
@@ -140,6 +145,9 @@ class Plant:
         for step in plan.steps:
             self.world.at(BEGIN_S + step.at, self._doing(step))
         self.world.after(_LOOK_S, self._look)
+
+    def node_of(self, drive: Drive) -> FieldNode:
+        return self.nodes_by_id[drive.node_id]
 
     def run(self, *, to_first: bool = False) -> Result:
         """Play the plan, or as much of it as there is before the first violation is found."""
@@ -181,6 +189,10 @@ class Plant:
             self.ways.frame(frame.time, frame.can_id, frame.data)
             self.outputs.frame(frame.time, frame.can_id, frame.data)
 
+    def _on_event(self, event: Event) -> None:
+        self.causes.told(event, self.world.now)
+        self.truths.told(event)
+
     def _on_telegram(self, drive: Drive, word: int) -> None:
         self.oracle.telegram(drive, self.world.now, word)
         before, self.before_telegram = self.before_telegram, lambda: None
@@ -204,6 +216,7 @@ class Plant:
     def _on_start(self) -> None:
         self.oracle.started()
         self.debts.started()
+        self.truths.started()
         self._disturbed()
 
     def on_still(self, now: float) -> None:
@@ -220,7 +233,7 @@ class Plant:
         self.world.after(self.down_s, self.bridge.restart)
 
     def _disturbed(self) -> None:
-        for judge in (self.answers, self.causes, self.debts, self.outputs):
+        for judge in (self.answers, self.causes, self.debts, self.outputs, self.truths):
             judge.disturbed(self.world.now)
         self.ways.excuse(self.world.now)
 
@@ -260,6 +273,7 @@ class Plant:
             said = self.bridge.good_number(f"{at}/last_stop")
             self.answers.last_stop(drive, now, self._last_stops[drive], said)
             self._last_stops[drive] = said
+        self.truths.look(now)
 
     # what happens
 

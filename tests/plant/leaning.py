@@ -3,8 +3,8 @@ wrong.
 
     python -m tests.plant.leaning --first FAULT [--seed N] [--seconds S] [--until S]
 
-``FAULT`` is one of the proof's (tests/proof/faults.py). Prints one line of JSON; ``--until`` plays the plan
-of ``--seed`` alone, and no longer than that.
+``FAULT`` is one of the proof's (tests/proof/faults.py), or another one of ``LEANS``. Prints one line of JSON;
+``--until`` plays the plan of ``--seed`` alone, and no longer than that.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ _GENERAL: Final = 4
 """Each so many plans one leans to nothing."""
 
 Group = tuple[str, ...]
-"""Kinds of steps that happen to one drive at about the same time."""
+"""Kinds of steps that happen to one drive at about the same time; with a colon and how it happens, where that
+is not drawn."""
 
 _SILENT: Final[tuple[Group, ...]] = (
     ("controller silent",),
@@ -79,14 +80,29 @@ LEANS: Final[dict[str, tuple[Group, ...]]] = {
     "acknowledge after somebody's stop of outputs": (("outputs stopped",),),
     "second connection of the owner's address": (("stranger",), ("stranger", "jog")),
     "what moves a drive as a parameter": (("reserved parameter",),),
+    "settings changed at a drive": (("keypad: scale",), ("keypad: meaning",), ("keypad: sum",), ("keypad",)),
+    "settings changed at a drive that answers late": (
+        ("keypad: scale", "late answers: 0.4"),
+        ("keypad: scale", "late answers: 0.3"),
+        ("keypad", "late answers"),
+    ),
+    "settings changed at a drive that answers wrongly": (
+        ("keypad: scale", "wrong answers: aborts"),
+        ("keypad: scale", "wrong answers: silent"),
+        ("keypad", "wrong answers"),
+    ),
+    "settings of a drive that positions": (("positions: P600",), ("positions",)),
 }
 """What is done first where the proof would begin with this fault; ``_SILENT`` for any other."""
 _EACH_OF: Final = {
     "deaf drive": 16.0,
     "deaf drive whose owner jogs": 38.0,
     "stop asked for in a silence": 10.0,
+    "settings changed at a drive": 3.0,
+    "settings changed at a drive that answers late": 4.0,
+    "settings changed at a drive that answers wrongly": 4.0,
 }
-"""Seconds from one group to the next, where that takes longer."""
+"""Seconds from one group to the next, where that takes longer, or several may be at work at once."""
 
 
 def leaning(seed: int, first: str, seconds: float = SECONDS) -> Plan:
@@ -98,11 +114,12 @@ def leaning(seed: int, first: str, seconds: float = SECONDS) -> Plan:
     while at < seconds - _LAST_S:
         group = rng.choice(groups)
         which: int | None = None
-        for what in group:
+        for one in group:
+            what, _, wanted = one.partition(": ")
             drawn, length_s, how = KINDS[what](rng)
             which = drawn if which is None else which
             begins = round(at + rng.uniform(0.0, rng.choice((0.1, 1.0, 2.7))), 4)
-            steps.append(Step(begins, what, which, round(length_s, 4), how))
+            steps.append(Step(begins, what, which, round(length_s, 4), wanted or how))
         at += rng.uniform(0.7, 1.4) * _EACH_OF.get(first, _EACH_S)
     return Plan(seed, seconds, tuple(sorted(steps)))
 

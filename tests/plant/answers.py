@@ -119,6 +119,14 @@ class Answers:
         """A Modbus exception as the answer to a telegram that enables, with this setpoint."""
         self._claim(drive, sent, at, False, f"exception {code:02X}h", setpoint)
 
+    def parameter_read(
+        self, drive: Drive, name: str, said: object, had: float, has: float, at: float
+    ) -> None:
+        """A parameter was read, which the drive had so when it was asked for, and has so now."""
+        self._oracle.looks += 1
+        if said != had == has:
+            self._oracle.wrong(at, f"{drive.path}: {name} is read as {said}, and the drive has {has:g}")
+
     def _claim(
         self,
         drive: Drive,

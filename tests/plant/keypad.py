@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from bridge.command import Identity, Outcome, ReadParameter, Request, Source
 from bridge.sim.core.simulated_device import SimulatedDevice
 from bridge.sim.nord.nord_drive import NordDrive
 from bridge.sim.nord.nord_single import NordSingle
 from bridge.sim.nord.nord_tu4 import NordTu4
 from tests.plant.field import FieldNode
+from tests.plant.physics import physics_of
 from tests.plant.plan import Step
 from tests.proof.drives import DRIVES
 from tests.proof.families import CIA402, LENZE, NORD, STOEBER, Family
@@ -53,6 +55,15 @@ CHANGES: Final[dict[Family, Changes]] = {
         "meaning": Setting(0x6060, 0, 3, 2, size=1),
     },
 }
+_READ: Final = {
+    NORD: ("P105", "P105 of parameter set 1"),
+    LENZE: ("C00011", "C00011"),
+    STOEBER: ("C01", "C01"),
+    CIA402: ("604C:01", "604C:01"),
+}
+"""A parameter of each family that somebody reads, and how the settings call it."""
+_READER: Final = Identity(Source.ZENOH, "a colleague", connection="session 46")
+_EACH_S, _DELAY_S, _SHORT_S = 1.5, 0.002, 0.5
 HOIST_CHANGES: Final[Changes] = {
     "P600": Setting(600, 1, 0, 2),
     "P546": Setting(546, 1, 4, 23),
@@ -116,12 +127,32 @@ def run_in_other_set(plant: Plant, step: Step) -> None:
 
 
 def answer_otherwise(plant: Plant, step: Step) -> None:
-    """The SDO answers of a node take their time, or are wrong, or there are none."""
-    answers, world = plant.node_of(DRIVES[step.which % len(DRIVES)]).answers, plant.world
-    answers.how, answers.until = step.how, max(answers.until, world.now + step.seconds)
+    """The SDO answers of a node take their time, or are wrong, or there are none, and somebody reads a
+    parameter of it again and again."""
+    drive, world = DRIVES[step.which % len(DRIVES)], plant.world
+    answers, ends = plant.node_of(drive).answers, world.now + step.seconds
+    answers.how, answers.until = step.how, max(answers.until, ends)
+    physics = physics_of(plant.node_of(drive).device, drive)
+    name, key = _READ[drive.family]
+
+    def read() -> None:
+        if world.now > ends:
+            return
+        world.after(_EACH_S, read)
+        had, asked_at = physics.settings()[key], world.now
+
+        def answered(outcome: Outcome) -> None:
+            # In a longer time it may have been another one, and be what it was again.
+            if outcome.ok and world.now < asked_at + _SHORT_S:
+                has = physics.settings()[key]
+                plant.answers.parameter_read(drive, name, outcome.value, had, has, world.now)
+
+        request = Request(_READER, drive.path, ReadParameter(name))
+        plant.bridge.ask(request, _DELAY_S, lambda: None, answered)
 
     def end() -> None:
         if world.now >= answers.until:
             answers.how = ""
 
+    world.after(_DELAY_S, read)
     world.after(step.seconds, end)

@@ -89,6 +89,7 @@ LEANS: Final[dict[str, tuple[Group, ...]]] = {
     "settings changed at a drive that answers wrongly": (
         ("keypad: scale", "wrong answers: aborts"),
         ("keypad: scale", "wrong answers: silent"),
+        ("wrong answers: another index",),
         ("keypad", "wrong answers"),
     ),
     "settings of a drive that positions": (("positions: P600",), ("positions",)),

@@ -64,6 +64,7 @@ _RULES: Final = (
     ("it stops by itself", "still runs"),
     ("answers are true", "', and "),
     ("answers are true", "its front shows"),
+    ("answers are true", "is read as"),
     ("followed is true", "followed, and"),
     ("causes are told", "no event says so"),
     ("one answer", "has no answer"),

@@ -43,7 +43,10 @@ class SdoAnswers:
                 Frame(frame.can_id, bytes([_ABORT, *data[1:4]]) + _GENERAL_ERROR.to_bytes(4, "little"))
             )
         elif how == "another index" and names_object:
-            self._send(Frame(frame.can_id, bytes([data[0], data[1] ^ 1, *data[2:]])))
+            # The next object's, with another value.
+            self._send(
+                Frame(frame.can_id, bytes([data[0], data[1] ^ 1, *data[2:4], data[4] ^ 0xFF, *data[5:]]))
+            )
         elif how in LATE:
             self._world.after(float(how), lambda: self._send(frame))
         else:

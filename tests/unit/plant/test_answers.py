@@ -175,3 +175,19 @@ def test_a_start_begins_with_what_was_taken_and_not_with_what_was_refused(
     scene.oracle.telegram(DRIVE, 1013.0, START)
     scene.sees(1012.0, FAMILY.run)
     assert bool(scene.wrong()) is not is_good
+
+
+@pytest.mark.parametrize(
+    ("said", "had", "has", "is_wrong"),
+    [
+        (50.0, 50.0, 50.0, False),
+        (100.0, 50.0, 50.0, True),
+        (50.0, 50.0, 100.0, False),
+        (None, 50.0, 50.0, True),
+    ],
+)
+def test_a_parameter_is_read_as_what_the_drive_has(
+    scene: Scene, said: float | None, had: float, has: float, is_wrong: bool
+) -> None:
+    scene.answers.parameter_read(DRIVE, "P105", said, had, has, 1010.0)
+    assert bool(scene.oracle.violations) is is_wrong

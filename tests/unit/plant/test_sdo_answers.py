@@ -32,7 +32,7 @@ def test_one_that_is_refused_names_its_object() -> None:
 
 
 def test_one_about_another_object_does_not() -> None:
-    assert answered("another index") == [(0.0, "4b682001f4010000")]
+    assert answered("another index") == [(0.0, "4b6820010b010000")]
     assert answered("another index", SEGMENT) == [(0.0, SEGMENT.data.hex())], "it names none"
 
 

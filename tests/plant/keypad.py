@@ -136,14 +136,18 @@ def answer_otherwise(plant: Plant, step: Step) -> None:
     name, key = _READ[drive.family]
 
     def read() -> None:
-        if world.now > ends:
-            return
-        world.after(_EACH_S, read)
-        had, asked_at = physics.settings()[key], world.now
+        if world.now < ends:
+            had = physics.settings()[key]
+            # One that is read just now may have been read for somebody else a moment ago.
+            world.after(_SHORT_S, lambda: ask(had))
+            world.after(_EACH_S, read)
+
+    def ask(had: float) -> None:
+        asked_at, is_same = world.now, physics.settings()[key] == had
 
         def answered(outcome: Outcome) -> None:
             # In a longer time it may have been another one, and be what it was again.
-            if outcome.ok and world.now < asked_at + _SHORT_S:
+            if outcome.ok and is_same and world.now < asked_at + _SHORT_S:
                 has = physics.settings()[key]
                 plant.answers.parameter_read(drive, name, outcome.value, had, has, world.now)
 

@@ -83,8 +83,7 @@ LEANS: Final[dict[str, tuple[Group, ...]]] = {
     "settings changed at a drive": (("keypad: scale",), ("keypad: meaning",), ("keypad: sum",), ("keypad",)),
     "settings changed at a drive that answers late": (
         ("keypad: scale", "late answers: 0.4"),
-        ("keypad: scale", "late answers: 0.3"),
-        ("keypad", "late answers"),
+        ("keypad", "late answers: 0.4"),
     ),
     "settings changed at a drive that answers wrongly": (
         ("keypad: scale", "wrong answers: aborts"),

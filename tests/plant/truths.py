@@ -19,8 +19,9 @@ from tests.plant import hoist
 from tests.plant.field import FieldNode
 from tests.plant.oracle import Oracle
 from tests.plant.physics import Leaf, Physics, physics_of, posicon_of
+from tests.plant.plan import FIRST_S
 from tests.plant.sdo_answers import LATEST_S
-from tests.plant.world import World
+from tests.plant.world import BEGIN_S, World
 from tests.proof.drives import DRIVES
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ FOUND_S: Final = 10.0 + 1.0 + LATEST_S
 looks take, and an answer that was on its way."""
 _ERROR_CONTROL: Final = range(0x700, 0x780)
 _BOOT_UP: Final = b"\0"
+_BOOT_S: Final = 20.0
+"""Longest time in which a node is booted: of a NORD's objects each may take 0.4 s."""
 _KEPT: Final = 40
 _TURNS: Final = 4
 """A drive is looked at once in so many looks: what is wrong stays so."""
@@ -63,6 +66,8 @@ class _Subject:
     """Since when each change is to be told."""
     false: set[str] = field(default_factory=set[str])
     """Set values that were not what the drive has, at the last look: a word may have been on its way."""
+    booted_by: float = BEGIN_S + FIRST_S
+    """By then the bridge has asked it, since one of both began anew."""
     has_given: bool = False
     """What the site file gives was what the drive has, and the bridge has said so since it began."""
 
@@ -93,8 +98,7 @@ class Truths:
             if frame.can_id not in _ERROR_CONTROL:
                 self._sample(subject, self._world.now)
             elif frame.data == _BOOT_UP:
-                # Whoever is told of its start asks it anew, and takes that for what it was.
-                self._forget(subject)
+                self._ask_anew(subject)
 
         return on_frame
 
@@ -110,6 +114,12 @@ class Truths:
         """Another process knows the site file, and reads what drives have by then."""
         for subject in self._subjects.values():
             subject.has_given = False
+            self._ask_anew(subject)
+
+    def _ask_anew(self, subject: _Subject) -> None:
+        """Its node is booted by the bridge: what is read then is what it was, and no news."""
+        subject.booted_by = self._world.now + _BOOT_S
+        self._forget(subject)
 
     def _forget(self, subject: _Subject) -> None:
         subject.owed.clear()
@@ -127,7 +137,7 @@ class Truths:
                 subject.owed.pop(name, None)
 
     def _sample(self, subject: _Subject, at: float) -> None:
-        is_back = not subject.samples or at > subject.samples[-1].at + subject.age_s
+        is_back = bool(subject.samples) and at > subject.samples[-1].at + subject.age_s
         settings = subject.physics.settings()
         if settings != subject.settings:
             for name, value in settings.items():
@@ -135,7 +145,8 @@ class Truths:
                     self._change(subject, name, value, at)
             subject.settings = settings
         if is_back:
-            # Whoever has not heard it for so long asks it anew, and takes that for what it was.
+            self._ask_anew(subject)
+        if at < subject.booted_by:
             self._forget(subject)
         subject.samples.append(_Sample(at, subject.physics.values()))
 
@@ -158,7 +169,7 @@ class Truths:
     def _look(self, subject: _Subject, now: float) -> None:
         path = subject.path
         recent = [one for one in subject.samples if one.at >= now - subject.age_s]
-        if not recent or not self.is_quiet():
+        if not self.is_quiet():
             self._forget(subject)
         if not recent:
             return

@@ -56,7 +56,7 @@ class Scene:
         )
         self._compose: Callable[[Frame], None] = self.truths.watch(PATH, self.motor)
         self.speaks = True
-        self.run(1.5)
+        self.run(10.0)
 
     def run(self, seconds: float) -> list[str]:
         for _ in range(round(seconds / 0.25)):
@@ -150,7 +150,7 @@ def test_a_change_is_told(scene: Scene, is_told: bool) -> None:
     found = scene.run(FOUND_S)
     assert bool(found) is not is_told
     if found:
-        assert f"{PATH}: scale was changed at 1.750 s, and no event says so" in found[0]
+        assert f"{PATH}: scale was changed at 10.250 s, and no event says so" in found[0]
 
 
 def test_a_change_that_leaves_nothing_good_need_not_be_told(scene: Scene) -> None:

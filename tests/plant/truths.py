@@ -129,6 +129,8 @@ class Truths:
         subject = self._subjects.get(event.source)
         if event.kind is not EventKind.CONFIGURATION or subject is None:
             return
+        # It may be told before the drive's next telegram.
+        self._take_settings(subject, self._world.now)
         message = event.message
         for name in subject.settings:
             # The mode is told by the object that says it, too: 6061h.
@@ -138,17 +140,20 @@ class Truths:
 
     def _sample(self, subject: _Subject, at: float) -> None:
         is_back = bool(subject.samples) and at > subject.samples[-1].at + subject.age_s
+        self._take_settings(subject, at)
+        if is_back:
+            self._ask_anew(subject)
+        if at < subject.booted_by:
+            self._forget(subject)
+        subject.samples.append(_Sample(at, subject.physics.values()))
+
+    def _take_settings(self, subject: _Subject, at: float) -> None:
         settings = subject.physics.settings()
         if settings != subject.settings:
             for name, value in settings.items():
                 if value != subject.settings[name]:
                     self._change(subject, name, value, at)
             subject.settings = settings
-        if is_back:
-            self._ask_anew(subject)
-        if at < subject.booted_by:
-            self._forget(subject)
-        subject.samples.append(_Sample(at, subject.physics.values()))
 
     def _change(self, subject: _Subject, name: str, value: float, at: float) -> None:
         subject.changed[name] = at

@@ -153,6 +153,13 @@ def test_a_change_is_told(scene: Scene, is_told: bool) -> None:
         assert f"{PATH}: scale was changed at 10.250 s, and no event says so" in found[0]
 
 
+def test_a_change_may_be_told_before_the_next_telegram(scene: Scene) -> None:
+    scene.motor.set_to["scale"], scene.motor.speed = 100.0, 50.0
+    scene.tell("scale of parameter set 1 is 100, it was 50")
+    scene.image = {"actual/speed": 50.0}
+    assert not scene.run(FOUND_S + 2.0)
+
+
 def test_a_change_that_leaves_nothing_good_need_not_be_told(scene: Scene) -> None:
     scene.motor.set_to["scale"] = 100.0
     assert not scene.run(FOUND_S + 2.0)

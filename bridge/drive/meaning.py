@@ -35,8 +35,8 @@ class Meanings:
         self.conditions = Conditions(family)
         self._known: dict[int, dict[str, float]] = {number: {} for number in self.sets}
         """Scaling parameters, as far as they are known, in each set."""
-        for name, full in given.items():
-            parameter, in_set = family.parameter_and_set(name)
+        self._given = {family.parameter_and_set(name): full for name, full in given.items()}
+        for (parameter, in_set), full in self._given.items():
             if in_set in self.sets:
                 self._known[in_set][parameter] = full
         self._scales = {number: scales_of(family, known) for number, known in self._known.items()}
@@ -48,6 +48,8 @@ class Meanings:
         self._unread = Lack(Quality.WAITING, Text.of("meaning.not_read_yet"))
         self._found: dict[tuple[str, int], tuple[ValueCodec, Lack | None]] = {}
         self._overdue: frozenset[Key] = frozenset()
+        self.told_by_drive: set[Key] = set()
+        """Keys of what the drive has given a value for since it was booted: it has these objects."""
         self._set = ParameterSet(family.status_word.parameter_set_bits)
         self._followers = _followers(family, slot)
         self._values = {value.leaf: ValueCodec(value, _words(family, value)) for value in family.value}
@@ -60,14 +62,24 @@ class Meanings:
     def on_scale(self, parameter: str, full: float, in_set: int = _FIRST) -> None:
         """Take over the drive's own value of a scaling parameter; it wins over the site file. Where it is no
         scale, no value is made: neither with the site file's nor with the one read before."""
+        self._no_scale.pop((parameter, in_set), None)
+        if not is_scale(full):
+            self._no_scale[parameter, in_set] = full
+        self._scale_by(parameter, full if is_scale(full) else None, in_set)
+
+    def _on_refused_scale(self, parameter: str, in_set: int) -> None:
+        """Take over that the drive does not tell a scaling parameter: the site file's counts, and not the one
+        that it has told before."""
+        self._no_scale.pop((parameter, in_set), None)
+        self._scale_by(parameter, self._given.get((parameter, in_set)), in_set)
+
+    def _scale_by(self, parameter: str, full: float | None, in_set: int) -> None:
         self._found.clear()
         scales, known = self._scales[in_set], self._known[in_set]
-        self._no_scale.pop((parameter, in_set), None)
-        if is_scale(full):
-            known[parameter] = full
-        else:
+        if full is None:
             known.pop(parameter, None)
-            self._no_scale[parameter, in_set] = full
+        else:
+            known[parameter] = full
         for value in self._family.value:
             if parameter in value.scaled_by:
                 scale = _scale(value, known)
@@ -89,7 +101,11 @@ class Meanings:
         value = self._setting(name, setting)
         self.conditions.tell(self.conditions.key(name, in_set), value)
         scales = any(name in one.scaled_by for one in self._family.value)
-        if value is not None and scales and self._family.parameter_named(name).read:
+        if not scales or not self._family.parameter_named(name).read:
+            return
+        if value is None:
+            self._on_refused_scale(name, in_set)
+        else:
             self.on_scale(name, value, in_set)
 
     def _setting(self, name: str, told: float | None) -> float | None:

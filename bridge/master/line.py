@@ -145,14 +145,23 @@ class BusLine:
         return (self.clock() - since) * 1000 > self.network.bus.deadman_ms
 
     def let_bus_work(self, now: float) -> None:
-        """Have the bus do what is due, unless the process was stopped since ``now`` for so long that what it
-        would send is stale: right after its look at the clock, too, which the signal tells."""
+        """Let the bus do what is due, unless the process was stopped: the next round finds the gap."""
         due = self.bus.next_deadline()
-        is_due = due is not None and now >= due
-        if is_due:
-            self.alarm.set(self.burst_s)
-        if not (self.stood_still(now) or (is_due and self.alarm.rang)):
-            self.bus.on_time(now)
+        if due is None or due > now:
+            if not self.stood_still(now):
+                self.bus.on_time(now)
+            return
+        self.alarm.set(self.burst_s)
+        try:
+            # As a hand-over: the process may be stopped right after it has read the clock.
+            self.alarm.breaks_in = True
+            if not (self.stood_still(now) or self.alarm.rang):
+                self.bus.on_time(now)
+        except StoodStill:
+            # What was broken off is handed over anew after the gap.
+            self.repetitions = None
+        finally:
+            self.alarm.breaks_in = False
 
     def flush(self, now: float) -> None:
         """Hand to the bus what is to be sent and repeated now."""

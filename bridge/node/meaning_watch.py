@@ -192,11 +192,18 @@ class MeaningWatch:
                 return
             watched.is_asking = False
             watched.answer_s += _SHARE * (self.now - asked_at - watched.answer_s)
-            if isinstance(result, SdoError) and not result.by_server:
-                item.tried_at = self.now
-            else:
+            told = watched.drive.channel.meanings.told_by_drive
+            if not isinstance(result, SdoError):
+                told.add(item.key)
                 item.read_at = self.now
-                self._told(watched.drive, item, None if isinstance(result, SdoError) else result)
+                self._told(watched.drive, item, result)
+            elif result.by_server and item.key not in told:
+                item.read_at = self.now
+                self._told(watched.drive, item, None)
+            else:
+                # No answer, or a refusal of what it has told before: it has the object, and may have
+                # changed it.
+                item.tried_at = self.now
             self._choose(watched, -math.inf)
             self._judge(watched)
             self._ask(watched)

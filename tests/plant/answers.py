@@ -65,6 +65,7 @@ class Answers:
         self._claims: list[_Claim] = []
         self._disturbed_at = -inf
         """When the bridge last stood still, ended, or lost its bus."""
+        self._ended_at = -inf
         self.is_quiet: Callable[[], bool] = lambda: True
         """Whether frames reach everybody."""
 
@@ -75,8 +76,10 @@ class Answers:
         self._disturbed_at = at
 
     def ended(self, at: float) -> None:
-        """The bus process is gone, and with it the answers that it owed; a front answers for itself."""
+        """The bus process is gone, and with it the answers that it owed; a front answers for itself, and does
+        not know what has become of what it had passed on."""
         self._asked = {asking: asked for asking, asked in self._asked.items() if asking[0]}
+        self._ended_at = at
         self.disturbed(at)
 
     def asked(self, asking: Asking, request: Request, at: float) -> None:
@@ -103,7 +106,7 @@ class Answers:
             self._oracle.wrong(at, f"request {asking} is answered twice: {outcome.code}")
             return
         drive = self._drives.get(asked.request.target)
-        if drive is None:
+        if drive is None or asked.came <= self._ended_at:
             return
         command = asked.request.command
         said = f"{outcome.code}{'' if outcome.forwarded else ', not forwarded'}"
@@ -120,6 +123,14 @@ class Answers:
     def refused(self, drive: Drive, setpoint: int, sent: float, at: float, code: int) -> None:
         """A Modbus exception as the answer to a telegram that enables, with this setpoint."""
         self._claim(drive, sent, at, False, f"exception {code:02X}h", setpoint)
+
+    def parameter_read(
+        self, drive: Drive, name: str, said: object, had: float, has: float, at: float
+    ) -> None:
+        """A parameter was read, which the drive had so when it was asked for, and has so now."""
+        self._oracle.looks += 1
+        if said != had == has:
+            self._oracle.wrong(at, f"{drive.path}: {name} is read as {said}, and the drive has {has:g}")
 
     def _claim(
         self,

@@ -156,6 +156,8 @@ class Controller:
         self.stops_long = False
         """It stops its drive for a second, and lets it run for another, again and again."""
         self.acknowledges = True
+        self.in_set = 1
+        """Parameter set of a NORD drive that it commands."""
         self.is_invalid = False
         """Its words lack "control data valid"."""
         self._world = world
@@ -195,7 +197,7 @@ class Controller:
             return
         if self.acknowledges_always and not self._moves:
             self._acknowledge()
-        self._write(NORD_INVALID if self.is_invalid else self._word())
+        self._write(NORD_INVALID if self.is_invalid else self._word() | self.in_set - 1 << 14)
 
     def _start(self, place: int) -> None:
         self._starts = place + 1
@@ -216,7 +218,8 @@ class Controller:
         jogs = (self.pauses and self._cycles % 4 == 0) or (self.stops_long and self._cycles % 6 < 4)
         if self.acknowledges_always:
             return family.run | (family.acknowledge & ~family.ready if self._cycles % 2 == 0 else 0)
-        if self._moves:
+        # What it has read of a drive that it is about to stop is older than that.
+        if self._moves and not 0 < self._place < _BEGINS.index("run"):
             self._place = 0
             return family.ready if jogs else family.run
         step = _BEGINS[self._place % len(_BEGINS)]

@@ -11,6 +11,8 @@ from bridge.canopen.frame import Frame
 from bridge.command import Code, EventKind, Identity, Outcome, Request, SetTimeout, Source, WriteParameter
 from tests.plant.bridge_process import Bridge
 from tests.plant.clients import Line, read, writes
+from tests.plant.hoist import position
+from tests.plant.keypad import answer_otherwise, change, run_in_other_set
 from tests.plant.machine import LOOK_S
 from tests.plant.plan import Step
 from tests.plant.summaries import ALARM, DANGER
@@ -355,6 +357,11 @@ MORE: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "sets time-out": set_timeout,
     "stops in a silence": stop_in_silence,
     "reserved parameter": set_reserved,
+    "late answers": answer_otherwise,
+    "wrong answers": answer_otherwise,
+    "keypad": change,
+    "other set": run_in_other_set,
+    "positions": position,
 }
 """Kinds of steps (tests/plant/plan.py), and what they do."""
 CALM: Final = (
@@ -369,6 +376,11 @@ CALM: Final = (
     "stops in a silence",
     "outputs stopped",
     "reserved parameter",
+    "late answers",
+    "wrong answers",
+    "keypad",
+    "other set",
+    "positions",
     "clock stepped",
 )
 """Kinds beside which it is known why a drive is stopped."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from bridge.canopen.frame import STANDARD_MASK, Frame
 from bridge.sim.core.simulated_device import SimulatedDevice
+from tests.plant.sdo_answers import SdoAnswers
 from tests.plant.wire import Wire
 from tests.plant.world import Timer, World
 
@@ -25,6 +27,9 @@ class FieldNode:
         """Nothing of it but its heartbeat reaches its wire."""
         self.deaf_to: tuple[int, ...] = ()
         """Identifiers that it does not hear."""
+        self.answers = SdoAnswers(world, device.node_id, self._port.send)
+        self.composed: dict[int, list[Callable[[Frame], None]]] = {}
+        """Called with each frame of this identifier that it has composed."""
 
     def power_on(self) -> None:
         self.device.start(self._world.now)
@@ -39,6 +44,14 @@ class FieldNode:
         """A frame that nobody else hears."""
         self._take(frame._replace(time=self._world.now))
 
+    def change(self, act: Callable[[], None]) -> None:
+        """Have something done at the device itself."""
+        self.device.on_time(self._world.now)
+        act()
+        self.device.slave.touch()
+        self.device.on_time(self._world.now)
+        self.serve()
+
     def _on_time(self) -> None:
         self._timer = None
         self.device.on_time(self._world.now)
@@ -46,9 +59,16 @@ class FieldNode:
 
     def serve(self) -> None:
         """Send what it has to send, and look when it is due next."""
+        answers = self.answers
         for frame in self.device.take_frames():
+            for tell in self.composed.get(frame.can_id, ()):
+                tell(frame)
             is_heard = not self.is_mute or frame.can_id == _ERROR_CONTROL + self.device.node_id
-            if self.speaks and is_heard:
+            if not (self.speaks and is_heard):
+                continue
+            if answers.how and frame.can_id in answers.can_ids:
+                answers.on_answer(frame)
+            else:
                 self._port.send(frame)
         due = self.device.next_deadline()
         timer = self._timer

@@ -18,6 +18,8 @@ from tests.plant.machine import Process
 from tests.plant.meeting import Link, Meeting
 from tests.plant.world import World
 
+_SIGN_S, _BACK_S = 5.0, 0.5
+"""After so long without a sign of life a front is killed (docs: "Fronts"), and so soon a new one begins."""
 _JUST_S: Final = 0.25
 """A front that has just gone on has not looked whether the bus process is there."""
 
@@ -86,7 +88,13 @@ class Front:
         await self._mirror.run()
 
     def on_still(self, now: float) -> None:
-        """Its clients wait."""
+        """Its clients wait, and who looks after it."""
+        self._world.after(_SIGN_S, partial(self._look_for_sign, self.process, now))
+
+    def _look_for_sign(self, process: Process, since: float) -> None:
+        if process.still_since == since and not process.is_dead:
+            process.kill(in_turn=False)
+            self._world.after(_BACK_S, self.start)
 
     def on_going_on(self, since: float, now: float) -> None:
         self._went_on_at = now

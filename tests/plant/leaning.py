@@ -3,9 +3,9 @@ wrong.
 
     python -m tests.plant.leaning --first FAULT [--seed N] [--seconds S] [--until S]
 
-``FAULT`` is one of the proof's (tests/proof/faults.py), or a kind of step, such as ``deaf``, or
-``deaf: jogs``. Prints one line of JSON; ``--until`` plays the plan of ``--seed`` alone, and no longer than
-that.
+``FAULT`` is one of the proof's (tests/proof/faults.py), another one of ``LEANS``, or a kind of step, such as
+``deaf``, or ``deaf: jogs``. Prints one line of JSON; ``--until`` plays the plan of ``--seed`` alone, and no
+longer than that.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ _GENERAL: Final = 4
 """Each so many plans one leans to nothing."""
 
 Group = tuple[str, ...]
-"""Kinds of steps that happen to one drive at about the same time."""
+"""Kinds of steps that happen to one drive at about the same time; with a colon and how it happens, where that
+is not drawn."""
 
 _SILENT: Final[tuple[Group, ...]] = (
     ("controller silent",),
@@ -80,6 +81,18 @@ LEANS: Final[dict[str, tuple[Group, ...]]] = {
     "acknowledge after somebody's stop of outputs": (("outputs stopped",),),
     "second connection of the owner's address": (("stranger",), ("stranger", "jog")),
     "what moves a drive as a parameter": (("reserved parameter",),),
+    "settings changed at a drive": (("keypad: scale",), ("keypad: meaning",), ("keypad: sum",), ("keypad",)),
+    "settings changed at a drive that answers late": (
+        ("keypad: scale", "late answers: 0.4"),
+        ("keypad", "late answers: 0.4"),
+    ),
+    "settings changed at a drive that answers wrongly": (
+        ("keypad: scale", "wrong answers: aborts"),
+        ("keypad: scale", "wrong answers: silent"),
+        ("wrong answers: another index",),
+        ("keypad", "wrong answers"),
+    ),
+    "settings of a drive that positions": (("positions: P600",), ("positions",)),
 }
 """What is done first where the proof would begin with this fault; ``_SILENT`` for any other that is no kind
 of step itself."""
@@ -91,26 +104,29 @@ _EACH_OF: Final = {
     "deaf": 22.0,
     "bus cut": 24.0,
     "hang": 16.0,
+    "settings changed at a drive": 3.0,
+    "settings changed at a drive that answers late": 4.0,
+    "settings changed at a drive that answers wrongly": 4.0,
 }
-"""Seconds from one group to the next, where that takes longer."""
+"""Seconds from one group to the next, where that takes longer, or several may be at work at once."""
 
 
 def leaning(seed: int, first: str, seconds: float = SECONDS) -> Plan:
     """A plan of these kinds of steps, in groups one after the other."""
     rng = Random(f"{seed} {first}")
-    kind, _, always = first.partition(": ")
-    groups = LEANS.get(first) or (((kind,),) if kind in KINDS else _SILENT)
+    kind = first.partition(": ")[0]
+    groups = LEANS.get(first) or (((first,),) if kind in KINDS else _SILENT)
     steps: list[Step] = []
     at = _FIRST_S
     while at < seconds - _LAST_S:
         group = rng.choice(groups)
         which: int | None = None
-        for what in group:
+        for one in group:
+            what, _, wanted = one.partition(": ")
             drawn, length_s, how = KINDS[what](rng)
-            how = always if always and what == kind else how
             which = drawn if which is None else which
             begins = round(at + rng.uniform(0.0, rng.choice((0.1, 1.0, 2.7))), 4)
-            steps.append(Step(begins, what, which, round(length_s, 4), how))
+            steps.append(Step(begins, what, which, round(length_s, 4), wanted or how))
         at += rng.uniform(0.7, 1.4) * _EACH_OF.get(kind, _EACH_S)
     return Plan(seed, seconds, tuple(sorted(steps)))
 

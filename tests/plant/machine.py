@@ -83,7 +83,9 @@ class Process:
         seen = self._world.now
         if not self._is_busy:
             return seen
-        if self._pause_s and not self._skips:
+        # Not within a turn of another process, which would stand still with this one, and nobody be told.
+        is_alone = self._world.turns == 1 or self._pause_s == inf
+        if self._pause_s and not self._skips and is_alone:
             pause_s, self._pause_s = self._pause_s, 0.0
             self._stand_still(pause_s)
             self.alarm.deliver()
@@ -104,6 +106,7 @@ class Process:
 
     def _work(self) -> None:
         self._is_busy = True
+        self._world.turns += 1
         before = asyncio._get_running_loop()
         try:
             while self._waiting and not self.is_dead:
@@ -114,6 +117,7 @@ class Process:
             self._end()
         finally:
             asyncio._set_running_loop(before)
+            self._world.turns -= 1
             self._is_busy = False
 
     def _do(self, act: Act) -> None:

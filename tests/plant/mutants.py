@@ -1,8 +1,9 @@
 """Plants of each seeded fault of the chain: which of the oracle's rules finds it, and how soon.
 
-    python -m tests.plant.mutants [NAME ...] [--seconds S] [--seed N] [--json FILE]
+    python -m tests.plant.mutants [NAME ...] [--of PATH] [--seconds S] [--seed N] [--json FILE]
 
-A mutant (tests/proof/mutants.toml) goes into a copy of the program, and plants of both halves of the drives
+A mutant (of tests/proof/mutants.toml, of another such table, or of all that are in a folder, such as
+tests/plant/taken_back) goes into a copy of the program, and plants of both halves of the drives
 are played with it, ``--seconds`` of CPU in all, until something is wrong. Then the same plan is played with
 the program as it is, in which nothing may be wrong. Ends with 1 where that finds something, or a mutant lives
 that is not in ``ELSEWHERE``.
@@ -20,7 +21,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from tests.proof.mutants import Mutant, Tree, load
+from tests.proof.mutants import TABLE, Mutant, Tree, load
 from tests.support.process import REPOSITORY
 
 ELSEWHERE: Final = {
@@ -29,6 +30,8 @@ ELSEWHERE: Final = {
     "a terminal that is closed": "no plant has signals",
 }
 """Mutants that no plant can find, and why."""
+TAKEN_BACK: Final = Path(__file__).with_name("taken_back")
+"""Tables of mends that are taken back, each in a file of its own."""
 _HALVES: Final = ("first", "second")
 _RULES: Final = (
     ("a whole is as bad", "a whole is said"),
@@ -64,6 +67,9 @@ _RULES: Final = (
     ("one bridge", "second bridge"),
     ("one bridge", "another bridge is in charge"),
     ("good is true", "is said to be good"),
+    ("answers are true", "is read as"),
+    ("image is drive", ", and the drive has "),
+    ("words are kept", "that nobody has sent"),
     ("it stops by itself", "still runs"),
     ("answers are true", "', and "),
     ("answers are true", "its front shows"),
@@ -87,6 +93,12 @@ class Kill:
     cpu_s: float
     false: str = ""
     """What is wrong in the program as it is, by the same plan."""
+
+
+def tables(path: Path) -> tuple[Mutant, ...]:
+    """Mutants of a table, or of those in a folder."""
+    files = sorted(path.glob("*.toml")) if path.is_dir() else [path]
+    return tuple(mutant for file in files for mutant in load(file))
 
 
 def rule_of(found: str) -> str:
@@ -151,9 +163,10 @@ def main() -> int:
     parser.add_argument("names", nargs="*")
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--of", type=Path, default=TABLE)
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
-    mutants = [one for one in load() if one.name in asked.names or not asked.names]
+    mutants = [one for one in tables(asked.of) if one.name in asked.names or not asked.names]
     kills: list[Kill] = []
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as other:
         tree, plain = Tree(Path(folder)), Plain(Path(other))

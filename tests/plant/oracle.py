@@ -310,6 +310,9 @@ class Oracle:
         if not setpoint:
             return
         track.setpoints.append((at, setpoint))
+        if not drive.family.setpoint <= setpoint <= drive.family.setpoint + NUMBERS:
+            # Also where the drive's scale was changed: its word stays (docs: ADR 12).
+            self.wrong(at, f"{drive.path} gets a setpoint that nobody has sent: {data.hex()}")
         was_strangers = track.is_strangers
         track.is_strangers = setpoint >= drive.family.setpoint + NUMBERS
         is_there = track.is_owned and at <= track.last_at + PLANT.fieldbus_timeout_ms / 1000

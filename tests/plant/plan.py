@@ -6,6 +6,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Final, NamedTuple
 
+from tests.plant.sdo_answers import LATE, WRONG
 from tests.plant.third_parties import Intruder
 from tests.proof.drives import DRIVES
 from tests.proof.settings import PLANT
@@ -18,6 +19,12 @@ _STOPS: Final = ("stop", "quick_stop", "disable_voltage")
 _DEAF: Final = ("silent", "jogs", "to everything")
 _WHILE_DEAD: Final = ("runs on", "taken out", "kept running", "outputs are active")
 _NODES: Final = len({drive.node for drive in DRIVES})
+
+
+KEYPAD: Final = ("scale", "scale", "current", "meaning", "setpoint", "sum", "other set")
+"""What somebody changes at a drive."""
+HOIST: Final = ("P600", "P600", "P546", "gear", "encoder")
+"""The same, at the one that positions."""
 
 
 class Step(NamedTuple):
@@ -58,6 +65,11 @@ def _around(rng: Random, *bounds_ms: float) -> float:
     if rng.random() < 0.3:
         return rng.uniform(0.0, 1.5 * max(bounds_ms)) / 1000
     return max(0.001, rng.choice(bounds_ms) * rng.uniform(0.8, 1.25) / 1000)
+
+
+def _found_or_not(rng: Random) -> float:
+    """Seconds that a change at a drive lasts: it is found by 10 s, so often too short for that."""
+    return rng.uniform(0.5, 10.0) if rng.random() < 0.3 else rng.uniform(12.0, 30.0)
 
 
 KINDS: Final[dict[str, Draw]] = {
@@ -105,6 +117,11 @@ KINDS: Final[dict[str, Draw]] = {
     "second bridge": lambda rng: (0, rng.uniform(1.0, 8.0), ""),
     "box slow": lambda rng: (0, rng.uniform(1.0, 6.0), rng.choice(("0.0001", "0.0003"))),
     "dead bridge": lambda rng: (_drive(rng), rng.uniform(6.8, 7.8), rng.choice(_WHILE_DEAD)),
+    "late answers": lambda rng: (_drive(rng), _found_or_not(rng), rng.choice(LATE)),
+    "wrong answers": lambda rng: (_drive(rng), _found_or_not(rng), rng.choice(WRONG)),
+    "keypad": lambda rng: (_drive(rng), _found_or_not(rng), rng.choice(KEYPAD)),
+    "other set": lambda rng: (_drive(rng), _found_or_not(rng), rng.choice(("", "scale", "meaning"))),
+    "positions": lambda rng: (0, _found_or_not(rng), rng.choice(("", *HOIST))),
     "clock stepped": lambda rng: (0, rng.uniform(-3600.0, 3600.0), ""),
 }
 """What can happen, and how it is drawn."""

@@ -11,8 +11,9 @@ from typing import Final
 
 from bridge.canopen.frame import Frame
 from bridge.cli.simulation import simulated_nodes
-from bridge.command import EventKind, Outcome, Request, Write
+from bridge.command import Event, EventKind, Outcome, Request, Write
 from bridge.project import Project, load_project
+from tests.plant import hoist
 from tests.plant.answers import Answers
 from tests.plant.bridge_process import Bridge
 from tests.plant.bus_deeds import bus_off, cut, noise, reset_node, silence_node
@@ -27,7 +28,9 @@ from tests.plant.meeting import Meeting
 from tests.plant.oracle import Oracle
 from tests.plant.outputs import Outputs, stop_outputs
 from tests.plant.plan import Plan, Step, length_s
+from tests.plant.process_deeds import hang, hang_front, kill, kill_front
 from tests.plant.summaries import Summaries
+from tests.plant.truths import truths_of
 from tests.plant.ways import Ways
 from tests.plant.wire import Port, Wire
 from tests.plant.witness import Witness
@@ -69,7 +72,7 @@ def project(folder: Path) -> Project:
     for name in ("state", "run"):
         (folder / name).mkdir(exist_ok=True)
     site = folder / "site.toml"
-    others = (BLOCK.site(folder),)
+    others = BLOCK.site(folder), hoist.site()
     return load_project(write_site(site, "can0", folder / "state", folder / "run", others=others))
 
 
@@ -101,8 +104,8 @@ class Plant:
         self.witnessed = Witnessed(self.oracle, table.name)
         Witness(self.world, self.wire, project, self.witnessed)
         self.answers.is_quiet = self.debts.is_quiet = self.witnessed.is_quiet = self.is_quiet
-        self.has_outputs = False
-        """Whether the outputs have an owner."""
+        self.has_outputs = self.has_hoist = False
+        """Whether they have an owner."""
         self.oracle.on_trip = self._on_trip
         self.oracle.on_stop = self._on_stop
         self.second: Bridge | None = None
@@ -111,6 +114,7 @@ class Plant:
         self.nodes = [
             FieldNode(self.world, self.wire, device) for device in simulated_nodes(table, project.path)
         ]
+        self.nodes_by_id = {node.device.node_id: node for node in self.nodes}
         meeting = Meeting(self.world)
         chance = Random(f"{plan.seed} bridge")
         self.bridge = Bridge(self.world, project, {table.name: self.wire}, "one", chance, records, meeting)
@@ -121,7 +125,8 @@ class Plant:
         self.front.on_answer.append(self._on_fronts_answer)
         self.front.on_lost.append(lambda number: self.answers.lost(("opcua", number)))
         self.bridge.on_start.append(self._on_start)
-        self.bridge.on_event.append(lambda event: self.causes.told(event, self.world.now))
+        self.truths = truths_of(self)
+        self.bridge.on_event.append(self._on_event)
         self.bridge.watchers += [self.oracle, self.debts, self]
         self.bridge.on_request.append(
             lambda number, asked: self.answers.asked(("", number), asked, self.world.now)
@@ -141,7 +146,8 @@ class Plant:
         self._last_stops: dict[Drive, float | None] = dict.fromkeys(DRIVES)
         self.operator = Operator(self.world, self.bridge)
         for node in self.nodes:
-            node.power_on()
+            if node.device.node_id != hoist.NODE_ID:
+                node.power_on()
         self.counts: Counter[str] = Counter()
         self._silent_since = BEGIN_S
         self._loud_until = BEGIN_S
@@ -193,6 +199,10 @@ class Plant:
             self.ways.frame(frame.time, frame.can_id, frame.data)
             self.outputs.frame(frame.time, frame.can_id, frame.data)
 
+    def _on_event(self, event: Event) -> None:
+        self.causes.told(event, self.world.now)
+        self.truths.told(event)
+
     def _on_telegram(self, drive: Drive, word: int) -> None:
         self.oracle.telegram(drive, self.world.now, word)
         before, self.before_telegram = self.before_telegram, lambda: None
@@ -217,6 +227,7 @@ class Plant:
         self.oracle.started()
         self.witnessed.restarted(self.world.now)
         self.debts.started()
+        self.truths.started()
         self.disturbed()
 
     def on_still(self, now: float) -> None:
@@ -233,7 +244,7 @@ class Plant:
         self.world.after(self.down_s, self.bridge.restart)
 
     def disturbed(self) -> None:
-        for judge in (self.answers, self.causes, self.debts, self.outputs, self.summaries):
+        for judge in (self.answers, self.causes, self.debts, self.outputs, self.summaries, self.truths):
             judge.disturbed(self.world.now)
         self.ways.excuse(self.world.now)
 
@@ -288,6 +299,7 @@ class Plant:
             said = self.bridge.good_number(f"{at}/last_stop")
             self.answers.last_stop(drive, now, self._last_stops[drive], said)
             self._last_stops[drive] = said
+        self.truths.look(now)
         self.summaries.look(now, self.bridge)
 
     # what happens
@@ -370,33 +382,6 @@ class Plant:
             self.oracle.shared(drive, self.world.now + step.seconds)
         self.world.after(step.seconds, stranger.leave)
 
-    def hang(self, step: Step) -> None:
-        def hang() -> None:
-            in_turn = step.how != "between turns"
-            self.bridge.process.hang(step.seconds, in_turn=in_turn, skips=step.which)
-
-        match step.how:
-            case "in a round":
-                self.bridge.before_round = hang
-            case "in a telegram":
-                self.before_telegram = hang
-            case _:
-                hang()
-
-    def hang_front(self, step: Step) -> None:
-        self.front.process.hang(step.seconds, in_turn=step.how == "in a turn")
-
-    def kill_front(self, step: Step) -> None:
-        process = self.front.process
-        if not process.is_dead:
-            process.kill(in_turn=False)
-            self.world.after(step.seconds, self.front.start)
-
-    def kill(self, step: Step) -> None:
-        if not self.bridge.process.is_dead:
-            self.down_s = step.seconds
-            self.bridge.process.kill(in_turn=step.how == "in a turn")
-
     def step_clock(self, step: Step) -> None:
         self.world.wall_step_s += step.seconds
 
@@ -410,10 +395,10 @@ _STEPS: Final[dict[str, Callable[[Plant, Step], None]]] = {
     "acknowledges": Plant.acknowledge_always,
     "stop": Plant.stop,
     "stranger": Plant.stranger,
-    "hang": Plant.hang,
-    "kill": Plant.kill,
-    "front hangs": Plant.hang_front,
-    "front killed": Plant.kill_front,
+    "hang": hang,
+    "kill": kill,
+    "front hangs": hang_front,
+    "front killed": kill_front,
     "bus off": bus_off,
     "bus cut": cut,
     "noise": noise,

@@ -43,6 +43,8 @@ class World:
         self.now = BEGIN_S
         self.wall_step_s = 0.0
         """By how much somebody has set the wall clock."""
+        self.turns = 0
+        """Number of processes in a turn, each but the first within a look at the clock of the one before."""
         self.log: list[str] | None = None
         """Lines of what has happened, for somebody who looks at a run."""
         self._queue: list[tuple[float, int, Timer]] = []

@@ -151,10 +151,12 @@ UNREADABLE: Final = Text.of("meaning.cannot_be_read")
 @dataclass(slots=True)
 class WordFacts:
     """Facts about a drive's words, as read from it: ``parameters`` that decide what they mean, by name and
-    set; ``codes`` by the word's leaf for each set, None for one that it does not tell; ``why_unread``."""
+    set; ``codes`` by the word's leaf for each set, None for one that it does not tell; ``why_unread``.
+    ``told`` are the keys of those for which it has given a value."""
 
     parameters: dict[Key, float | None] = field(default_factory=dict[Key, float | None])
     codes: dict[str, list[int | None]] = field(default_factory=dict[str, list[int | None]])
+    told: set[Key] = field(default_factory=set[Key])
     why_unread: Text = UNREADABLE
 
 

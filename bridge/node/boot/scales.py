@@ -79,6 +79,8 @@ def read_words(node: Node, drive: Drive, result: BootResult) -> Generator[Action
                 _go_on_without(error, channel, result)
             else:
                 found.codes[one.leaf][in_set - 1] = code_of(drive.family, one, data)
+                if data is not None:
+                    found.told.add((one.leaf, in_set))
         yield from _read_parameters(node, drive, channel, found, result)
     except SdoError:
         if channel == FIRST:
@@ -111,6 +113,8 @@ def _read_parameters(
             result.notes.append(Text.of("boot.of_slot", slot=drive.slot.name, what=error.said))
             value = math.nan
         found.parameters[parameter.name, in_set] = value
+        if value is not None and not math.isnan(value):
+            found.told.add((parameter.name, in_set))
         if value is None or parameter.name not in scaling or not parameter.read:
             continue
         if not is_scale(value):

@@ -256,6 +256,7 @@ def connect(
         drive.on_identification(result.identification, now)
         drive.on_own_supervision(result.own[drive.name], now)
         facts = result.words[drive.name]
+        drive.channel.meanings.told_by_drive = set(facts.told)
         if drive.on_codes(facts.codes, facts.why_unread):
             drive.channel.start_anew(now)
         drive.news.on_boot_up(facts.parameters, now)

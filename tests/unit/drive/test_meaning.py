@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 
 from bridge.command import Action, Code, Outcome, Request, command_of
 from bridge.command.messages.telegram import Refusal
+from bridge.drive.meaning import Meanings
 from bridge.image import Quality
+from bridge.mapping import load_family
 from bridge.sim.core.dictionary import Entry
 from bridge.sim.core.sdo_abort import AbortCode, SdoAbort
 from bridge.sim.nord.nord_drive import NordDrive
@@ -241,3 +243,16 @@ def test_a_frequency_is_the_same_in_every_set_and_through_every_switch(
         shown = point(bench, "actual/frequency")
         assert shown.quality is Quality.GOOD
         assert shown.value == pytest.approx(frequency, abs=len(sets) * step)
+
+
+@pytest.mark.parametrize(("given", "full"), [({}, None), ({"P105": 50.0}, 50.0)])
+def test_a_scale_that_the_drive_tells_no_more_is_that_of_the_site_file_or_none(
+    given: dict[str, float], full: float | None
+) -> None:
+    family = load_family("nord/sk-tu4-cao")
+    meanings = Meanings(family, family.slot[0], given)
+    meanings.on_parameter("P105", 100.0)
+    assert meanings.scales["actual/frequency"].full == 100.0
+    meanings.on_parameter("P105", None)
+    scale = meanings.scales.get("actual/frequency")
+    assert (scale and scale.full) == full

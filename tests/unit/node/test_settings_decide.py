@@ -198,3 +198,45 @@ def all_good(bench: Bench, values: list[ProcessValue]) -> bool:
     bad = {leaf: reading for leaf, reading in bad.items() if reading.quality is not Quality.GOOD}
     assert not bad
     return True
+
+
+class RefusingSdo(SlowSdo):
+    """Each answer is an abort while it ``refuses``: general error, or another one that has nothing to do
+    with the object."""
+
+    refuses = False
+
+    def take_frames(self) -> list[Frame]:
+        frames = super().take_frames()
+        return [self._refused(one) if self.refuses and one.can_id == 0x585 else one for one in frames]
+
+    def _refused(self, frame: Frame) -> Frame:
+        return frame._replace(data=b"\x80" + frame.data[1:4] + bytes.fromhex("00000008"))
+
+
+@pytest.mark.landing(4)
+@pytest.mark.parametrize("mapping", SLOW)
+def test_what_a_drive_has_told_and_refuses_to_tell_again_is_in_doubt(tmp_path: Path, mapping: str) -> None:
+    """It has the object: nothing that is assumed of drives without it counts, nor what it told last."""
+    bench = made(tmp_path, mapping, 0.005)
+    family = drive(bench).family
+    usual = [one for one in decided(family) if not one.code or family.is_usual(family.slot[0], one)]
+    scaling = {name for value in usual for name in (*value.scaled_by, *family.steady_of(value))}
+    changed = [one for value in usual for one in settings(bench, value) if one.name in scaling]
+    inner: Any = bench.node
+    node = bench.node = RefusingSdo(inner.inner)
+    node.refuses = True
+    for one in changed:
+        at_keypad(bench, one.ref, one.other)
+    bench.run(BOUND_S)
+    assert not [one for one in changed if point(bench, one.value).quality is Quality.GOOD]
+    node.refuses = False
+    bench.run(2.0)
+    read = [
+        one for one in changed if one.name in one.value.scaled_by and family.parameter_named(one.name).read
+    ]
+    assert all(follows(bench, one.value, one.name) for one in read)
+    for one in changed:
+        at_keypad(bench, one.ref, one.before)
+    bench.run(BOUND_S)
+    assert all_good(bench, usual)

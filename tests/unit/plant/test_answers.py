@@ -192,3 +192,19 @@ def test_what_a_drive_has_said_before_its_stop_is_no_answer(
     assert not scene.oracle.violations
     scene.answers.still_running(DRIVE, 1010.0, 1010.05, 2.0)
     assert bool(scene.oracle.violations) is is_wrong
+
+
+@pytest.mark.parametrize(
+    ("said", "had", "has", "is_wrong"),
+    [
+        (50.0, 50.0, 50.0, False),
+        (100.0, 50.0, 50.0, True),
+        (50.0, 50.0, 100.0, False),
+        (None, 50.0, 50.0, True),
+    ],
+)
+def test_a_parameter_is_read_as_what_the_drive_has(
+    scene: Scene, said: float | None, had: float, has: float, is_wrong: bool
+) -> None:
+    scene.answers.parameter_read(DRIVE, "P105", said, had, has, 1010.0)
+    assert bool(scene.oracle.violations) is is_wrong

@@ -132,3 +132,19 @@ def test_an_alarm_that_breaks_nothing_off_is_known(world: World, seconds: float,
     process.hang(seconds, in_turn=False)
     world.run_until(BEGIN_S + seconds)
     assert process.alarm.rang is rang
+
+
+def test_it_does_not_stand_still_within_a_turn_of_another(world: World) -> None:
+    """The other one would stand still with it."""
+    watcher = Nobody()
+    one, other = Process(world, watcher, []), Process(world, Nobody(), [])
+    one.look_s = other.look_s = 0.01
+    one.hang(0.5, in_turn=True)
+    seen: list[float] = []
+    world.after(0.005, lambda: one.post(lambda: seen.append(one.clock())))
+    other.post(lambda: seen.append(other.clock()))
+    assert world.now - BEGIN_S < 0.1
+    assert not watcher.seen
+    one.post(lambda: seen.append(one.clock()))
+    assert watcher.seen[0].startswith("still")
+    assert world.now - BEGIN_S > 0.5

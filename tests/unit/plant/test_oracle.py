@@ -167,6 +167,12 @@ def test_a_stranger_has_no_setpoint(scene: Scene) -> None:
     assert "setpoint of a stranger" in scene.sees(1010.1, setpoint=FAMILY.setpoint + NUMBERS)
 
 
+@pytest.mark.parametrize("setpoint", [FAMILY.setpoint // 2, 2 * FAMILY.setpoint, FAMILY.setpoint - 1])
+def test_a_setpoint_that_nobody_has_sent_is_wrong(scene: Scene, setpoint: int) -> None:
+    assert "gets a setpoint that nobody has sent" in scene.sees(1010.1, setpoint=setpoint)
+    assert not scene.sees(1010.2, setpoint=FAMILY.setpoint + 1)
+
+
 def test_who_takes_over_a_drive_without_an_owner_is_none(scene: Scene) -> None:
     scene.oracle.left(DRIVE, 1010.0)
     assert not scene.sees(1010.05)

@@ -1,15 +1,16 @@
-"""A node that positions beside the drives, and its owner, who are there for a while: a NORD SK TU3-CAO with
-the settings of BU 2500 §5.4, some of which somebody changes at its keypad on the way."""
+"""A node that positions beside the drives, and its owner: a NORD SK TU3-CAO with the settings of BU 2500
+§5.4, some of which somebody changes at its keypad on the way."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from bridge.command import Action, Identity, Request, Source, Write, command_of
+from bridge.command import Identity, Request, Source, Write
 from tests.plant.field import FieldNode
 from tests.plant.keypad import HOIST_CHANGES, nord_drive, set_at_keypad
 from tests.plant.plan import Step
 from tests.proof.drives import DRIVES
+from tests.proof.families import OWN_TIMEOUT_MS
 from tests.proof.settings import PLANT
 
 if TYPE_CHECKING:
@@ -28,10 +29,9 @@ _25_HZ: Final = 0x2000
 _PLACES: Final = (30_000, -20_000)
 """In increments, a thousandth of a revolution each."""
 _EACH_S: Final = 8.0
-_BOOT_S: Final = 3.0
-_WAY_S: Final = _BOOT_S + 3.0
-"""From its power-on to the change at the keypad."""
-_ENDS_S: Final = 1.0
+_RARELY: Final = 10
+_WAY_S: Final = 3.0
+"""From its first telegram to the change at the keypad."""
 _WHO: Final = Identity(Source.ZENOH, "hoist's controller", connection="session 45")
 
 
@@ -43,6 +43,8 @@ id = {NODE_ID}
 mapping = "nord/sk-tu3-cao-pdo3"
 supervision = "heartbeat"
 supervision_ms = {2 * PLANT.heartbeat_ms}
+own_timeout_ms = {OWN_TIMEOUT_MS}
+enforce = true
 [[bus.node.drive]]
 slot = "drive"
 unit_id = {len(DRIVES) + 2}
@@ -58,57 +60,61 @@ def commission(node: FieldNode) -> None:
     drive.parameters.commission(600, 2)
 
 
-def position(plant: Plant, step: Step) -> None:
-    """Its mains are switched on, its owner lets it go to and fro, and somebody changes a setting (``how``) on
-    the way, which is as it was before the mains are switched off: it costs nothing while nobody looks."""
-    if plant.has_hoist:
-        return
-    plant.has_hoist = True
-    world, node = plant.world, plant.nodes_by_id[NODE_ID]
-    began, drive = world.now, nord_drive(node.device, "")
-    cycles, is_owned = 0, True
-    setting = HOIST_CHANGES.get(step.how)
-    node.power_on()
+class Hoist:
+    """Its owner, who keeps it ready, and lets it go to and fro where that is asked for."""
 
-    def cycle() -> None:
-        nonlocal cycles
-        age_s = world.now - began
-        if not is_owned:
-            return
-        world.after(PLANT.owner_period_s, cycle)
-        word = _BEGINS[cycles % len(_BEGINS)] if not moves() else _RUN
-        cycles = 0 if moves() else cycles + 1
-        place = _PLACES[int(age_s // _EACH_S) % len(_PLACES)]
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self._node = plant.nodes_by_id[NODE_ID]
+        self._began: float | None = None
+        """Since when it goes to and fro."""
+        self._cycles = 0
+        plant.world.after(0.0, self._cycle)
+
+    def _cycle(self) -> None:
+        world = self._plant.world
+        world.after(PLANT.owner_period_s, self._cycle)
+        self._cycles += 1
+        if self._began is None:
+            # Whatever it has is acknowledged now and then.
+            place, word = 0, _READY if self._cycles % _RARELY else _ACKNOWLEDGE
+        else:
+            place = _PLACES[int((world.now - self._began) // _EACH_S) % len(_PLACES)]
+            word = _RUN if self._moves() else _BEGINS[self._cycles % len(_BEGINS)]
         # As words: they mean what the drive says, and are taken whatever that is.
         values = {
             "control_word": word,
             "setpoint_1": place & 0xFFFF,
             "setpoint_2": place >> 16 & 0xFFFF,
-            "setpoint_3": _25_HZ,
+            "setpoint_3": _25_HZ if self._began else 0,
         }
-        plant.bridge.ask(Request(_WHO, PATH, Write(values)), _DELAY_S, lambda: None, lambda outcome: None)
+        request = Request(_WHO, PATH, Write(values))
+        self._plant.bridge.ask(request, _DELAY_S, lambda: None, lambda outcome: None)
 
-    def moves() -> bool:
-        word = plant.bridge.good_number(f"{PATH}/status/drive_status_word")
+    def _moves(self) -> bool:
+        word = self._plant.bridge.good_number(f"{PATH}/status/drive_status_word")
         return word is not None and int(word) & 0x7F == 0x37
 
-    def at_keypad() -> None:
-        if setting is not None:
-            set_at_keypad(node, drive, setting, setting.value)
+    def go(self, seconds: float, how: str) -> None:
+        """Go to and fro; somebody changes a setting (``how``) on the way, and back before the end."""
+        if self._began is not None:
+            return
+        world, setting = self._plant.world, HOIST_CHANGES.get(how)
+        drive = nord_drive(self._node.device, "")
+        self._began, self._cycles = world.now, 0
 
-    def leave() -> None:
-        nonlocal is_owned
-        is_owned = False
-        if setting is not None:
-            set_at_keypad(node, drive, setting, setting.usual)
-        request = Request(_WHO, PATH, command_of(Action.RELEASE_CONTROL))
-        plant.bridge.ask(request, _DELAY_S, lambda: None, lambda outcome: None)
-        world.after(_ENDS_S, end)
+        def at_keypad() -> None:
+            if setting is not None:
+                set_at_keypad(self._node, drive, setting, setting.value)
 
-    def end() -> None:
-        node.change(node.device.power_off)
-        plant.has_hoist = False
+        def end() -> None:
+            self._began = None
+            if setting is not None:
+                set_at_keypad(self._node, drive, setting, setting.usual)
 
-    world.after(_BOOT_S, cycle)
-    world.after(_WAY_S, at_keypad)
-    world.after(_WAY_S + step.seconds, leave)
+        world.after(_WAY_S, at_keypad)
+        world.after(_WAY_S + seconds, end)
+
+
+def position(plant: Plant, step: Step) -> None:
+    plant.hoist.go(step.seconds, step.how)

@@ -104,8 +104,8 @@ class Plant:
         self.witnessed = Witnessed(self.oracle, table.name)
         Witness(self.world, self.wire, project, self.witnessed)
         self.answers.is_quiet = self.debts.is_quiet = self.witnessed.is_quiet = self.is_quiet
-        self.has_outputs = self.has_hoist = False
-        """Whether they have an owner."""
+        self.has_outputs = False
+        """Whether the outputs have an owner."""
         self.oracle.on_trip = self._on_trip
         self.oracle.on_stop = self._on_stop
         self.second: Bridge | None = None
@@ -145,9 +145,9 @@ class Plant:
         ]
         self._last_stops: dict[Drive, float | None] = dict.fromkeys(DRIVES)
         self.operator = Operator(self.world, self.bridge)
+        self.hoist = hoist.Hoist(self)
         for node in self.nodes:
-            if node.device.node_id != hoist.NODE_ID:
-                node.power_on()
+            node.power_on()
         self.counts: Counter[str] = Counter()
         self._silent_since = BEGIN_S
         self._loud_until = BEGIN_S

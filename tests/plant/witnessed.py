@@ -316,7 +316,10 @@ class Witnessed:
             return is_strange or self._turns(source, at)
         if source == BLOCK.path:
             return self._is_right_of_outputs(kind, at)
-        one = self._of_path[source]
+        one = self._of_path.get(source)
+        if one is None:
+            # Of the hoist nothing is known here.
+            return True
         if kind == "runs on":
             return one.is_enabled and one.stopped_at == inf and one.tpdo_at - one.rpdo_at > _OWN_S
         if kind == "stop ignored":

@@ -25,6 +25,8 @@ _ON_WIRE_S: Final = 0.03
 """A word is handed over a little before it is on the wire."""
 _FOLLOWED: Final = 2
 _STOPS: Final = ("stop", "quick_stop", "disable_voltage")
+_GOT_S: Final = 1.0
+"""So far apart are a refusal that is told and the answer that says so."""
 
 
 Asking = tuple[str, int]
@@ -65,7 +67,11 @@ class Answers:
         self._claims: list[_Claim] = []
         self._disturbed_at = -inf
         """When the bridge last stood still, ended, or lost its bus."""
-        self._ended_at = -inf
+        self._ended_at = self._front_at = -inf
+        self._refused: dict[str, list[float]] = {}
+        """When requests to each drive were answered by a refusal."""
+        self._told: list[tuple[str, float]] = []
+        """Refusals that an event has told, which somebody must have got."""
         self.is_quiet: Callable[[], bool] = lambda: True
         """Whether frames reach everybody."""
 
@@ -81,6 +87,14 @@ class Answers:
         self._asked = {asking: asked for asking, asked in self._asked.items() if asking[0]}
         self._ended_at = at
         self.disturbed(at)
+
+    def front_disturbed(self, at: float) -> None:
+        """The front stands still, goes on, or ends: answers are late, or lost."""
+        self._front_at = at
+
+    def refusal_told(self, target: str, at: float) -> None:
+        """An event says that a request by a client of the front was refused."""
+        self._told.append((target, at))
 
     def asked(self, asking: Asking, request: Request, at: float) -> None:
         self._asked[asking] = _Asked(request, at)
@@ -105,6 +119,8 @@ class Answers:
         if asked is None:
             self._oracle.wrong(at, f"request {asking} is answered twice: {outcome.code}")
             return
+        if not outcome.ok:
+            self._refused.setdefault(asked.request.target, []).append(at)
         drive = self._drives.get(asked.request.target)
         if drive is None or asked.came <= self._ended_at:
             return
@@ -156,6 +172,10 @@ class Answers:
             if now - max(asked.came, self._disturbed_at) > _ANSWER_S:
                 del self._asked[asking]
                 self._oracle.wrong(now, f"{asked.request} has no answer for {_ANSWER_S:.0f} s")
+        told = [one for one in self._told if one[1] + _GOT_S <= now]
+        self._told = self._told[len(told) :]
+        for target, at in told:
+            self._look_for_refused(target, at)
         due = [claim for claim in self._claims if claim.due <= now]
         self._claims = [claim for claim in self._claims if claim.due > now]
         for claim in due:
@@ -163,6 +183,13 @@ class Answers:
             if wrong := self._judged(claim, self._oracle.tracks[claim.drive]):
                 asked = f"{claim.drive.path}, asked at {claim.came - 1000.0:.3f} s"
                 self._oracle.wrong(claim.answered, f"{asked}: {claim.said!r}, and {wrong}")
+
+    def _look_for_refused(self, target: str, at: float) -> None:
+        self._oracle.looks += 1
+        if at < max(self._disturbed_at, self._front_at) + _GOT_S:
+            return
+        if not any(abs(when - at) <= _GOT_S for when in self._refused.get(target, [])):
+            self._oracle.wrong(at, f"{target}: a refusal is told that nobody has got")
 
     def _judged(self, claim: _Claim, track: Track) -> str:
         if not claim.is_forwarded:

@@ -8,12 +8,14 @@ from functools import partial
 from math import inf
 from typing import Final, cast
 
-from bridge.command import Identity, Outcome, Request
+from bridge.command import Event, EventKind, Identity, Outcome, Request, Write
 from bridge.command.messages.freshness import Inflow
 from bridge.image import Image, Quality
 from bridge.mirror import MirrorClient
 from bridge.northbound.pulse import Pulse
 from bridge.zenohlink import ZenohLink
+from tests.plant.answers import Answers
+from tests.plant.bridge_process import Bridge
 from tests.plant.machine import Process
 from tests.plant.meeting import Link, Meeting
 from tests.plant.world import World
@@ -40,9 +42,9 @@ class Front:
 
     def __init__(self, world: World, meeting: Meeting, name: str, faults: list[str]) -> None:
         """``faults`` gets what fails in its processes."""
-        self._world = world
+        self.world = world
         self._meeting = meeting
-        self._name = name
+        self.name = name
         self._faults = faults
         self._links: list[Link] = []
         self._requests = 0
@@ -53,6 +55,8 @@ class Front:
         self.on_answer: list[Callable[[int, Request, Outcome], None]] = []
         self.on_lost: list[Callable[[int], None]] = []
         """Called with the number of a request that nobody answers any more."""
+        self.on_disturbed: list[Callable[[], None]] = []
+        """Called when it stands still, goes on, or ends."""
         self._waiting: dict[int, Request] = {}
         self._went_on_at = -inf
         self.start()
@@ -60,12 +64,12 @@ class Front:
     # life
 
     def start(self) -> None:
-        process = self.process = Process(self._world, self, self._faults)
+        process = self.process = Process(self.world, self, self._faults)
         self._is_open = False
         self._inflows: dict[str, Inflow] = {}
         self._pulse = Pulse(process.clock)
-        self._mirror = _Mirror(self._link, self._world, process.clock, self._name)
-        self._world.after(0.0, lambda: process.post(self._begin))
+        self._mirror = _Mirror(self._link, self.world, process.clock, self.name)
+        self.world.after(0.0, lambda: process.post(self._begin))
 
     def _begin(self) -> None:
         self.process.loop.create_task(self._run())
@@ -89,19 +93,26 @@ class Front:
 
     def on_still(self, now: float) -> None:
         """Its clients wait, and who looks after it."""
-        self._world.after(_SIGN_S, partial(self._look_for_sign, self.process, now))
+        self._tell_disturbed()
+        self.world.after(_SIGN_S, partial(self._look_for_sign, self.process, now))
+
+    def _tell_disturbed(self) -> None:
+        for tell in self.on_disturbed:
+            tell()
 
     def _look_for_sign(self, process: Process, since: float) -> None:
         if process.still_since == since and not process.is_dead:
             process.kill(in_turn=False)
-            self._world.after(_BACK_S, self.start)
+            self.world.after(_BACK_S, self.start)
 
     def on_going_on(self, since: float, now: float) -> None:
         self._went_on_at = now
+        self._tell_disturbed()
 
     def on_end(self, now: float) -> None:
         """The kernel closes what the process had open, its clients' connections too."""
         self._is_open = False
+        self._tell_disturbed()
         links, self._links = self._links, []
         for link in links:
             link.drop()
@@ -132,7 +143,7 @@ class Front:
                 tell(number, request)
             self.process.post(lambda: self._serve(number, request, reply))
 
-        self._world.after(delay_s, arrive)
+        self.world.after(delay_s, arrive)
 
     def _serve(self, number: int, request: Request, reply: Callable[[Outcome], None]) -> None:
         now, look = self.process.clock(), self._pulse.look
@@ -162,7 +173,7 @@ class Front:
     def image(self) -> Image | None:
         """As its clients see it; None while nobody sees any, or a front that went on has not looked yet."""
         process = self.process
-        is_looked_at = process.still_since == inf and self._world.now > self._went_on_at + _JUST_S
+        is_looked_at = process.still_since == inf and self.world.now > self._went_on_at + _JUST_S
         return self._mirror.image if self._is_open and is_looked_at else None
 
     def good_number(self, name: str) -> float | None:
@@ -173,3 +184,27 @@ class Front:
         reading = image.read(name)
         is_number = reading.quality is Quality.GOOD and isinstance(reading.value, int | float)
         return reading.value if is_number else None  # type: ignore[return-value]
+
+
+def judge_front(front: Front, bridge: Bridge, answers: Answers) -> None:
+    """Have ``answers`` look at what a front answers and shows, and at the refusals of its clients' requests
+    that ``bridge`` tells."""
+    world, name = front.world, front.name
+
+    def on_answer(number: int, asked: Request, outcome: Outcome) -> None:
+        world.tell(f"request {number} of {name} {outcome.code} {outcome.forwarded}")
+        answers.answered((name, number), outcome, world.now)
+        point = f"{asked.target}/command/control_word"
+        if outcome.ok and isinstance(asked.command, Write):
+            shown = front.good_number(point), bridge.good_number(point)
+            answers.shown(asked.target, asked.command.values["control_word"], *shown, world.now)
+
+    def on_event(event: Event) -> None:
+        if event.kind is EventKind.REFUSED and f" by {name}:controller " in event.message:
+            answers.refusal_told(event.source, world.now)
+
+    front.on_request.append(lambda number, asked: answers.asked((name, number), asked, world.now))
+    front.on_answer.append(on_answer)
+    front.on_lost.append(lambda number: answers.lost((name, number)))
+    front.on_disturbed.append(lambda: answers.front_disturbed(world.now))
+    bridge.on_event.append(on_event)

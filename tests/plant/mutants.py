@@ -76,6 +76,7 @@ _RULES: Final = (
     ("followed is true", "followed, and"),
     ("causes are told", "no event says so"),
     ("one answer", "has no answer"),
+    ("one answer", "that nobody has got"),
     ("one answer", "is answered twice"),
     ("nothing fails", "Traceback"),
 )

@@ -11,7 +11,7 @@ from typing import Final
 
 from bridge.canopen.frame import Frame
 from bridge.cli.simulation import simulated_nodes
-from bridge.command import Event, EventKind, Outcome, Request, Write
+from bridge.command import Event, EventKind, Outcome
 from bridge.project import Project, load_project
 from tests.plant import hoist
 from tests.plant.answers import Answers
@@ -23,7 +23,7 @@ from tests.plant.dead_bridge import be_dead
 from tests.plant.debts import Debts
 from tests.plant.deeds import CALM, MORE
 from tests.plant.field import FieldNode
-from tests.plant.front import Front
+from tests.plant.front import Front, judge_front
 from tests.plant.meeting import Meeting
 from tests.plant.oracle import Oracle
 from tests.plant.outputs import Outputs, stop_outputs
@@ -119,11 +119,7 @@ class Plant:
         chance = Random(f"{plan.seed} bridge")
         self.bridge = Bridge(self.world, project, {table.name: self.wire}, "one", chance, records, meeting)
         self.front = Front(self.world, meeting, "opcua", self.bridge.faults)
-        self.front.on_request.append(
-            lambda number, asked: self.answers.asked(("opcua", number), asked, self.world.now)
-        )
-        self.front.on_answer.append(self._on_fronts_answer)
-        self.front.on_lost.append(lambda number: self.answers.lost(("opcua", number)))
+        judge_front(self.front, self.bridge, self.answers)
         self.bridge.on_start.append(self._on_start)
         self.truths = truths_of(self)
         self.bridge.on_event.append(self._on_event)
@@ -163,7 +159,7 @@ class Plant:
         end = BEGIN_S + self.plan.seconds
         while self.world.now < end and not (to_first and (self.oracle.violations or self.bridge.faults)):
             self.world.run_until(min(end, self.world.now + _LOOK_S) if to_first else end)
-        self.front.end()
+        self.close()
         return Result(
             self.plan,
             self.oracle.violations + self.bridge.faults,
@@ -175,6 +171,11 @@ class Plant:
             self.world.log or [],
             self.world.now - BEGIN_S,
         )
+
+    def close(self) -> None:
+        """No task of its processes is left."""
+        self.front.end()
+        self.bridge.process.loop.end()
 
     def _moves(self, drive: Drive) -> bool:
         track = self.oracle.tracks[drive]
@@ -207,14 +208,6 @@ class Plant:
         self.oracle.telegram(drive, self.world.now, word)
         before, self.before_telegram = self.before_telegram, lambda: None
         before()
-
-    def _on_fronts_answer(self, number: int, asked: Request, outcome: Outcome) -> None:
-        self.world.tell(f"request {number} of the front {outcome.code} {outcome.forwarded}")
-        self.answers.answered(("opcua", number), outcome, self.world.now)
-        name = f"{asked.target}/command/control_word"
-        if outcome.ok and isinstance(asked.command, Write):
-            shown = self.front.good_number(name), self.bridge.good_number(name)
-            self.answers.shown(asked.target, asked.command.values["control_word"], *shown, self.world.now)
 
     def _on_answer(self, number: int, outcome: Outcome) -> None:
         self.world.tell(f"request {number} {outcome.code} {outcome.forwarded}")

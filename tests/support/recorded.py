@@ -45,5 +45,5 @@ class RecordedPlant:
         tape.is_on = True
         world.run_until(world.now + seconds)
         tape.is_on = False
-        self.plant.front.end()
+        self.plant.close()
         return Segment(header, state, list(self._turns))

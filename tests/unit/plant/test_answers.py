@@ -208,3 +208,17 @@ def test_a_parameter_is_read_as_what_the_drive_has(
 ) -> None:
     scene.answers.parameter_read(DRIVE, "P105", said, had, has, 1010.0)
     assert bool(scene.oracle.violations) is is_wrong
+
+
+@pytest.mark.parametrize(("got_at", "is_wrong"), [(1010.01, False), (1012.0, True)])
+def test_a_refusal_that_is_told_is_somebodys_answer(scene: Scene, got_at: float, is_wrong: bool) -> None:
+    scene.asks(at=got_at - 0.005)
+    scene.answers.refusal_told(DRIVE.path, 1010.0)
+    scene.is_answered(Outcome(Code.NOT_ALLOWED, forwarded=False), got_at)
+    assert ("that nobody has got" in scene.wrong()) is is_wrong
+
+
+def test_a_front_that_hangs_may_get_it_late(scene: Scene) -> None:
+    scene.answers.refusal_told(DRIVE.path, 1010.0)
+    scene.answers.front_disturbed(1009.5)
+    assert not scene.wrong()

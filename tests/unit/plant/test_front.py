@@ -45,7 +45,7 @@ class Scene:
 def scene(tmp_path: Path) -> Iterator[Scene]:
     scene = Scene(tmp_path)
     yield scene
-    scene.front.end()
+    scene.plant.close()
     assert not scene.plant.bridge.faults
 
 

@@ -123,6 +123,7 @@ def test_objects_that_lead_to_each_other_are_the_same_afterwards(tmp_path: Path)
     first = next(iter(core.drives.values()))
     assert core.members[first.name] is first
     assert type(master) is type(plant.plant.bridge.master)
+    plant.plant.close()
 
 
 def test_what_is_outside_does_nothing() -> None:

@@ -75,6 +75,7 @@ def recorded(tmp_path: Path) -> Recorded:
 
 def test_what_was_asked_and_answered_is_replayed(recorded: Recorded, tmp_path: Path) -> None:
     recorded.start()
+    recorded.until(lambda: recorded.has_state(1))
     recorded.core.master.wake()
     [outcome] = recorded.asks()
     recorded.recorder.close()

@@ -119,4 +119,4 @@ def test_there_is_no_checkpoint_in_the_middle_of_a_dialogue(tmp_path: Path) -> N
         plant.run(0.51)
     with pytest.raises(checkpoint.DialogueIsOn):
         plant.core()
-    plant.plant.front.end()
+    plant.plant.close()

@@ -193,11 +193,12 @@ class Summaries:
             self._oracle.wrong(now, f"everything is in order, and is said to be {conditions}")
 
     def _all_run(self, now: float) -> bool:
-        """Each drive has been enabled for a while."""
+        """Each drive has been enabled for a while, and is told to be: one that hears nothing may run on."""
         for track in self._oracle.tracks.values():
             mask, value = track.drive.family.enabled
             latest = [word for at, word in track.said if at > now - _PASSES_S]
-            if not latest or any(word & mask != value for word in latest):
+            is_told = track.enabled_at > now - _PASSES_S
+            if not (latest and is_told) or any(word & mask != value for word in latest):
                 return False
         return True
 

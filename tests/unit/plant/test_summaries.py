@@ -42,14 +42,16 @@ class Scene:
         self.bridge = Bridge()
         self.now = 1030.0
 
-    def later(self, seconds: float, *, runs: bool = False) -> str:
-        """What is found wrong within these seconds."""
+    def later(self, seconds: float, *, runs: bool = False, is_told: bool = True) -> str:
+        """What is found wrong within these seconds; its drive ``runs``, and ``is_told`` to."""
         ends = self.now + seconds
         while self.now < ends:
             self.now += 0.25
             if runs:
                 word = DRIVE.family.enabled[1].to_bytes(2, "little")
                 self.oracle.frame(self.now, DRIVE.tpdo, word, of_bridge=False)
+                if is_told:
+                    self.oracle.tracks[DRIVE].enabled_at = self.now
             self.summaries.look(self.now, self.bridge)
         return " ".join(self.oracle.violations)
 
@@ -115,12 +117,12 @@ def test_everything_is_in_order_again(scene: Scene) -> None:
     assert "everything is in order" in scene.later(3.0, runs=True)
 
 
-@pytest.mark.parametrize("how", ["an intruder", "a drive that stands"])
+@pytest.mark.parametrize("how", ["an intruder", "a drive that stands", "one that runs untold"])
 def test_or_it_is_not(scene: Scene, how: str) -> None:
     if how == "an intruder":
         scene.summaries.intruded(scene.now)
     scene.bridge.said = dict.fromkeys((BUS, ALL), 1)
-    assert not scene.later(20.0, runs=how == "an intruder")
+    assert not scene.later(20.0, runs=how != "a drive that stands", is_told=how == "an intruder")
 
 
 def cut(scene: Scene) -> None:

@@ -65,7 +65,17 @@ class Rig:
         return self.folder / "state" / "audit.jsonl"
 
     def fronts(self) -> list[int]:
-        return children(self.process.pid)
+        """Without a fork of the bus process, which writes a checkpoint of the recorder and ends."""
+        own = command_line(self.process.pid)
+        return [pid for pid in children(self.process.pid) if command_line(pid) not in (own, b"")]
+
+
+def command_line(pid: int) -> bytes:
+    """Empty where there is no such process any more."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return b""
 
 
 def children(pid: int) -> list[int]:

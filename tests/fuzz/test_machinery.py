@@ -4,6 +4,7 @@ what was thrown at it is kept and kills it again."""
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -18,7 +19,7 @@ from tests.fuzz import judge as judges
 from tests.fuzz import run
 from tests.fuzz.case import Case, read_cases
 from tests.fuzz.judge import Judge
-from tests.fuzz.rig import Rig
+from tests.fuzz.rig import Rig, children, command_line
 from tests.fuzz.run import fuzz
 from tests.support.process import running, until
 
@@ -280,3 +281,22 @@ def test_a_fuzzer_that_fails_is_no_success(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(run, "BUILD", tmp_path / "build")
     with faulty(tmp_path) as rig:
         assert "out of order" in fuzz(rig, ["opcua"], 30.0, 7).faults[0]
+
+
+FORKS = """
+import os, subprocess, time
+front = subprocess.Popen(["sleep", "60"])
+if os.fork():
+    print("ready", flush=True)
+time.sleep(60)
+"""
+
+
+def test_a_fork_that_writes_a_checkpoint_is_no_front(tmp_path: Path) -> None:
+    with running(tmp_path, "bridge", sys.executable, "-c", FORKS) as bridge:
+        bridge.wait_output("ready")
+        assert len(children(bridge.pid)) == 2
+        (front,) = Rig(tmp_path, bridge, bridge, 0, 0, 0).fronts()
+        assert command_line(front).startswith(b"sleep")
+        for child in children(bridge.pid):
+            os.kill(child, signal.SIGKILL)

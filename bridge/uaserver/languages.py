@@ -1,11 +1,13 @@
 """Texts in several languages, of which each client is told the one that it asks for (OPC 10000-4 §5.4)."""
 
+# asyncua's LocalizedText has fields of these names: here they are looked up.
+# pyright: reportIncompatibleVariableOverride=false, reportIncompatibleMethodOverride=false
+
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Final
 
 from bridge.uaserver.library import ua
 
@@ -19,21 +21,18 @@ class Spoken(ua.LocalizedText):
     ``words`` are its texts by LocaleId; the first of them is for who knows none of the others.
     """
 
-    # A LocalizedText that cannot be changed has attributes of these names: here they are looked up.
-    # pyright: reportIncompatibleVariableOverride=false, reportIncompatibleMethodOverride=false
+    words: Mapping[str, str]
 
     def __init__(self, words: Mapping[str, str]) -> None:
         object.__setattr__(self, "words", words)
         object.__setattr__(self, "Encoding", 0)
 
-    words: Mapping[str, str]
-
     @property
-    def Locale(self) -> str:  # noqa: N802 - asyncua's name
+    def Locale(self) -> str:
         return chosen(_locales.get(), self.words)
 
     @property
-    def Text(self) -> str:  # noqa: N802
+    def Text(self) -> str:
         return self.words[chosen(_locales.get(), self.words)]
 
     def __eq__(self, other: object) -> bool:
@@ -47,7 +46,7 @@ class Spoken(ua.LocalizedText):
 
 
 @contextmanager
-def speaking(locales: Sequence[str]) -> Iterator[None]:
+def speaking(locales: Sequence[str]) -> Generator[None]:
     """Context in which texts are in the first of ``locales`` that they are in."""
     token = _locales.set(locales)
     try:

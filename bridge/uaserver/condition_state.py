@@ -1,4 +1,5 @@
-"""State of an alarm condition, and what each event and method makes of it (OPC 10000-9 §5.5 to §5.8). Sans-IO.
+"""State of an alarm condition, and what each event and method makes of it (OPC 10000-9 §5.5 to §5.8).
+Sans-IO.
 
 There are no branches: an alarm that comes again before it was acknowledged is to be acknowledged anew, once
 (Annex B.1.2). Times are in ms since 1970.
@@ -196,6 +197,10 @@ class ConditionState:
 
     def _by(self, act: Act) -> ConditionState:
         return replace(self, comment=self.comment.by(act.user, act.comment))
+
+
+NORMAL: Final = ConditionState()
+"""State of a condition that nothing has happened to."""
 
 
 def _unshelved(state: ConditionState) -> ConditionState:

@@ -91,7 +91,7 @@ def _write(session: Session, params: Any) -> Any:
 
 
 def _call(session: Session, params: Any) -> Any:
-    return session.application.call(session.identity, get(params, "MethodsToCall"))
+    return session.call_methods(get(params, "MethodsToCall"))
 
 
 def _view(act: Callable[[Browser, Any], Any]) -> _Act:

@@ -134,10 +134,18 @@ class Subscription:
         for held in (self.items, self._listeners, self._ready, self._holding):
             held.pop(item.number, None)
 
+    @property
+    def listeners(self) -> list[EventItem]:
+        return list(self._listeners.values())
+
     def hear(self, event: Occurrence) -> None:
         for item in self._listeners.values():
-            if item.hear(event):
-                self._ready[item.number] = item
+            self.tell(item, event)
+
+    def tell(self, item: EventItem, event: Occurrence) -> None:
+        """Tell one of its items alone."""
+        if item.hear(event):
+            self._ready[item.number] = item
 
     def repeat_values(self) -> None:
         """Tell every value again that nothing newer is queued for."""

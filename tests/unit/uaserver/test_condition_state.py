@@ -20,7 +20,7 @@ from bridge.uaserver.condition_state import (
 )
 from bridge.uaserver.library import StatusCodes as Codes
 
-NORMAL = ConditionState()
+NORMAL, NO_COMMENT = ConditionState(), Comment()
 GERMAN = Comment("Förderband geprüft", "de", "", 1000.0)
 
 
@@ -28,7 +28,7 @@ def event(number: int) -> bytes:
     return number.to_bytes(16, "big")
 
 
-def act(number: int = 1, comment: Comment = Comment()) -> Act:
+def act(number: int = 1, comment: Comment = NO_COMMENT) -> Act:
     return Act(event(number), comment, "anna")
 
 

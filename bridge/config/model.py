@@ -335,6 +335,9 @@ class OpcUaTable(ListeningTable):
     certificate: str | None = None
     private_key: str | None = None
     trusted_dir: str | None = None
+    acknowledge_resets: bool = Field(
+        False, description="true has whoever acknowledges the alarm of a drive reset its fault"
+    )
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 

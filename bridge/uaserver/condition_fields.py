@@ -65,9 +65,10 @@ def condition_place(
     source: tuple[ua.NodeId, str],
     emitters: Iterable[ua.NodeId],
     condition_class: tuple[int, ua.LocalizedText],
+    more: Fields,
 ) -> ConditionPlace:
     """``kind`` is its event type, ``source`` the node that it is about with its name, ``condition_class`` the
-    type and name of its class (§5.9)."""
+    type and name of its class (§5.9), ``more`` are fields of its type."""
     source_node, source_name = source
     class_id, class_name = condition_class
     return ConditionPlace(
@@ -86,6 +87,7 @@ def condition_place(
             "BranchId": _NO_BRANCH,
             "MaxTimeShelved": _MAX_TIME_SHELVED,
             "Quality": _GOOD,
+            **more,
         },
     )
 

@@ -111,6 +111,7 @@ class Conditions:
         self._changed: dict[ua.NodeId, None] = {}
         self._refreshing: set[int] = set()
         self._guard = Guard("OPC UA alarms")
+        self._latest: tuple[tuple[Condition, ConditionState, AlarmContent], Fields] | None = None
         self._by_object: dict[ua.NodeId, Condition] = {}
         self.conditions: dict[ua.NodeId, Condition] = {}
         self.watched: dict[ua.NodeId, dict[str, Callbacks]] = {}
@@ -133,7 +134,9 @@ class Conditions:
             step = step._replace(tells=step.state.enabled)
         self._take(condition, step)
 
-    def cleared(self, condition: Condition) -> None:
+    def cleared(self, condition: Condition, content: AlarmContent) -> None:
+        """It is not active any more, and says ``content``."""
+        condition.content = content
         self._take(condition, condition.state.cleared(self._epoch_ms()))
 
     def look(self) -> None:
@@ -160,11 +163,15 @@ class Conditions:
             self._lost = True
         self._waiting.append((condition.place.emitters, self.fields(condition)))
 
-    def fields(self, condition: Condition) -> dict[str, ua.Variant]:
+    def fields(self, condition: Condition) -> Fields:
         """Fields of its latest event, with what it says by this time."""
-        at = self._epoch_ms()
-        said = condition_fields(condition.place, condition.state, condition.content, self._words, at)
-        return said | event_fields(condition.event_id, condition.time_ms)
+        made_for = condition, condition.state, condition.content
+        # A client reads one field after the other.
+        if self._latest is None or condition.state.shelved or self._latest[0] != made_for:
+            at = self._epoch_ms()
+            said = condition_fields(condition.place, condition.state, condition.content, self._words, at)
+            self._latest = made_for, said | event_fields(condition.event_id, condition.time_ms)
+        return self._latest[1]
 
     # what is told
 

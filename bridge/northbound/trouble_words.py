@@ -68,7 +68,7 @@ def _as_it_is(drive: str, number: str, language: str) -> Mapping[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class PlantWords:
-    """What a plant adds to the words of its troubles. ``on_expiry`` is the reaction to a silent controller by
+    """Facts of a plant for the words of its troubles. ``on_expiry`` is the reaction to a silent controller by
     drive."""
 
     fault_in: FaultIn = _as_it_is

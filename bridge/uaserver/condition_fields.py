@@ -40,7 +40,7 @@ _NO_TIME: Final = variant(None, Kind.Null)
 
 @dataclass(frozen=True, slots=True)
 class AlarmContent:
-    """What an alarm says at present. ``more`` are fields of its own type, by ``where.field_name``."""
+    """Content of an alarm at present. ``more`` are fields of its own type, by ``where.field_name``."""
 
     message: ua.LocalizedText
     severity: int
@@ -49,7 +49,7 @@ class AlarmContent:
 
 @dataclass(frozen=True, slots=True)
 class ConditionPlace:
-    """What a condition is about. ``emitters`` are the nodes whose events tell of it, ``fixed`` the fields
+    """Subject of a condition. ``emitters`` are the nodes whose events tell of it, ``fixed`` the fields
     that never change."""
 
     node: ua.NodeId

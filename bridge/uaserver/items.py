@@ -67,7 +67,7 @@ def value_settings(asked: ua.MonitoringParameters, publishing_ms: float) -> Item
 
 
 def event_weight(settings: ItemSettings, filter_: EventFilter) -> int:
-    """What an item for events is counted as: cost of judging an event, and of keeping a queue of them."""
+    """Weight of an item for events: cost of judging an event, and of keeping a queue of them."""
     return filter_.weight * math.ceil(settings.queue_size / EVENT_QUEUE)
 
 

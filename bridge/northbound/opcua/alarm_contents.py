@@ -1,4 +1,4 @@
-"""What an alarm says: a trouble as fields of an event, in all languages."""
+"""Contents of alarms: a trouble as fields of an event, in all languages."""
 
 from __future__ import annotations
 

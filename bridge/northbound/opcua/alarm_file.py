@@ -49,7 +49,7 @@ class KeptAlarm(msgspec.Struct, frozen=True, omit_defaults=True):
     confirmed_ms: float = 0.0
     severity_ms: float = 0.0
     trouble: msgspec.Raw = msgspec.Raw(b"null")
-    """What it says, as the points told it."""
+    """The trouble that it speaks of, as the points told it."""
 
 
 class _Kept(msgspec.Struct, frozen=True):

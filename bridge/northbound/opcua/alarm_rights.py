@@ -1,4 +1,4 @@
-"""Who may do what to the bridge's alarms, and what an acknowledgement does to a drive."""
+"""Rights to the bridge's alarms, and the effect of an acknowledgement on a drive."""
 
 from __future__ import annotations
 

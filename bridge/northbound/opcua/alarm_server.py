@@ -47,7 +47,7 @@ _CLASSES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class AlarmSite:
-    """What a site adds to its alarms. ``fronts`` are the names of its fronts."""
+    """Facts of a site for its alarms. ``fronts`` are the names of its fronts."""
 
     words: PlantWords = field(default_factory=PlantWords)
     fronts: tuple[str, ...] = ()

@@ -48,7 +48,7 @@ Trouble = Mapping[str, Any]
 
 
 class _Speaking:
-    """What an alarm has been raised for. ``is_restored``: before this start, and not told again yet."""
+    """Trouble that an alarm was raised for. ``is_restored``: before this start, and not told again yet."""
 
     __slots__ = ("is_restored", "reason", "since", "told_at", "trouble")
 
@@ -67,7 +67,7 @@ class _Speaking:
 
 
 def reason_of(trouble: Trouble) -> str:
-    """What an acknowledgement is about: another kind of trouble, or another fault, is to be seen anew."""
+    """Subject of an acknowledgement: another kind of trouble, or another fault, is to be seen anew."""
     return f"{trouble['kind']}:{trouble['facts'].get('number', '')}"
 
 
@@ -122,7 +122,7 @@ class Alarms:
         self._speaking[alarm.place.id] = _Speaking(told, _LONG_AGO, is_restored=True)
 
     def kept(self) -> Mapping[str, Any]:
-        """What is to be kept, by the alarms' ids."""
+        """States to be kept, by the alarms' ids."""
         return {
             name: kept_alarm(one.condition.state, self._trouble_of(name))
             for name, one in self._alarms.items()

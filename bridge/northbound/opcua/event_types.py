@@ -27,7 +27,7 @@ class EventField(NamedTuple):
 
 
 TOLD_FIELDS: Final = (EventField("Code", Kind.String), EventField("Facts", Kind.String))
-"""What a message is made of: the code of its text, and the facts in it as JSON."""
+"""Fields that a message is made of: the code of its text, and the facts in it as JSON."""
 DRIVE_EVENT_FIELDS: Final = (
     *TOLD_FIELDS,
     EventField("Cause", Kind.LocalizedText),

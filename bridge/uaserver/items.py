@@ -22,6 +22,7 @@ from bridge.uaserver.library import (
     get,
     make,
     node_id,
+    notification,
     status,
     text,
     ua,
@@ -158,9 +159,7 @@ class ValueItem:
 
     def notification(self) -> ua.MonitoredItemNotification:
         """The next in the queue, which is taken off it."""
-        value = self.window.timed(self.queue.popleft())
-        handle = self.settings.client_handle
-        return make(ua.MonitoredItemNotification, ClientHandle=handle, Value=value)
+        return notification(self.settings.client_handle, self.window.timed(self.queue.popleft()))
 
 
 def _overflown(value: ua.DataValue) -> ua.DataValue:

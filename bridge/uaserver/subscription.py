@@ -5,7 +5,7 @@ Of time it knows what ``on_cycle`` is told; ``subscriptions`` has the timer.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -13,7 +13,9 @@ from bridge.uaserver.application import UserIdentity
 from bridge.uaserver.encoding import weight
 from bridge.uaserver.eventfilter import Occurrence
 from bridge.uaserver.items import EventItem, Item, Monitoring, ValueItem
+from bridge.uaserver.languages import speaking
 from bridge.uaserver.library import ServiceError, StatusCodes, get, make, status, ua
+from bridge.uaserver.notifications import changes
 from bridge.uaserver.publishing import PublishQueue, PublishRequest
 
 LEAST_INTERVAL_MS: Final = 50.0
@@ -63,6 +65,7 @@ class SubscriptionOwner(Protocol):
 
     session_id: ua.NodeId
     address: str
+    locales: Sequence[str]
     identity: UserIdentity
     channel_certificate: bytes | None
     publishing: PublishQueue
@@ -185,7 +188,8 @@ class Subscription:
         values, events = self._collect(request.most_bytes) if self._enabled else ([], [])
         data: list[object] = []
         if values:
-            data.append(make(ua.DataChangeNotification, MonitoredItems=values))
+            with speaking(self.owner.locales):
+                data.append(changes(values))
         if events:
             data.append(make(ua.EventNotificationList, Events=events))
         message = make(ua.NotificationMessage, SequenceNumber=self._sequence, NotificationData=data)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import inspect
 import logging
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -52,7 +52,7 @@ class ServiceRequest:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """``operations`` is the field of the parameters that has them, ``most`` how many there may be. What
+    """``operations`` are the fields of the parameters that have them, ``most`` how many there may be. What
     ``act`` returns is the field ``answer`` of the response. Without it a Publish request waits until there is
     something to tell."""
 
@@ -66,7 +66,7 @@ class Route:
         """Raises ServiceError for what is to be answered as a fault."""
         params = struct_from_binary(get(ua, f"{self.name}Parameters"), request.body)
         if self.operations:
-            _limit(get(params, self.operations), self.most)
+            _limit(sum(len(get(params, field) or ()) for field in self.operations.split()), self.most)
         if self.act is None:
             _publish(session, params, request)
             return
@@ -140,16 +140,22 @@ ROUTES: Final[Mapping[ua.NodeId, Route]] = {
         Route("CreateMonitoredItems", _subscription(Subscriptions.create_items), "ItemsToCreate"),
         Route("ModifyMonitoredItems", _items(MonitoredItems.modify), "ItemsToModify"),
         Route("SetMonitoringMode", _items(MonitoredItems.set_mode), "MonitoredItemIds", _RESULTS),
+        Route(
+            "SetTriggering",
+            _items(MonitoredItems.set_triggering),
+            "LinksToRemove LinksToAdd",
+            "Parameters",
+        ),
         Route("DeleteMonitoredItems", _items(MonitoredItems.delete), "MonitoredItemIds"),
     )
 }
 """Routes by the type of the requests."""
 
 
-def _limit(operations: Sequence[object] | None, most: int) -> None:
+def _limit(operations: int, most: int) -> None:
     if not operations:
         raise ServiceError(StatusCodes.BadNothingToDo)
-    if len(operations) > most:
+    if operations > most:
         raise ServiceError(StatusCodes.BadTooManyOperations)
 
 

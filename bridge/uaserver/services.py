@@ -92,7 +92,11 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
         Service("CreateMonitoredItems", "every attribute, events; see [Subscriptions](#subscriptions)"),
         Service("ModifyMonitoredItems", "all parameters"),
         Service("SetMonitoringMode", "disabled, sampling, reporting"),
-        _no("SetTriggering", "items do not trigger each other"),
+        Service(
+            "SetTriggering",
+            "what a linked item has queued is told once, at the end of the publishing interval; at most "
+            "2000 links of a subscription, else BadResourceUnavailable",
+        ),
         Service("DeleteMonitoredItems", "what is queued of them goes, too"),
     ),
     "Subscription": (

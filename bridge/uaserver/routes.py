@@ -94,6 +94,10 @@ def _call(session: Session, params: Any) -> Any:
     return session.application.call(session.identity, get(params, "MethodsToCall"))
 
 
+def _cancel(session: Session, params: Any) -> ua.CancelResult:
+    return make(ua.CancelResult, CancelCount=session.publishing.cancel(get(params, "RequestHandle")))
+
+
 def _view(act: Callable[[Browser, Any], Any]) -> _Act:
     return lambda session, params: act(session.browser, params)
 
@@ -115,6 +119,7 @@ _RESULTS: Final = "Parameters.Results"
 ROUTES: Final[Mapping[ua.NodeId, Route]] = {
     request_type(route.name): route
     for route in (
+        Route("Cancel", _cancel, answer="Parameters"),
         Route("Browse", _browse, "NodesToBrowse"),
         Route("BrowseNext", _view(Browser.browse_next), "ContinuationPoints", _RESULTS),
         Route("TranslateBrowsePathsToNodeIds", _view(Browser.translate), "BrowsePaths"),
@@ -182,5 +187,6 @@ def _publish(session: Session, params: ua.PublishParameters, request: ServiceReq
     expires_at = loop_time() + hint_ms / 1000 if hint_ms else float("inf")
     # Half of what the client accepts: the last notification may go beyond the limit.
     most_bytes = min(MOST_BYTES, session.most_bytes // 2)
-    waiting = PublishRequest(expires_at, request.is_open, answer, refuse, most_bytes)
+    handle: int = request.header.RequestHandle
+    waiting = PublishRequest(expires_at, request.is_open, answer, refuse, most_bytes, handle)
     session.subscriptions.publish(session, acknowledged, waiting)

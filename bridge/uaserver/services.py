@@ -53,7 +53,11 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
             "without `deleteSubscriptions`, and after a time-out, they live on for their lifetime, for a "
             "transfer",
         ),
-        _no("Cancel", "a request under way has its outcome"),
+        Service(
+            "Cancel",
+            "Publish requests that wait are answered with BadRequestCancelledByClient; a Write or Call is "
+            "carried out and has its outcome",
+        ),
     ),
     "NodeManagement": (
         _no("AddNodes", "the address space follows from the site file"),

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 from bridge.uaserver.condition_state import MAX_TIME_SHELVED_MS, ConditionState, Shelving
-from bridge.uaserver.library import GOOD, ObjectIds, node_id, ua, variant
+from bridge.uaserver.library import GOOD, ObjectIds, StatusCodes, data_value, node_id, status, ua, variant
 from bridge.uaserver.where import CONDITION_ID, Fields
 
 Kind = ua.VariantType
@@ -35,6 +35,7 @@ _FALSE: Final = variant(False, Kind.Boolean)
 _NO_BRANCH: Final = variant(ua.NodeId(), Kind.NodeId)
 _GOOD: Final = variant(GOOD, Kind.StatusCode)
 _MAX_TIME_SHELVED: Final = variant(MAX_TIME_SHELVED_MS, Kind.Double)
+_NO_DATA: Final = data_value(variant(None, Kind.Null), status(StatusCodes.BadNoData))
 _NO_TIME: Final = variant(None, Kind.Null)
 
 
@@ -151,6 +152,12 @@ def event_fields(event_id: bytes, time_ms: float) -> dict[str, ua.Variant]:
     was made."""
     time = moment(time_ms)
     return {"EventId": variant(event_id, Kind.ByteString), "Time": time, "ReceiveTime": time}
+
+
+def field_value(fields: Fields, name: str) -> ua.DataValue:
+    """Value of a field where clients read it: BadNoData for one that has none."""
+    held = fields.get(name)
+    return _NO_DATA if held is None or held.Value is None else data_value(held)
 
 
 def moment(time_ms: float) -> ua.Variant:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
 from bridge.base.guard import Guard
-from bridge.uaserver.address_space import Callbacks
+from bridge.uaserver.address_space import Watchers
 from bridge.uaserver.condition_calls import (
     METHODS,
     ArgumentFault,
@@ -31,6 +31,7 @@ from bridge.uaserver.condition_fields import (
     ConditionWords,
     condition_fields,
     event_fields,
+    field_value,
 )
 from bridge.uaserver.condition_state import NORMAL, Act, Comment, ConditionState, Step
 from bridge.uaserver.eventfilter import Occurrence
@@ -39,7 +40,6 @@ from bridge.uaserver.library import (
     ObjectIds,
     ServiceError,
     StatusCodes,
-    data_value,
     node_id,
     text,
     ua,
@@ -114,7 +114,7 @@ class Conditions:
         self._latest: tuple[tuple[Condition, ConditionState, AlarmContent], Fields] | None = None
         self._by_object: dict[ua.NodeId, Condition] = {}
         self.conditions: dict[ua.NodeId, Condition] = {}
-        self.watched: dict[ua.NodeId, dict[str, Callbacks]] = {}
+        self.watched: dict[ua.NodeId, dict[str, Watchers]] = {}
         self.on_change: Callable[[bool], None] = lambda is_by_user: None
         """Told of each change of a state; ``is_by_user``: somebody has called a method."""
 
@@ -198,10 +198,12 @@ class Conditions:
 
     async def _tell_watchers(self, where: ua.NodeId) -> None:
         fields = self.fields(self.conditions[where])
-        for name, callbacks in list(self.watched[where].items()):
-            for handle, tell in list(callbacks.items()):
+        now = asyncio.get_running_loop().time()
+        for name, watchers in list(self.watched[where].items()):
+            value = field_value(fields, name)
+            for watcher in list(watchers.values()):
                 with self._guard:
-                    await tell(handle, data_value(fields.get(name)))
+                    watcher.told(value, now)
         await asyncio.sleep(0)
 
     # the methods

@@ -5,16 +5,19 @@ Of time it knows what ``on_cycle`` is told; ``subscriptions`` has the timer.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
 from bridge.uaserver.application import UserIdentity
 from bridge.uaserver.encoding import weight
 from bridge.uaserver.eventfilter import Occurrence
-from bridge.uaserver.items import EventItem, Item, Monitoring, ValueItem
+from bridge.uaserver.items import EventItem, Item, ValueItem
+from bridge.uaserver.languages import speaking
 from bridge.uaserver.library import ServiceError, StatusCodes, get, make, status, ua
+from bridge.uaserver.notifications import change, changes
 from bridge.uaserver.publishing import PublishQueue, PublishRequest
+from bridge.uaserver.triggering import TriggeringLinks
 
 LEAST_INTERVAL_MS: Final = 50.0
 MOST_INTERVAL_MS: Final = 3_600_000.0
@@ -63,6 +66,7 @@ class SubscriptionOwner(Protocol):
 
     session_id: ua.NodeId
     address: str
+    locales: Sequence[str]
     identity: UserIdentity
     channel_certificate: bytes | None
     publishing: PublishQueue
@@ -72,6 +76,10 @@ class SubscriptionOwner(Protocol):
     @property
     def is_gone(self) -> bool:
         """Whether the session has ended. Its subscriptions may be transferred as long as they live."""
+        ...
+
+    def looks_alike(self, wanted: ua.ReadValueId) -> bool:
+        """Whether everybody sees the same of it: its values as they are."""
         ...
 
     def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
@@ -93,6 +101,7 @@ class Subscription:
         self.owner = owner
         self.terms = agreed
         self.items: dict[int, Item] = {}
+        self.links = TriggeringLinks()
         self._enabled = enabled
         self._listeners: dict[int, EventItem] = {}
         self._ready: dict[int, Item] = {}
@@ -118,8 +127,11 @@ class Subscription:
 
     # what there is to tell
 
-    def noticed(self, item: Item) -> None:
-        """Look at an item whose value, or queue, may have changed."""
+    def noticed(self, item: Item, *, is_queued: bool = False) -> None:
+        """Look at an item whose value, or queue, may have changed. ``is_queued``: it has queued something,
+        which triggers those that are linked to it."""
+        if is_queued:
+            self.links.fire(item.number)
         if isinstance(item, ValueItem) and item.is_holding:
             self._holding[item.number] = item
         if item.has_something:
@@ -133,6 +145,7 @@ class Subscription:
     def drop(self, item: Item) -> None:
         for held in (self.items, self._listeners, self._ready, self._holding):
             held.pop(item.number, None)
+        self.links.drop(item.number)
 
     @property
     def listeners(self) -> list[EventItem]:
@@ -145,7 +158,7 @@ class Subscription:
     def tell(self, item: EventItem, event: Occurrence) -> None:
         """Tell one of its items alone."""
         if item.hear(event):
-            self._ready[item.number] = item
+            self.noticed(item, is_queued=True)
 
     def repeat_values(self) -> None:
         """Tell every value again that nothing newer is queued for."""
@@ -162,10 +175,11 @@ class Subscription:
         if self._silent >= self.terms.lifetime:
             return False
         for item in list(self._holding.values()):
-            item.sample(now)
+            is_queued = item.sample(now)
             if not item.is_holding:
                 del self._holding[item.number]
-            self.noticed(item)
+            self.noticed(item, is_queued=is_queued)
+        self.links.release()
         self._quiet += 1
         if self._quiet >= self.terms.keep_alive or (self._enabled and any(self._reporting())):
             self.owner.publishing.ask(self, now)
@@ -184,16 +198,16 @@ class Subscription:
         self.touch()
 
     def _reporting(self) -> Iterator[Item]:
-        waiting = (item for item in self._ready.values() if item.has_something)
-        return (item for item in waiting if item.mode == Monitoring.Reporting)
+        return (item for item in self._ready.values() if item.has_report)
 
     # messages
 
     def publish(self, request: PublishRequest) -> bool:
-        values, events = self._collect(request.most_bytes) if self._enabled else ([], [])
+        with speaking(self.owner.locales):
+            values, events = self._collect(request.most_bytes) if self._enabled else ([], [])
         data: list[object] = []
         if values:
-            data.append(make(ua.DataChangeNotification, MonitoredItems=values))
+            data.append(changes(values))
         if events:
             data.append(make(ua.EventNotificationList, Events=events))
         message = make(ua.NotificationMessage, SequenceNumber=self._sequence, NotificationData=data)
@@ -213,17 +227,17 @@ class Subscription:
         )
         return more
 
-    def _collect(self, most_bytes: int) -> tuple[list[ua.MonitoredItemNotification], list[ua.EventFieldList]]:
-        """Notifications for one message, as many as go into it."""
-        values: list[ua.MonitoredItemNotification] = []
+    def _collect(self, most_bytes: int) -> tuple[list[bytes], list[ua.EventFieldList]]:
+        """Notifications for one message, as many as go into it; those of values are encoded."""
+        values: list[bytes] = []
         events: list[ua.EventFieldList] = []
         left, bytes_left = self.terms.most_per_message, most_bytes
         for item in list(self._reporting()):
-            while left and item.has_something:
+            while left and item.has_report:
                 left -= 1
                 if isinstance(item, ValueItem):
-                    values.append(item.notification())
-                    bytes_left -= weight(get(values[-1], "Value").Value)
+                    values.append(change(item.settings.client_handle, item.take()))
+                    bytes_left -= len(values[-1])
                 else:
                     events.append(item.notification())
                     bytes_left -= weight(get(events[-1], "EventFields"))

@@ -16,18 +16,15 @@ from bridge.northbound.opcua.alarm_places import CERTIFICATE, AlarmPlace
 from bridge.northbound.opcua.event_types import ALARM_FIELDS
 from bridge.northbound.opcua.kinds import Kinds, Name, constant, node_attributes, reference_to
 from bridge.northbound.opcua.structures import READ, variable_attributes
-from bridge.uaserver.address_space import Attributes, Callbacks
+from bridge.uaserver.address_space import Attributes, Watchers
+from bridge.uaserver.condition_fields import field_value
 from bridge.uaserver.conditions import Condition, Conditions
 from bridge.uaserver.library import (
     AttributeIds,
     ObjectIds,
-    StatusCodes,
-    data_value,
     make,
     node_id,
-    status,
     ua,
-    variant,
 )
 from bridge.uaserver.where import own_name
 
@@ -38,7 +35,6 @@ _SCALAR: Final = -1
 _HAS_CONDITION: Final = node_id(ObjectIds.HasCondition)
 _HAS_COMPONENT: Final = node_id(ObjectIds.HasComponent)
 _HAS_PROPERTY: Final = node_id(ObjectIds.HasProperty)
-_NO_DATA: Final = data_value(variant(None, Kind.Null), status(StatusCodes.BadNoData))
 _METHODS: Final = {
     "": (
         ObjectIds.ConditionType_Enable,
@@ -222,13 +218,12 @@ class ConditionValue(AttributeValue):
         self._field = field
 
     def read(self, *_: object) -> ua.DataValue:
-        held = self._conditions.fields(self._condition).get(self._field)
-        return _NO_DATA if held is None or held.Value is None else data_value(held)
+        return field_value(self._conditions.fields(self._condition), self._field)
 
     value_callback = read  # pyright: ignore[reportAssignmentType]
 
     @property
-    def datachange_callbacks(self) -> Callbacks:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def datachange_callbacks(self) -> Watchers:  # pyright: ignore[reportIncompatibleVariableOverride]
         of_condition = self._conditions.watched.setdefault(self._condition.place.node, {})
         return of_condition.setdefault(self._field, {})
 
@@ -265,7 +260,7 @@ class AlarmNodes:
         for one in alarms:
             self._of_owner.setdefault(one.place.owner, []).append(one)
         self.conditions = conditions
-        self.never_called: Callbacks = {}
+        self.never_called: Watchers = {}
         self.attributes_of = cache(self._attributes_of)
         self._to_type = cache(self._to_type_of)
         self._to_methods = cache(self._to_methods_of)

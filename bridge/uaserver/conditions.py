@@ -268,7 +268,9 @@ class Conditions:
                 raise ServiceError(StatusCodes.BadMonitoredItemIdInvalid)
         with self._refreshing_alone(number):
             _tell_all(found, items, _refresh_event(ObjectIds.RefreshStartEventType))
-            await self._tell_retained(found, items)
+            latest = asyncio.get_running_loop().time() + _LONGEST_REFRESH_S
+            await self._tell_retained(found, items, latest)
+            await _until_room(items, latest)
             _tell_all(found, items, _refresh_event(ObjectIds.RefreshEndEventType))
 
     @contextmanager
@@ -281,19 +283,22 @@ class Conditions:
         finally:
             self._refreshing.discard(number)
 
-    async def _tell_retained(self, found: Subscription, items: Sequence[EventItem]) -> None:
-        left_s = _LONGEST_REFRESH_S
+    async def _tell_retained(self, found: Subscription, items: Sequence[EventItem], latest: float) -> None:
         retained = [one for one in self.conditions.values() if one.state.retain]
         for number, condition in enumerate(retained):
-            while left_s > 0 and any(item.is_full for item in items):
-                await asyncio.sleep(_PAUSE_S)
-                left_s -= _PAUSE_S
+            await _until_room(items, latest)
             fields = self.fields(condition)
             for item in items:
                 if item.node in condition.place.emitters:
                     found.tell(item, Occurrence(item.node, fields))
             if number % _BATCH == _BATCH - 1:
                 await asyncio.sleep(0)
+
+
+async def _until_room(items: Sequence[EventItem], latest: float) -> None:
+    """Wait until the client has fetched what fills its queues, not beyond ``latest``."""
+    while any(item.is_full for item in items) and asyncio.get_running_loop().time() < latest:
+        await asyncio.sleep(_PAUSE_S)
 
 
 def _step(state: ConditionState, name: str, act: Act, duration_ms: float, now_ms: float) -> Step:

@@ -115,11 +115,13 @@ class Alarms:
                 self._restore_trouble(alarm, bytes(kept.trouble))
 
     def _restore_trouble(self, alarm: Alarm, kept: bytes) -> None:
-        told: dict[str, Any] = _UNKNOWN
-        with suppress(msgspec.MsgspecError, KeyError, TypeError, AttributeError):
+        speaking = _Speaking(_UNKNOWN, _LONG_AGO, is_restored=True)
+        # The file may be anybody's: what is no trouble is told when the bus process tells of it.
+        with suppress(msgspec.MsgspecError, KeyError, TypeError, ValueError, AttributeError):
             told = _decode(kept)
             alarm.condition.content = self._contents.of(told, alarm.place)
-        self._speaking[alarm.place.id] = _Speaking(told, _LONG_AGO, is_restored=True)
+            speaking = _Speaking(told, _LONG_AGO, is_restored=True)
+        self._speaking[alarm.place.id] = speaking
 
     def kept(self) -> Mapping[str, Any]:
         """States to be kept, by the alarms' ids."""

@@ -1,4 +1,4 @@
-"""Nodes of the alarms, made when somebody looks at them: each would be some sixty in asyncua's hands.
+"""Nodes of the alarms, made when somebody looks at them: each would be some fifty in asyncua's hands.
 
 An alarm has the parts of its type that the server fills; methods are the type's own (OPC 10000-9 §5.12).
 """

@@ -131,7 +131,7 @@ class Conditions:
         step = condition.state.raised(content.severity, self._epoch_ms(), anew=anew)
         if content != condition.content:
             condition.content = content
-            step = step._replace(tells=step.state.enabled)
+            step = Step(step.state, tells=step.state.enabled)
         self._take(condition, step)
 
     def cleared(self, condition: Condition, content: AlarmContent) -> None:

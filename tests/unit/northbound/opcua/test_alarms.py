@@ -20,7 +20,7 @@ from bridge.northbound.opcua.alarm_places import CERTIFICATE, alarm_places
 from bridge.northbound.opcua.alarms import Alarms
 from bridge.northbound.trouble_reader import TroubleReader
 from bridge.northbound.trouble_words import PlantWords
-from bridge.uaserver.condition_fields import ConditionWords, condition_place
+from bridge.uaserver.condition_fields import ConditionPlace, ConditionWords, common_fields
 from bridge.uaserver.condition_state import Act
 from bridge.uaserver.conditions import Condition, Conditions
 from bridge.uaserver.library import text
@@ -85,8 +85,8 @@ class Bench:
 
     def _condition(self, name: str, contents: AlarmContents) -> Condition:
         where = ua.NodeId(name, 2)
-        class_ = Ids.ProcessConditionClassType, text("process")
-        place = condition_place(where, where, "Alarm", (where, name), (where,), class_, {})
+        common = common_fields(where, "Alarm", Ids.ProcessConditionClassType, text("process"), {})
+        place = ConditionPlace(where, where, name, (where,), common)
         condition = Condition(place, content=contents.nothing)
         self.conditions.add(condition)
         return condition

@@ -17,6 +17,7 @@ import msgspec
 
 from bridge.base.guard import Guard
 from bridge.base.publishing_clock import next_publish
+from bridge.condition.told import MOST
 from bridge.northbound.opcua.alarm_contents import AlarmContents
 from bridge.northbound.opcua.alarm_file import AlarmFile, is_worth_keeping, kept_alarm, state_of
 from bridge.northbound.opcua.alarm_nodes import Alarm
@@ -164,8 +165,9 @@ class Alarms:
                 worst.setdefault(alarm.place.id, (alarm, told))
         for alarm, trouble in worst.values():
             self._raise(alarm, trouble)
-        # Of the rest nothing is known while the bus process does not answer.
-        for name in [] if is_dead else list(self._speaking):
+        # Of the rest nothing is known while the bus process does not answer, or tells only the worst.
+        is_whole = not is_dead and len(shown) < MOST
+        for name in list(self._speaking) if is_whole else ():
             if name not in worst:
                 self._clear(name)
 

@@ -3,41 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
-from bridge.command.messages.request import Identity, Role
+from bridge.command.messages.request import Role
 from bridge.northbound.opcua.accounts import Accounts
+from bridge.northbound.opcua.alarm_rights import LEAST_ROLE
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.session_user import SessionUser
 from bridge.northbound.opcua.writes import Writer
-from bridge.northbound.passwords import ANONYMOUS
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
+from bridge.uaserver.condition_calls import METHODS
 from bridge.uaserver.library import ua
-
-
-@dataclass(frozen=True, slots=True)
-class SessionUser:
-    """User of a session; ``identity`` names the session as its connection."""
-
-    identity: Identity
-
-    @property
-    def name(self) -> str:
-        return self.identity.user
-
-    @property
-    def is_anonymous(self) -> bool:
-        return self.identity.user == ANONYMOUS
-
-    @property
-    def has_rights(self) -> bool:
-        return self.identity.role >= Role.OPERATOR
-
-    def is_same(self, other: object) -> bool:
-        return isinstance(other, SessionUser) and self.identity.is_same(other.identity)
 
 
 class ConnectionArrivals:
@@ -70,6 +50,8 @@ class Backend(ServedApplication[SessionUser]):
         least = self._caller.least_role(where)
         if least is None:
             least = self._writer.least_role(where)
+        if least is None and where in METHODS:
+            least = LEAST_ROLE.get(METHODS[where].name, Role.OBSERVER)
         return user.identity.role >= (Role.OPERATOR if least is None else least)
 
     async def write(self, user: SessionUser, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:

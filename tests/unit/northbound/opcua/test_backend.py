@@ -10,9 +10,10 @@ from cryptography.hazmat.primitives.asymmetric.rsa import generate_private_key
 
 from bridge.command.messages.request import Action, Identity, Role, Source
 from bridge.image import DataType, Point
-from bridge.northbound.opcua.backend import Backend, SessionUser
+from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import MethodNode, VariableKind, VariableNode
+from bridge.northbound.opcua.session_user import SessionUser
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.uaserver.application import NOBODY, LoginAttempt
@@ -114,3 +115,20 @@ def test_what_is_crowded_may_have_waited_for_ever() -> None:
     arrivals = backend(Told(), pulse).arrivals()
     assert arrivals.arrive(crowded=True) == float("-inf")
     assert isinstance(arrivals.arrive(crowded=False), float)
+
+
+@pytest.mark.parametrize(
+    ("method", "least"),
+    [
+        (ua.ObjectIds.ConditionType_ConditionRefresh, Role.OBSERVER),
+        (ua.ObjectIds.AcknowledgeableConditionType_Acknowledge, Role.OPERATOR),
+        (ua.ObjectIds.AlarmConditionType_ShelvingState_TimedShelve, Role.OPERATOR),
+        (ua.ObjectIds.ConditionType_Disable, Role.ENGINEER),
+    ],
+)
+def test_methods_of_alarms_have_their_roles(method: int, least: Role) -> None:
+    told: Any = Told()
+    nobodys = Caller(told, told, lambda _: None), Writer(told, told, lambda _: None)
+    made = Backend(told, nobodys[1], nobodys[0], told, told)
+    allowed = [role for role in Role if made.may(user(role=role), ua.NodeId(method))]
+    assert allowed == [role for role in Role if role >= least]

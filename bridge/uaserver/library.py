@@ -29,6 +29,9 @@ variant: Callable[..., ua.Variant] = ua.Variant
 data_value: Callable[..., ua.DataValue] = ua.DataValue
 """(value, status, source time, server time)"""
 
+extension_object: Callable[..., ua.ExtensionObject] = ua.ExtensionObject
+"""(type of the encoding, encoded body)"""
+
 node_id: Callable[..., ua.NodeId] = ua.NodeId
 """(identifier, namespace index)"""
 

@@ -23,6 +23,7 @@ from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
 from bridge.uaserver.browsing import Browser
 from bridge.uaserver.connection_limits import MOST_CONNECTIONS
 from bridge.uaserver.encoding import Results
+from bridge.uaserver.historyread import HistoryReader
 from bridge.uaserver.library import (
     AttributeIds,
     ServiceError,
@@ -48,8 +49,8 @@ _NAME_BYTES: Final = 4
 """Length of the name by which a session is told from others of its user, also from those before a restart."""
 _MOST_LOCALES: Final = 10
 _READ: Final = 1
-"""Bit of an access level."""
-_OBSERVER_ACCESS: Final = data_value(variant(_READ, ua.VariantType.Byte))
+_READ_HISTORY: Final = 4
+"""Bits of an access level."""
 _OBSERVER_EXECUTABLE: Final = data_value(variant(False, ua.VariantType.Boolean))
 _NOTHING: Final = variant(None, ua.VariantType.Null)
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
@@ -73,6 +74,7 @@ class Session(InternalSession):
         self.channel_certificate: bytes | None = None
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
+        self.history = HistoryReader(aspace, server.subscriptions.items.event_types)
         self.holder: object | None = None
         """The processor of the connection that it is activated on."""
         self.answer: Results | None = None
@@ -149,6 +151,11 @@ class Session(InternalSession):
             await results.add(self._read(one, times))
         return results
 
+    async def read_history(self, params: ua.HistoryReadParameters) -> Any:
+        results = self.answer = Results(self.most_bytes)
+        await self.history.read(params, self.application, results)
+        return results
+
     def _read(self, wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> ua.DataValue:
         try:
             looked_at = window(wanted, times)
@@ -172,7 +179,8 @@ class Session(InternalSession):
         ):
             return value
         if attribute == AttributeIds.UserAccessLevel:
-            return _OBSERVER_ACCESS
+            may = value.Value.Value & (_READ | _READ_HISTORY)
+            return data_value(variant(may, ua.VariantType.Byte), None, None, value.ServerTimestamp)
         if attribute == AttributeIds.UserExecutable:
             return _OBSERVER_EXECUTABLE
         return value

@@ -35,7 +35,7 @@ from bridge.uaserver.library import (
     ObjectIds,
     ServiceError,
     StatusCodes,
-    extension_object,
+    extension,
     get,
     make,
     node_id,
@@ -129,7 +129,7 @@ class _Share:
     def result(self, kind: ua.NodeId, point: bytes | None) -> ua.HistoryReadResult:
         body = _COUNT.pack(self.count) + self.encoded
         code = GOOD if self.count else status(StatusCodes.GoodNoData)
-        held = extension_object(kind, body)
+        held = extension(kind, body)
         return make(ua.HistoryReadResult, StatusCode=code, ContinuationPoint=point, HistoryData=held)
 
 

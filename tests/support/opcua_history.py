@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from asyncua import ua
 
 from bridge.uaserver.eventfilter import Occurrence
-from bridge.uaserver.history import date_time
+from bridge.uaserver.history import Kept, date_time
 
 Codes = ua.StatusCodes
 
@@ -60,6 +60,10 @@ class Happened:
     def event(self, number: int) -> Occurrence | None:
         fields = self.held[number - self.first][1]
         return None if fields is None else Occurrence(ua.NodeId(ua.ObjectIds.Server), fields)
+
+
+def times_of(kept: Kept) -> list[int]:
+    return [kept.time_us(number) for number in range(kept.first, kept.end)]
 
 
 def told(times: Sequence[int], severity: int = 500) -> Happened:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Protocol
 
 from bridge.base.guard import Guard
 from bridge.base.publishing_clock import next_publish
@@ -16,13 +16,26 @@ _TAKE: Final = 500
 _BEFORE_YIELD: Final = 20
 
 
-class Publisher:
-    """Follows the image for the variables in ``watched``."""
+class Past(Protocol):
+    """What is kept of the past."""
 
-    def __init__(self, image: Image, watched: AllWatched, events: EventSender) -> None:
+    def record(self, places: Sequence[int]) -> None:
+        """These points have changed."""
+        ...
+
+    def look(self) -> None:
+        """Do what is due; called at each look."""
+        ...
+
+
+class Publisher:
+    """Follows the image for the variables in ``watched``, and for what is kept of the past."""
+
+    def __init__(self, image: Image, watched: AllWatched, events: EventSender, past: Past) -> None:
         self._image = image
         self._watched = watched
         self._events = events
+        self._past = past
         self._guard = Guard("OPC UA publisher")
 
     async def run(self) -> None:
@@ -36,7 +49,11 @@ class Publisher:
                 while left > 0:
                     taken = feed.take(min(left, _TAKE))
                     left -= len(taken)
+                    with self._guard:
+                        self._past.record(taken)
                     await self._publish(taken)
+                with self._guard:
+                    self._past.look()
                 now = asyncio.get_running_loop().time()
                 await asyncio.sleep(next_publish(now) - now)
         finally:

@@ -12,6 +12,7 @@ from bridge.command import Rejection
 from bridge.command.messages.request import Code, Identity, Outcome
 from bridge.image import DataType, Image, Point, Quality, Reading, Value
 from bridge.text import Text
+from bridge.uaserver.history import date_time
 from bridge.uaserver.library import GOOD, StatusCodes, scalar, stamped, status, ua, variant
 
 EpochNs = Callable[[float], int]
@@ -131,7 +132,12 @@ def _cut(value: Value) -> Value:
 def source_time(epoch_ns: int) -> datetime:
     """A time in ns since 1970 as OPC UA's DateTime, to the microsecond. What changes together has the
     same."""
-    return datetime.fromtimestamp(epoch_ns / 1e9, UTC)
+    return date_time(epoch_us(epoch_ns))
+
+
+def epoch_us(epoch_ns: int) -> int:
+    """A time in ns since 1970 in µs."""
+    return (epoch_ns + 500) // 1000
 
 
 def reading_value(
@@ -149,6 +155,13 @@ def reading_value(
     # A point that has never had a value has no source time either.
     stamp = None if quality is Quality.WAITING else source_time(epoch_ns)
     return stamped(value, code, stamp, datetime.now(UTC))
+
+
+def past_value(value: Value, quality: Quality, data_type: DataType, time_us: int) -> ua.DataValue:
+    """What a point of this type was, as ``reading_value`` tells what it is; without a server's time."""
+    code = QUALITY_STATUS[quality]
+    held = _NO_VALUE if code.is_bad() else scalar(value, VARIANT_TYPE[data_type])
+    return stamped(held, code, date_time(time_us), None)
 
 
 def present_value(

@@ -12,10 +12,15 @@ from typing import Final
 from bridge.base.guard import Guard
 from bridge.base.ratelimit import RateLimit
 from bridge.command import Event, EventKind
-from bridge.northbound.opcua.data_values import source_time
+from bridge.northbound.opcua.data_values import epoch_us, source_time
+from bridge.northbound.opcua.event_keeper import EventKeeper
+from bridge.northbound.opcua.event_records import Fields
 from bridge.northbound.opcua.nodes import pascal_case
+from bridge.northbound.opcua.notifiers import Notifiers
+from bridge.text import LANGUAGES, Said, Text, render
 from bridge.uaserver.eventfilter import Occurrence
-from bridge.uaserver.library import ObjectIds, node_id, text, ua, variant
+from bridge.uaserver.languages import Spoken
+from bridge.uaserver.library import ua, variant
 from bridge.uaserver.subscriptions import Subscriptions
 
 BASE_TYPE: Final = "DriveEventType"
@@ -37,13 +42,15 @@ class EventSender:
         self,
         epoch_ns: Callable[[float], int],
         subscriptions: Subscriptions,
-        objects: Mapping[str, ua.NodeId],
+        notifiers: Notifiers,
         types: Mapping[EventKind, ua.NodeId],
+        keeper: EventKeeper | None = None,
     ) -> None:
         self._epoch_ns = epoch_ns
         self._subscriptions = subscriptions
-        self._objects = objects
+        self._notifiers = notifiers
         self._types = types
+        self._keeper = keeper
         self._guard = Guard("OPC UA events")
         self._limits: dict[EventKind, RateLimit] = {}
         self._held_back = Counter[EventKind]()
@@ -58,23 +65,14 @@ class EventSender:
     async def send_waiting(self) -> None:
         while self._queue:
             event, held_back = self._queue.popleft()
-            if self._subscriptions.subscriptions:
+            if self._keeper or self._subscriptions.subscriptions:
                 await self._send(event, held_back)
 
     async def _send(self, event: Event, held_back: int) -> None:
-        more = f" ({held_back} more like it before were left out)" if held_back else ""
-        kinds = ua.VariantType
-        fields = {
-            "EventId": variant(uuid.uuid4().bytes, kinds.ByteString),
-            "EventType": variant(self._types[event.kind], kinds.NodeId),
-            "SourceNode": variant(self._source(event.source), kinds.NodeId),
-            "SourceName": variant(event.source, kinds.String),
-            "Time": variant(source_time(self._epoch_ns(event.time)), kinds.DateTime),
-            "ReceiveTime": variant(datetime.now(UTC), kinds.DateTime),
-            "Message": variant(text(event.text + more), kinds.LocalizedText),
-            "Severity": variant(event.severity, kinds.UInt16),
-        }
-        for emitter in self._emitters(event.source):
+        fields = self._fields(event, held_back)
+        if self._keeper:
+            self._keeper.keep(epoch_us(self._epoch_ns(event.time)), event.source, fields)
+        for emitter in self._notifiers.emitters(event.source):
             for subscription in list(self._subscriptions.subscriptions.values()):
                 if subscription.is_listening:
                     # Each client brings its own filter.
@@ -82,13 +80,25 @@ class EventSender:
                         subscription.hear(Occurrence(emitter, fields))
                     await asyncio.sleep(0)
 
-    def _source(self, name: str) -> ua.NodeId:
-        """The object that an event is about: a drive, a node, a bus, or else the bridge itself."""
-        objects = self._objects
-        return objects.get(name) or objects.get(f"bus/{name}") or objects["bridge"]
+    def _fields(self, event: Event, held_back: int) -> Fields:
+        kinds = ua.VariantType
+        return {
+            "EventId": variant(uuid.uuid4().bytes, kinds.ByteString),
+            "EventType": variant(self._types[event.kind], kinds.NodeId),
+            "SourceNode": variant(self._notifiers.source(event.source), kinds.NodeId),
+            "SourceName": variant(event.source, kinds.String),
+            "Time": variant(source_time(self._epoch_ns(event.time)), kinds.DateTime),
+            "ReceiveTime": variant(datetime.now(UTC), kinds.DateTime),
+            "Message": variant(_message(event, held_back), kinds.LocalizedText),
+            "Severity": variant(event.severity, kinds.UInt16),
+        }
 
-    def _emitters(self, name: str) -> list[ua.NodeId]:
-        """Objects that send the event: for one of a drive, the drive, its node and the server."""
-        above = self._objects.get(name.partition("/")[0]) if "/" in name else None
-        found = [node_id(ObjectIds.Server), self._source(name)]
-        return [*found, above] if above else found
+
+def _message(event: Event, held_back: int) -> ua.LocalizedText:
+    """The message with its cause, in all languages."""
+    said: Said = event.said
+    if event.because:
+        said = Text.of("event.because", message=said, cause=event.because)
+    if held_back:
+        said = Text.of("event.left_out", message=said, count=held_back)
+    return Spoken({language: render(said, language) for language in LANGUAGES})

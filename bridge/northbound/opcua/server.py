@@ -20,11 +20,17 @@ from bridge.northbound.opcua.accounts import Accounts, security_policies
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.change_publisher import Publisher
+from bridge.northbound.opcua.event_keeper import EventKeeper
+from bridge.northbound.opcua.event_log import EventLog
+from bridge.northbound.opcua.event_records import EventCodec
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.notifiers import Notifiers
+from bridge.northbound.opcua.plant_history import PlantHistory
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.tree import Tree
+from bridge.northbound.opcua.value_rings import ValueRings
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -37,6 +43,7 @@ from bridge.uaserver.session import InnerServer
 
 NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
+_MB: Final = 1_000_000
 
 _log = logging.getLogger(__name__)
 
@@ -65,6 +72,7 @@ class OpcUaServer:
         self._socket = bound
         self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
+        self._past: PlantHistory | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
         self.port = int(port)
@@ -127,6 +135,9 @@ class OpcUaServer:
         bound, self._socket = self._socket, None
         if bound:
             bound.close()
+        past, self._past = self._past, None
+        if past:
+            await past.close()
         if self._users:
             self._users.close()
 
@@ -143,19 +154,37 @@ class OpcUaServer:
         await self._describe(server, own.application_uri, users)
         namespace = await server.register_namespace(NAMESPACE)
         image = self._view.image
-        tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
+        kept = self._settings.history
+        rings = ValueRings(image, self._view.epoch_ns, kept)
+        trees = layout(image.points, rings.rings, kept.black_boxes)
+        keeps_events = kept.event_hours > 0
+        how = inner.aspace, namespace, image, self._view.epoch_ns
+        tree = Tree(*how, trees, keeps_events=keeps_events)
+        notifiers = Notifiers(tree.notifiers)
+        keeper = None
+        if keeps_events:
+            codec = EventCodec(await server.get_namespace_array())
+            most_bytes = kept.events_mb * _MB
+            log = EventLog(codec, notifiers, kept.event_hours, most_bytes)
+            keeper = EventKeeper(log, self._folder, most_bytes)
+        past = self._past = PlantHistory(
+            kept, image, self._view.epoch_ns, tree, rings, keeper, self._folder / "black_box"
+        )
+        await past.start()
+        self._view.on_event(past.on_event)
         inner.application = Backend(
             users,
             Writer(self._view, inner.aspace, tree.writable),
             Caller(self._view, inner.aspace, tree.method),
             self._view,
             self._pulse,
+            past,
         )
-        events = self._events(inner, tree)
+        events = self._events(inner, tree.namespace, notifiers, keeper)
         inner.subscriptions.prepare()
         self._server = server
         await server.start()
-        publisher = Publisher(image, tree.watched, events)
+        publisher = Publisher(image, tree.watched, events, past)
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
@@ -174,12 +203,12 @@ class OpcUaServer:
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
 
-    def _events(self, inner: InnerServer, tree: Tree) -> EventSender:
-        base = _event_type(inner, node_id(BASE_TYPE, tree.namespace), node_id(ObjectIds.BaseEventType))
-        types = {
-            kind: _event_type(inner, node_id(type_name(kind), tree.namespace), base) for kind in EventKind
-        }
-        events = EventSender(self._view.epoch_ns, inner.subscriptions, tree.notifiers, types)
+    def _events(
+        self, inner: InnerServer, namespace: int, notifiers: Notifiers, keeper: EventKeeper | None
+    ) -> EventSender:
+        base = _event_type(inner, node_id(BASE_TYPE, namespace), node_id(ObjectIds.BaseEventType))
+        types = {kind: _event_type(inner, node_id(type_name(kind), namespace), base) for kind in EventKind}
+        events = EventSender(self._view.epoch_ns, inner.subscriptions, notifiers, types, keeper)
         self._view.on_event(events.on_event)
         return events
 

@@ -10,6 +10,7 @@ from asyncua import ua
 
 from bridge.command import Event, EventKind
 from bridge.northbound.opcua.events import EventSender
+from bridge.northbound.opcua.notifiers import Notifiers
 from bridge.uaserver.eventfilter import Occurrence
 from bridge.uaserver.subscriptions import Subscriptions
 
@@ -29,7 +30,7 @@ def test_events_are_bounded_to_a_burst_and_a_rate() -> None:
     sender = EventSender(
         lambda at: round(at * 1e9),
         cast("Subscriptions", subscriptions),
-        {"bridge": ua.NodeId("bridge", 1)},
+        Notifiers({"bridge": ua.NodeId("bridge", 1)}),
         kinds,
     )
 

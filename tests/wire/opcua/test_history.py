@@ -208,7 +208,6 @@ async def test_events_of_the_past_are_those_of_their_objects(client: Client, vie
     assert notifies.Value.Value == 5
 
 
-@pytest.mark.landing
 async def test_a_bus_that_was_cut_is_in_the_history_after_a_restart(tmp_path: Path) -> None:
     """In the language of who reads it, though it happened in another run."""
     async with serving(SETTINGS, tmp_path) as (server, view):

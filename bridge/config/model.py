@@ -327,7 +327,7 @@ class UserTable(Table):
 
 
 class OpcUaHistoryTable(Table):
-    """What the OPC UA server keeps of the past."""
+    """History that the OPC UA server keeps."""
 
     points: list[PointPattern] = Field(default_factory=lambda: list(HISTORY_POINTS))
     samples_per_point: int = Field(20_000, ge=10, le=10_000_000, description="10…10000000")

@@ -80,11 +80,11 @@ class ServedApplication(Protocol[U]):
     async def call(self, user: U, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]: ...
 
     def value_history(self, where: ua.NodeId) -> ValueHistory | None:
-        """What is kept of a variable; None where nothing is."""
+        """History of a variable; None where it has none."""
         ...
 
     def event_history(self, where: ua.NodeId) -> EventHistory | None:
-        """What is kept of the events of an object; None where nothing is."""
+        """Past events of an object; None where none are kept."""
         ...
 
     def on_connection(self, user: U, *, is_there: bool, has_others: bool) -> None:

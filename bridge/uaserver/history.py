@@ -29,7 +29,7 @@ _NOTHING: Final = variant(None, ua.VariantType.Null)
 
 
 class Kept(Protocol):
-    """What is kept of one node. ``first`` is the number of the oldest, ``end`` that after the newest."""
+    """History of one node. ``first`` is the number of the oldest, ``end`` that after the newest."""
 
     @property
     def first(self) -> int: ...
@@ -68,8 +68,8 @@ class Bound:
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """What is still to be read: the numbers from ``at`` by ``step`` (1 or -1) to ``stop``, which is not part
-    of it. ``before`` and ``after`` are bounds that are not there."""
+    """Part of a history that is still to be read: the numbers from ``at`` by ``step`` (1 or -1) to ``stop``,
+    which is not part of it. ``before`` and ``after`` are bounds that are not there."""
 
     at: int
     stop: int

@@ -51,7 +51,7 @@ MOST_CONTINUATION_POINTS: Final = 100
 MOST_VALUES: Final = 10_000
 """Values or events in one answer, of all its nodes together; the rest follows by continuation points."""
 
-_TURN_S: Final = 0.005
+_TURN_S: Final = 0.002
 _CHUNK: Final = 10
 """Values between two looks at the clock."""
 _POINT_BYTES: Final = 8
@@ -61,7 +61,7 @@ _EVENTS: Final = node_id(ObjectIds.HistoryEvent_Encoding_DefaultBinary)
 
 
 class HistoryStore(Protocol):
-    """What is kept of which node."""
+    """Histories by their nodes."""
 
     def value_history(self, where: ua.NodeId) -> ValueHistory | None: ...
 

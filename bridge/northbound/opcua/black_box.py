@@ -96,7 +96,8 @@ def _rows(columns: Sequence[Column], trip_us: int, start_us: int) -> Iterator[li
 
 
 def _changes(columns: Sequence[Column], start_us: int) -> list[tuple[int, int, Value | None]]:
-    """What was already so at the beginning is told then."""
+    """Times, places and values of all columns in the order of time; what was so before ``start_us`` has that
+    time."""
     found = [
         (max(time_us, start_us), place, value)
         for place, column in enumerate(columns)
@@ -121,7 +122,7 @@ def iso(time: datetime) -> str:
 def places_by_drive(
     points: Sequence[Point], places: Sequence[int], drives: Sequence[str]
 ) -> Mapping[str, list[int]]:
-    """Those of ``places`` that are of each drive."""
+    """The ``places`` of each drive's points, by its name."""
     found: dict[str, list[int]] = {drive: [] for drive in drives}
     for place in places:
         drive = "/".join(points[place].path[:2])

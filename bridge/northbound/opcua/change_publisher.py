@@ -19,7 +19,7 @@ _TURN_S: Final = 0.001
 
 
 class Past(Protocol):
-    """What is kept of the past."""
+    """History that is fed with changes."""
 
     def record(self, places: Sequence[int]) -> None:
         """These points have changed."""
@@ -31,7 +31,7 @@ class Past(Protocol):
 
 
 class Publisher:
-    """Follows the image for the variables in ``watched``, and for what is kept of the past."""
+    """Follows the image for the variables in ``watched``, and for the history."""
 
     def __init__(self, image: Image, watched: AllWatched, events: EventSender, past: Past) -> None:
         self._image = image

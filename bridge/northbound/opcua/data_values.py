@@ -165,7 +165,8 @@ def reading_value(
 
 
 def past_value(value: Value, quality: Quality, data_type: DataType, time_us: int) -> ua.DataValue:
-    """What a point of this type was, as ``reading_value`` tells what it is; without a server's time."""
+    """A former value of a point of this type, as ``reading_value`` tells the present one; without a server's
+    time."""
     code = QUALITY_STATUS[quality]
     held = _NO_VALUE if code.is_bad() else scalar(value, VARIANT_TYPE[data_type])
     return stamped(held, code, date_time(time_us), None)

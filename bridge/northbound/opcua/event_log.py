@@ -16,7 +16,7 @@ from bridge.uaserver.history import EventHistory
 from bridge.uaserver.library import ua
 
 _HOUR_US: Final = 3_600_000_000
-_RECORD_BYTES: Final = 200
+_RECORD_BYTES: Final = 240
 """Bytes that a record takes beside its line, about."""
 
 
@@ -86,7 +86,7 @@ class _Told:
 
 
 def read_records(path: Path) -> list[EventRecord]:
-    """What is in the file and in the one before it; lines that are none are left out. A last line that was
+    """Records of the file and of the one before it; lines that are none are left out. A last line that was
     torn off is taken away, so that the next one begins at its beginning. Raises OSError."""
     found: list[EventRecord] = []
     for one in (path.with_name(f"{path.name}.1"), path):

@@ -36,7 +36,7 @@ class _OpenFile:
     size: int
     position: int = 0
     lock: asyncio.Lock = field(default_factory=asyncio.Lock)
-    """Of a file that is being read nothing is closed."""
+    """Held while the file is read: its descriptor is not closed meanwhile."""
 
 
 class FileTransfer:
@@ -160,7 +160,7 @@ _METHODS: Final[Mapping[ua.NodeId, tuple[_Method, int]]] = {
     node_id(ObjectIds.FileType_GetPosition): (FileTransfer.get_position, 1),
     node_id(ObjectIds.FileType_SetPosition): (FileTransfer.set_position, 2),
 }
-"""What is done, and the number of arguments, by the methods of FileType, which all files share."""
+"""Deeds, and the numbers of their arguments, by the methods of FileType, which all files share."""
 
 READING: Final = frozenset(_METHODS) - {WRITE}
 

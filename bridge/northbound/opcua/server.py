@@ -137,6 +137,7 @@ class OpcUaServer:
             bound.close()
         past, self._past = self._past, None
         if past:
+            self._view.forget(past.on_event)
             await past.close()
         if self._users:
             self._users.close()

@@ -101,7 +101,7 @@ class _EventPoint:
 
 
 class _Share:
-    """Part of an answer that one node may take. ``limit`` is what the client wants at most, 0 for all."""
+    """Part of an answer that one node may take: ``most`` values of about ``most_bytes``."""
 
     def __init__(self, most: int, most_bytes: int) -> None:
         self.encoded = bytearray()
@@ -111,7 +111,8 @@ class _Share:
         self._turn_at = loop_time() + _TURN_S
 
     def left(self, limit: int) -> int:
-        """Number of values that it still takes: at least one in all, so that every answer gets on."""
+        """Number of values that it still takes, of ``limit`` at most where that is not 0. It takes one in any
+        case, so that every answer gets on."""
         if self.count and len(self.encoded) >= self._most_bytes:
             return 0
         return min(limit or self._most, self._most) - self.count

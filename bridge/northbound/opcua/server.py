@@ -158,16 +158,11 @@ class OpcUaServer:
         kept = self._settings.history
         rings = ValueRings(image, self._view.epoch_ns, kept)
         trees = layout(image.points, rings.rings, kept.black_boxes)
-        keeps_events = kept.event_hours > 0
         how = inner.aspace, namespace, image, self._view.epoch_ns
-        tree = Tree(*how, trees, keeps_events=keeps_events)
+        tree = Tree(*how, trees, keeps_events=kept.event_hours > 0)
         notifiers = Notifiers(tree.notifiers)
-        keeper = None
-        if keeps_events:
-            codec = EventCodec(await server.get_namespace_array())
-            most_bytes = kept.events_mb * _MB
-            log = EventLog(codec, notifiers, kept.event_hours, most_bytes)
-            keeper = EventKeeper(log, self._folder, most_bytes)
+        codec = EventCodec(await server.get_namespace_array())
+        keeper = self._keeper(codec, notifiers)
         past = self._past = PlantHistory(
             kept, image, self._view.epoch_ns, tree, rings, keeper, self._folder / "black_box"
         )
@@ -203,6 +198,15 @@ class OpcUaServer:
         await server.set_build_info(_PRODUCT, "drivebridge", "drivebridge", version, version, built)
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
+
+    def _keeper(self, codec: EventCodec, notifiers: Notifiers) -> EventKeeper | None:
+        """The keeper of past events; None where none are kept."""
+        kept = self._settings.history
+        if not kept.event_hours:
+            return None
+        most_bytes = kept.events_mb * _MB
+        log = EventLog(codec, notifiers, kept.event_hours, most_bytes)
+        return EventKeeper(log, self._folder, most_bytes)
 
     def _events(
         self, inner: InnerServer, namespace: int, notifiers: Notifiers, keeper: EventKeeper | None

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import csv
+import json
+import sys
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from datetime import UTC, datetime, timedelta
@@ -21,10 +23,12 @@ from bridge.text import Text
 from tests.support.opcua_client import node
 from tests.support.opcua_raw import ask
 from tests.support.opcua_site import OPEN, LocalView, connected, namespace, serving
+from tests.support.process import REPOSITORY
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 Codes, Attribute = ua.StatusCodes, ua.AttributeIds
 LOAD = "bus/can0/load"
+PEER = REPOSITORY / "tests" / "wire" / "peers" / "o6_history.py"
 BEFORE = datetime(2020, 1, 1, tzinfo=UTC)
 POINTS = ["bus/*/load", "*/*/actual/*", "*/*/status/state"]
 SETTINGS = OPEN.model_copy(
@@ -104,6 +108,21 @@ async def test_raw_values_forwards_backwards_and_in_pieces(client: Client, view:
     second = await where.history_read(details, first.ContinuationPoint)
     assert values(second.HistoryData.DataValues) == [40.0]
     assert second.ContinuationPoint is None
+
+
+@pytest.mark.landing
+async def test_open62541_reads_the_same(view: Any) -> None:
+    await load(view, 1.0, 2.0, 3.0)
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, str(PEER), view.server.endpoint_url, LOAD, stdout=asyncio.subprocess.PIPE
+    )
+    out, _ = await process.communicate()
+    assert process.returncode == 0
+    # It prints a banner before.
+    seen = json.loads(out.decode().splitlines()[-1])
+    assert seen["forwards"][-3:] == [1.0, 2.0, 3.0]
+    assert seen["backwards"] == seen["forwards"][::-1]
+    assert seen["first"] == seen["forwards"][:2]
 
 
 async def test_a_subscription_and_the_history_have_the_same(client: Client, view: LocalView) -> None:

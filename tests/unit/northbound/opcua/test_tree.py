@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import random
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from bridge.catalogue import Catalogue
 from bridge.command import Plant
 from bridge.image import DataType, Image, Point
 from bridge.mapping import family_names
-from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.nodes import ObjectNode, layout
 from bridge.northbound.opcua.tree import Tree
 from bridge.project import load_project
 from tests.support import sites
@@ -78,9 +78,21 @@ def tree(space: AddressSpace, image: Image) -> Tree:
 @pytest.mark.parametrize("name", PLANTS)
 def test_clients_see_what_asyncua_would_have_held(name: str, standard: AddressSpace, tmp_path: Path) -> None:
     image = PLANTS[name](tmp_path).image
-    held = HeldTree(copy_of(standard), NAMESPACE, image)
+    check_against_asyncua(standard, image, layout(image.points))
+
+
+@pytest.mark.landing
+def test_clients_see_of_history_what_asyncua_would_have_held(standard: AddressSpace) -> None:
+    image = make_plant().image
+    check_against_asyncua(standard, image, layout(image.points, range(0, 500, 3), 2), keeps_events=True)
+
+
+def check_against_asyncua(
+    standard: AddressSpace, image: Image, trees: Sequence[ObjectNode], *, keeps_events: bool = False
+) -> None:
+    held = HeldTree(copy_of(standard), NAMESPACE, trees, 5 if keeps_events else 1)
     space = copy_of(standard)
-    tree_in(space, image)
+    Tree(space, NAMESPACE, image, epoch, trees, keeps_events=keeps_events)
     ids = [ua.NodeId(ua.ObjectIds.ObjectsFolder), ua.NodeId(ua.ObjectIds.Server), *held.ids]
     random.Random(1).shuffle(ids)
     for where in ids:

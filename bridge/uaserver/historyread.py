@@ -100,15 +100,27 @@ class _EventPoint:
     filter: EventFilter
 
 
+class _Pace:
+    """Turns of one request: others have theirs where one has been long."""
+
+    def __init__(self) -> None:
+        self._turn_at = loop_time() + _TURN_S
+
+    async def pause(self) -> None:
+        if loop_time() >= self._turn_at:
+            await asyncio.sleep(0)
+            self._turn_at = loop_time() + _TURN_S
+
+
 class _Share:
     """Part of an answer that one node may take: ``most`` values of about ``most_bytes``."""
 
-    def __init__(self, most: int, most_bytes: int) -> None:
+    def __init__(self, most: int, most_bytes: int, pace: _Pace) -> None:
         self.encoded = bytearray()
         self.count = 0
+        self.pause = pace.pause
         self._most = most
         self._most_bytes = most_bytes
-        self._turn_at = loop_time() + _TURN_S
 
     def left(self, limit: int) -> int:
         """Number of values that it still takes, of ``limit`` at most where that is not 0. It takes one in any
@@ -120,12 +132,6 @@ class _Share:
     def add(self, encoded: bytes) -> None:
         self.encoded += encoded
         self.count += 1
-
-    async def pause(self) -> None:
-        """Let others have their turn where this one has been long."""
-        if loop_time() >= self._turn_at:
-            await asyncio.sleep(0)
-            self._turn_at = loop_time() + _TURN_S
 
     def result(self, kind: ua.NodeId, point: bytes | None) -> ua.HistoryReadResult:
         body = _COUNT.pack(self.count) + self.encoded
@@ -154,8 +160,9 @@ class HistoryReader:
         read.check(len(wanted))
         most = max(1, MOST_VALUES // len(wanted))
         most_bytes = results.most_bytes // 2 // len(wanted)
+        pace = _Pace()
         for one in wanted:
-            share = _Share(most, most_bytes)
+            share = _Share(most, most_bytes, pace)
             try:
                 result = await self._one(one, read, share)
             except ServiceError as error:

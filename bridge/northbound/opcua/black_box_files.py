@@ -21,6 +21,7 @@ from bridge.uaserver.history import date_time
 from bridge.uaserver.library import StatusCodes, data_value, status, ua, variant
 
 _SUFFIX: Final = ".csv"
+_PART: Final = ".part"
 _TIME: Final = "%Y-%m-%dT%H-%M-%S.%fZ"
 """Time of the trip in the name of its file: no system minds it, and names sort as times do."""
 _MODE: Final = 0o640
@@ -81,7 +82,14 @@ class BlackBoxFiles:
         await self._show(drive)
 
     def _found(self) -> dict[str, list[BlackBoxFile]]:
-        return {drive: list(self._of_drive(drive))[: self._count] for drive in self._files}
+        found: dict[str, list[BlackBoxFile]] = {}
+        for drive in self._files:
+            files = list(self._of_drive(drive))
+            found[drive], old = files[: self._count], [one.path for one in files[self._count :]]
+            # What an earlier run has begun, or the site file has kept then.
+            for path in (*old, *(self._folder / drive).glob(f"*{_PART}")):
+                path.unlink(missing_ok=True)
+        return found
 
     def _of_drive(self, drive: str) -> Iterator[BlackBoxFile]:
         for path in sorted((self._folder / drive).glob(f"*{_SUFFIX}"), reverse=True):
@@ -143,7 +151,7 @@ async def _tell(held: AttributeValue, value: ua.DataValue) -> None:
 def _write_file(path: Path, columns: Sequence[Column], trip_us: int, start_us: int) -> int:
     content = table(columns, trip_us, start_us)
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
+    part = path.with_suffix(_PART)
     part.touch(_MODE)
     part.write_bytes(content)
     part.replace(path)

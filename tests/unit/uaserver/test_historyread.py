@@ -283,6 +283,9 @@ async def test_others_have_their_turn_meanwhile(types: EventTypes, monkeypatch: 
     turns = 0
     await rig.one(events(0, 600), SERVER)
     assert turns >= 100
+    turns = 0
+    await rig.results(raw(0, 10), *[ua.HistoryReadValueId(NodeId=LOAD)] * 100)
+    assert turns >= 30, "of many nodes with few values, too"
     task.cancel()
 
 

@@ -24,6 +24,8 @@ def fields(number: int = 0, words: str = "lost") -> Fields:
         "Severity": ua.Variant(800, Kind.UInt16),
         "Retain": ua.Variant(True, Kind.Boolean),
         "Quality": ua.Variant(ua.StatusCode(0), Kind.StatusCode),
+        "2:Code": ua.Variant("node.lost", Kind.String),
+        "EnabledState/Id": ua.Variant(False, Kind.Boolean),
         "ClientUserId": ua.Variant(None, Kind.Null),
     }
 

@@ -1,7 +1,7 @@
 """Fields of an event as a line of JSON, and back.
 
-A NodeId is written with the URI of its namespace, whose index may be another one after a restart; a text in
-all languages, so that who reads it gets their own.
+NodeIds, and names of fields that are not the standard's, are written with the URI of their namespace, whose
+index may be another one after a restart; a text in all languages, so that who reads it gets their own.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from bridge.uaserver.library import node_id, text, ua, variant
 Fields = Mapping[str, ua.Variant]
 
 _Kind = ua.VariantType
+_URI: Final = "nsu="
+"""Beginning of a name with the URI of its namespace, as in Part 6 §5.3.1.10."""
 _PLAIN: Final = frozenset(
     (
         _Kind.Boolean,
@@ -55,14 +57,31 @@ class EventCodec:
 
     def record(self, time_us: int, source: str, fields: Fields) -> EventRecord:
         """Raises ValueError for a field of a type that is not kept."""
-        kept = {name: self._body(one) for name, one in fields.items()}
+        kept = {self._written_name(name): self._body(one) for name, one in fields.items()}
         content = {"time_us": time_us, "source": source, "fields": kept}
         line = json.dumps(content, ensure_ascii=False, separators=(",", ":")) + "\n"
         return EventRecord(time_us, source, line.encode())
 
     def fields(self, record: EventRecord) -> Fields:
         found: dict[str, Any] = json.loads(record.line)["fields"]
-        return {name: self._variant(_Kind(kind), body) for name, (kind, body) in found.items()}
+        read = {
+            self._read_name(name): self._variant(_Kind(kind), body) for name, (kind, body) in found.items()
+        }
+        read.pop("", None)
+        return read
+
+    def _written_name(self, name: str) -> str:
+        index, colon, rest = name.partition(":")
+        if colon and index.isdecimal() and int(index) < len(self.namespaces):
+            return f"{_URI}{self.namespaces[int(index)]};{rest}"
+        return name
+
+    def _read_name(self, written: str) -> str:
+        """Empty for one of a namespace that there is no more."""
+        if not written.startswith(_URI):
+            return written
+        uri, _, name = written.removeprefix(_URI).rpartition(";")
+        return f"{self.namespaces.index(uri)}:{name}" if uri in self.namespaces else ""
 
     def _body(self, held: ua.Variant) -> tuple[int, object]:
         kind, value = held.VariantType, held.Value

@@ -39,11 +39,14 @@ def test_a_text_in_one_language_stays_so() -> None:
         assert codec.fields(made)["Message"].Value == said
 
 
-def test_a_node_id_is_found_where_its_namespace_is_by_then() -> None:
-    moved = EventCodec((URIS[0], URIS[1], "urn:other", URIS[2]))
-    assert moved.fields(record(1))["EventType"].Value == ua.NodeId("NodeLostEventType", 3)
-    gone = EventCodec(URIS[:2])
-    assert gone.fields(record(1))["EventType"].Value is None
+def test_node_ids_and_names_are_found_where_their_namespace_is_by_then() -> None:
+    moved = EventCodec((URIS[0], URIS[1], "urn:other", URIS[2])).fields(record(1))
+    assert moved["EventType"].Value == ua.NodeId("NodeLostEventType", 3)
+    assert moved["3:Code"].Value == "node.lost"
+    assert "2:Code" not in moved
+    gone = EventCodec(URIS[:2]).fields(record(1))
+    assert gone["EventType"].Value is None
+    assert not any("Code" in name for name in gone)
 
 
 @pytest.mark.parametrize(

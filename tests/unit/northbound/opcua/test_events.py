@@ -75,6 +75,6 @@ def test_events_are_kept_in_all_languages_though_nobody_listens() -> None:
     assert (time_us, source) == (5_000_001, "pump")
     assert fields["SourceNode"].Value == ua.NodeId("pump", 1)
     message = fields["Message"].Value
-    for language, expected in (("en", "node lost (because: "), ("de", "Knoten nicht erreichbar (Ursache: ")):
+    for language, expected in (("en", "node lost (because: "), ("de", "Knoten nicht erreichbar (wegen: ")):
         with speaking([language]):
             assert message.Text.startswith(expected)

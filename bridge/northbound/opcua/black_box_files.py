@@ -25,6 +25,7 @@ _PART: Final = ".part"
 _TIME: Final = "%Y-%m-%dT%H-%M-%S.%fZ"
 """Time of the trip in the name of its file: no system minds it, and names sort as times do."""
 _MODE: Final = 0o640
+_CLOSE_S: Final = 2.0
 _MIME_TYPE: Final = "text/csv"
 
 _log = logging.getLogger(__name__)
@@ -65,9 +66,15 @@ class BlackBoxFiles:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether one is being written: the next can wait where it is, on a slow disk, too."""
+        return bool(self._tasks)
+
     async def settled(self) -> None:
-        """Wait until all is written that is to be."""
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        """Wait until all is written that is to be, but not for a disk that hangs."""
+        if self._tasks:
+            await asyncio.wait(self._tasks, timeout=_CLOSE_S)
 
     def find(self, drive: str, number: int) -> BlackBoxFile | None:
         """The file of a drive with this number, the newest with 1."""

@@ -21,6 +21,8 @@ from bridge.uaserver.history import EventHistory, ValueHistory
 from bridge.uaserver.library import ua
 
 _SECOND_US: Final = 1_000_000
+_CLOSE_S: Final = 2.0
+"""Time for the black boxes that wait at the end, seconds."""
 
 
 class PlantHistory:
@@ -55,9 +57,12 @@ class PlantHistory:
 
     async def close(self) -> None:
         """Write what waits. A black box that waits for what comes after its trip has what there is by now."""
-        for trip in self._trips.rest():
-            self._freeze(trip)
+        end = clock.now() + _CLOSE_S
         await self.files.settled()
+        for trip in self._trips.rest():
+            if clock.now() < end:
+                self._freeze(trip)
+                await self.files.settled()
         if self._keeper:
             await self._keeper.close()
 
@@ -71,7 +76,7 @@ class PlantHistory:
 
     def look(self) -> None:
         # One at a time: a bus that goes down is a trip of all its drives.
-        trip = self._trips.due(clock.now())
+        trip = None if self.files.is_busy else self._trips.due(clock.now())
         if trip:
             self._freeze(trip)
 

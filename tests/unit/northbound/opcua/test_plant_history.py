@@ -54,8 +54,8 @@ class Rig:
             self.image.set(place, amperes, at)
         self.history.record(range(len(NAMES)))
 
-    def trip(self, at: float) -> None:
-        self.history.on_event(Event(at, EventKind.WATCHDOG, DRIVE, 900, ""))
+    def trip(self, at: float, drive: str = DRIVE) -> None:
+        self.history.on_event(Event(at, EventKind.WATCHDOG, drive, 900, ""))
 
     def files(self) -> list[Path]:
         return list(self.folder.rglob("*.csv"))
@@ -87,6 +87,20 @@ async def test_a_trip_is_written_when_its_time_has_come(tmp_path: Path) -> None:
     told = [(row["seconds_from_trip"], row[NAMES[0]]) for row in rig.rows()]
     assert told == [("-5.000", "1.0"), ("-3.000", "7.0"), ("-1.000", "9.0")]
     assert not any("pump" in name for name in rig.rows()[0])
+
+
+async def test_trips_of_many_drives_are_written_one_after_the_other(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, after_s=0)
+    rig.load(9.0, 9.0)
+    for drive in (DRIVE, "pump/drive"):
+        rig.trip(10.0, drive)
+    for _ in range(5):
+        rig.history.look()
+    await rig.history.files.settled()
+    assert [path.parent.parent.name for path in rig.files()] == ["conveyor"]
+    rig.history.look()
+    await rig.history.files.settled()
+    assert len(rig.files()) == 2
 
 
 async def test_a_trip_that_waits_is_written_at_the_end(tmp_path: Path) -> None:

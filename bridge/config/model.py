@@ -351,6 +351,9 @@ class OpcUaTable(ListeningTable):
     private_key: str | None = None
     trusted_dir: str | None = None
     history: OpcUaHistoryTable = Field(default_factory=lambda: OpcUaHistoryTable.model_validate({}))
+    acknowledge_resets: bool = Field(
+        False, description="true has whoever acknowledges the alarm of a drive reset its fault"
+    )
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 

@@ -12,7 +12,7 @@ from bridge.base.guard import Guard
 from bridge.base.line_file import LineFile
 from bridge.northbound.opcua.event_log import EventLog, read_records
 from bridge.northbound.opcua.event_records import Fields
-from bridge.uaserver.history import EventHistory
+from bridge.uaserver.history import EventHistory, time_us
 from bridge.uaserver.library import ua
 
 FILE_NAME: Final = "events.jsonl"
@@ -43,11 +43,12 @@ class EventKeeper:
         self._file.start()
         self._is_open = True
 
-    def keep(self, time_us: int, source: str, fields: Fields) -> None:
-        """Keep an event about ``source``."""
+    def keep(self, fields: Fields) -> None:
+        """Keep an event with these fields, ``Time`` and ``SourceName`` among them."""
         # Who is told of events must not lose them because they cannot be kept.
         with self._guard:
-            record = self._log.codec.record(time_us, source, fields)
+            at = time_us(fields["Time"].Value)
+            record = self._log.codec.record(at or _now_us(), fields["SourceName"].Value, fields)
             self._log.add([record], _now_us())
             self._file.put(record.line)
         if self._file.fault != self._fault:

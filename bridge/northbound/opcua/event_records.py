@@ -56,8 +56,8 @@ class EventCodec:
     namespaces: Sequence[str]
 
     def record(self, time_us: int, source: str, fields: Fields) -> EventRecord:
-        """Raises ValueError for a field of a type that is not kept."""
-        kept = {self._written_name(name): self._body(one) for name, one in fields.items()}
+        """``fields`` without those of types that are not kept: arrays and structures."""
+        kept = {self._written_name(name): self._body(one) for name, one in fields.items() if _is_kept(one)}
         content = {"time_us": time_us, "source": source, "fields": kept}
         line = json.dumps(content, ensure_ascii=False, separators=(",", ":")) + "\n"
         return EventRecord(time_us, source, line.encode())
@@ -87,11 +87,7 @@ class EventCodec:
         kind, value = held.VariantType, held.Value
         if value is None or kind is _Kind.Null:
             return _Kind.Null.value, None
-        if held.is_array:
-            raise ValueError("an array is not kept")
-        if kind in _PLAIN:
-            return kind.value, value
-        return kind.value, _WRITERS[kind](self, value) if kind in _WRITERS else _refused(kind)
+        return kind.value, value if kind in _PLAIN else _WRITERS[kind](self, value)
 
     def _variant(self, kind: ua.VariantType, body: Any) -> ua.Variant:
         value = _READERS[kind](self, body) if kind in _READERS else body
@@ -108,8 +104,9 @@ class EventCodec:
         return node_id(identifier, self.namespaces.index(uri)) if uri in self.namespaces else None
 
 
-def _refused(kind: ua.VariantType) -> object:
-    raise ValueError(f"a {kind.name} is not kept")
+def _is_kept(held: ua.Variant) -> bool:
+    kind = held.VariantType
+    return held.Value is None or (not held.is_array and (kind in _PLAIN or kind in _WRITERS))
 
 
 def _words(said: ua.LocalizedText) -> Mapping[str, str]:

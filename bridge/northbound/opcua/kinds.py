@@ -115,7 +115,7 @@ class Kinds:
             case FileNode():
                 node_class, type_id = ua.NodeClass.Object, ObjectIds.FileType
                 wanted = make(ua.ObjectAttributes, EventNotifier=0)
-        attributes = _attributes(node_class, wanted)
+        attributes = node_attributes(node_class, wanted)
         if isinstance(node, PropertyNode):
             held = attributes[AttributeIds.Value].value
             change(held, SourceTimestamp=self._built_at, ServerTimestamp=self._built_at)
@@ -149,10 +149,11 @@ def _description(words: str) -> AttributeValue:
 
 
 def reference_to(
-    space: AddressSpace, target: int, reference: int, *, forward: bool
+    space: AddressSpace, target: int | ua.NodeId, reference: int, *, forward: bool
 ) -> ua.ReferenceDescription:
-    """A reference of this type to a node of the standard's, as asyncua describes it."""
-    where = node_id(target)
+    """A reference of this type to a node that asyncua holds, as asyncua describes it; a number is a node of
+    the standard's."""
+    where = node_id(target) if isinstance(target, int) else target
     fields = {
         name: get(space.read_attribute_value(where, attribute).Value, "Value")
         for name, attribute in (
@@ -189,7 +190,10 @@ def _key(node: Node) -> Hashable:
             return FileNode
 
 
-def _attributes(node_class: ua.NodeClass, wanted: ua.NodeAttributes) -> dict[AttributeIds, AttributeValue]:
+def node_attributes(
+    node_class: ua.NodeClass, wanted: ua.NodeAttributes
+) -> dict[AttributeIds, AttributeValue]:
+    """Attributes of a node as asyncua makes them."""
     space = AddressSpace()
     item = make(ua.AddNodesItem, RequestedNewNodeId=_ANY, NodeClass=node_class, NodeAttributes=wanted)
     # Without its checks: there is no parent.

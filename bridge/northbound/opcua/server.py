@@ -17,13 +17,16 @@ from bridge.command import EventKind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua.accounts import Accounts, security_policies
+from bridge.northbound.opcua.alarm_server import AlarmSite, serve_alarms
+from bridge.northbound.opcua.alarms import AlarmTask
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.change_publisher import Publisher
 from bridge.northbound.opcua.event_keeper import EventKeeper
 from bridge.northbound.opcua.event_log import EventLog
 from bridge.northbound.opcua.event_records import EventCodec
-from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
+from bridge.northbound.opcua.event_types import BASE_TYPE, DRIVE_EVENT_FIELDS, EventTypeMaker, type_name
+from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.notifiers import Notifiers
@@ -37,7 +40,7 @@ from bridge.northbound.view import View
 from bridge.uaserver import decoding
 from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
-from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
+from bridge.uaserver.library import ObjectIds, node_id, ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.session import InnerServer
 
@@ -51,8 +54,8 @@ _log = logging.getLogger(__name__)
 class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
-    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``. ``bound`` is a
-    listening socket where somebody else holds the port.
+    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``, where the state
+    of the alarms is kept, too. ``bound`` is a listening socket where somebody else holds the port.
     """
 
     def __init__(
@@ -62,16 +65,20 @@ class OpcUaServer:
         state_dir: Path,
         site_name: str,
         bound: socket.socket | None = None,
+        alarm_site: AlarmSite | None = None,
     ) -> None:
         self._view = view
         self._settings = settings
         self._folder = state_dir / "opcua"
         self._site_name = site_name
+        self._alarm_site = alarm_site or AlarmSite()
         self._users: Accounts | None = None
         self._server: BoundServer | None = None
         self._socket = bound
         self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
+        self._follower: asyncio.Task[None] | None = None
+        self._alarms: AlarmTask | None = None
         self._past: PlantHistory | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
@@ -111,11 +118,11 @@ class OpcUaServer:
     async def failed(self) -> None:
         """Wait for ever, or raise ``OperationFailed`` when no client can connect any more or changes are not
         published."""
-        if self._socket is None or self._publisher is None:
+        if self._socket is None or self._publisher is None or self._follower is None:
             return
         deaf = asyncio.create_task(until_deaf(self._socket, "opcua.listen"))
         try:
-            await asyncio.wait((deaf, self._publisher), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((deaf, self._publisher, self._follower), return_when=asyncio.FIRST_COMPLETED)
             if not deaf.done():
                 raise OperationFailed("OPC UA: clients are told of no change any more")
             await deaf
@@ -125,10 +132,13 @@ class OpcUaServer:
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
         self._pulse.stop()
-        task, self._publisher = self._publisher, None
-        if task:
+        tasks = [one for one in (self._publisher, self._follower) if one]
+        self._publisher = self._follower = None
+        for task in tasks:
             task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
+        if self._alarms:
+            await self._alarms.end()
         server, self._server = self._server, None
         if server:
             await server.stop()
@@ -161,13 +171,16 @@ class OpcUaServer:
         how = inner.aspace, namespace, image, self._view.epoch_ns
         tree = Tree(*how, trees, keeps_events=kept.event_hours > 0)
         notifiers = Notifiers(tree.notifiers)
-        codec = EventCodec(await server.get_namespace_array())
-        keeper = self._keeper(codec, notifiers)
+        keeper = self._keeper(EventCodec(await server.get_namespace_array()), notifiers)
         past = self._past = PlantHistory(
             kept, image, self._view.epoch_ns, tree, rings, keeper, self._folder / "black_box"
         )
         await past.start()
         self._view.on_event(past.on_event)
+        resets = self._settings.acknowledge_resets
+        self._alarms = serve_alarms(
+            inner, tree, self._view, self._alarm_site, own.certificate, self._folder, keeper, resets=resets
+        )
         inner.application = Backend(
             users,
             Writer(self._view, inner.aspace, tree.writable),
@@ -182,6 +195,7 @@ class OpcUaServer:
         await server.start()
         publisher = Publisher(image, tree.watched, events, past)
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
+        self._follower = asyncio.create_task(self._alarms.run(), name="opcua alarms")
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
 
@@ -211,9 +225,11 @@ class OpcUaServer:
     def _events(
         self, inner: InnerServer, namespace: int, notifiers: Notifiers, keeper: EventKeeper | None
     ) -> EventSender:
-        base = _event_type(inner, node_id(BASE_TYPE, namespace), node_id(ObjectIds.BaseEventType))
-        types = {kind: _event_type(inner, node_id(type_name(kind), namespace), base) for kind in EventKind}
-        events = EventSender(self._view.epoch_ns, inner.subscriptions, notifiers, types, keeper)
+        types = EventTypeMaker(inner, namespace)
+        base = types.make(BASE_TYPE, node_id(ObjectIds.BaseEventType), DRIVE_EVENT_FIELDS)
+        types.generates(base)
+        made = {kind: types.make(type_name(kind), base) for kind in EventKind}
+        events = EventSender(self._view.epoch_ns, inner.subscriptions, notifiers, made, keeper)
         self._view.on_event(events.on_event)
         return events
 
@@ -228,23 +244,6 @@ class OpcUaServer:
             )
         if settings.anonymous == "none" and not settings.user:
             _log.warning('OPC UA: nobody can log in: no [[opcua.user]] and anonymous = "none"')
-
-
-def _event_type(inner: InnerServer, where: ua.NodeId, parent: ua.NodeId) -> ua.NodeId:
-    """A new type below ``parent``. Raises UaError where there is one already."""
-    name = str(where.Identifier)
-    item = make(
-        ua.AddNodesItem,
-        RequestedNewNodeId=where,
-        BrowseName=ua.QualifiedName(name, where.NamespaceIndex),
-        NodeClass=ua.NodeClass.ObjectType,
-        ParentNodeId=parent,
-        ReferenceTypeId=node_id(ObjectIds.HasSubtype),
-        NodeAttributes=make(ua.ObjectTypeAttributes, DisplayName=text(name)),
-    )
-    (result,) = inner.node_mgt_service.add_nodes([item])
-    get(result, "StatusCode").check()
-    return where
 
 
 def built_at() -> datetime:

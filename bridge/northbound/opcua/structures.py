@@ -139,7 +139,7 @@ def value_type(node: VariableNode) -> ua.VariantType:
 
 def property_attributes(content: Property) -> ua.VariableAttributes:
     rank = _ONE_DIMENSION if content.value.is_array else _SCALAR
-    return _variable_attributes(content.data_type, READ, rank, Value=content.value)
+    return variable_attributes(content.data_type, READ, rank, Value=content.value)
 
 
 def point_attributes(
@@ -147,11 +147,11 @@ def point_attributes(
 ) -> ua.VariableAttributes:
     """``kept``: past values are."""
     access = (READ_WRITE if writable else READ) | (READ_HISTORY if kept else 0)
-    made = _variable_attributes(kind.value, access, _SCALAR, MinimumSamplingInterval=_SAMPLING_MS)
+    made = variable_attributes(kind.value, access, _SCALAR, MinimumSamplingInterval=_SAMPLING_MS)
     return change(made, Historizing=kept)
 
 
-def _variable_attributes(data_type: int, access: int, rank: int, **more: object) -> ua.VariableAttributes:
+def variable_attributes(data_type: int, access: int, rank: int, **more: object) -> ua.VariableAttributes:
     return make(
         ua.VariableAttributes,
         DataType=node_id(data_type),

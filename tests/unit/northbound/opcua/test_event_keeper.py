@@ -26,7 +26,7 @@ async def kept(folder: Path, *times: int, most_bytes: int = 100_000) -> list[int
     keeper = EventKeeper(event_log(most_bytes=most_bytes), folder, most_bytes)
     await keeper.start()
     for time in times:
-        keeper.keep(time, "conveyor/fu1", fields(time))
+        keeper.keep(fields(time))
     history = keeper.history(SERVER)
     assert history is not None
     found = times_of(history)
@@ -63,12 +63,12 @@ async def test_events_are_told_where_they_cannot_be_kept(
     assert "cannot be read" in caplog.text
 
 
-async def test_a_field_that_cannot_be_kept_hinders_nothing(
+async def test_an_event_that_cannot_be_kept_hinders_nothing(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     keeper = EventKeeper(event_log(), tmp_path, 100_000)
     await keeper.start()
-    keeper.keep(1, "pump", {"Value": ua.Variant([1], ua.VariantType.Int32)})
+    keeper.keep({})
     history = keeper.history(SERVER)
     assert history is not None
     assert times_of(history) == []

@@ -20,6 +20,7 @@ from asyncua.client.ua_file import UaFile
 from bridge.command import Event, EventKind
 from bridge.config import OpcUaHistoryTable, OpcUaTable
 from bridge.text import Text
+from tests.support.opcua_alarms import cut_bus, tell
 from tests.support.opcua_client import node
 from tests.support.opcua_raw import ask
 from tests.support.opcua_site import OPEN, LocalView, connected, namespace, serving
@@ -247,6 +248,26 @@ async def test_a_bus_that_was_cut_is_in_the_history_after_a_restart(tmp_path: Pa
                 return len(await events(client.nodes.server)) == 2
 
             await until(more, "one more")
+
+
+async def alarms(client: Client) -> list[Any]:
+    """Events of the alarm of the bus."""
+    server = client.nodes.server
+    kind = ua.NodeId(ua.ObjectIds.AlarmConditionType)
+    found = await server.read_event_history(BEFORE, None, 1000, evtypes=kind)
+    return [one for one in found if one.SourceName == "can0" and hasattr(one, "ActiveState/Id")]
+
+
+async def test_what_an_alarm_has_told_is_in_the_history_after_a_restart(tmp_path: Path) -> None:
+    async with serving(SETTINGS, tmp_path) as (server, view), connected(server) as client:
+        tell(view, cut_bus("conveyor"))
+        before = await until(lambda: alarms(client), "the alarm")
+    async with serving(SETTINGS, tmp_path) as (server, view), connected(server) as client:
+        after = await alarms(client)
+        assert [one.EventId for one in after[: len(before)]] == [one.EventId for one in before]
+        assert getattr(after[0], "ActiveState/Id") is True
+        assert after[0].Message == before[0].Message
+        assert after[0].SourceNode == ua.NodeId("bus/can0", await namespace(client))
 
 
 @pytest.mark.landing

@@ -25,14 +25,15 @@ from bridge.northbound.opcua.event_types import (
     CERTIFICATE_ALARM_TYPE,
     EventTypeMaker,
 )
-from bridge.northbound.opcua.events import emitters_of, in_all_languages
+from bridge.northbound.opcua.events import in_all_languages
+from bridge.northbound.opcua.notifiers import Notifiers
 from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.trouble_reader import TroubleReader
 from bridge.northbound.trouble_words import PlantWords
 from bridge.northbound.view import View
 from bridge.text import Text
 from bridge.uaserver.condition_fields import ConditionPlace, ConditionWords, common_fields
-from bridge.uaserver.conditions import Condition, Conditions
+from bridge.uaserver.conditions import Condition, Conditions, EventSink
 from bridge.uaserver.library import ObjectIds, node_id, ua, variant
 from bridge.uaserver.session import InnerServer
 from bridge.uaserver.where import Fields
@@ -60,10 +61,12 @@ def serve_alarms(
     site: AlarmSite,
     certificate: x509.Certificate,
     folder: Path,
+    sink: EventSink | None,
     *,
     resets: bool,
 ) -> AlarmTask:
-    """Give the server its alarms, as they were left. Before the first client is let in."""
+    """Give the server its alarms, as they were left; ``sink`` keeps what they tell from then on. Before the
+    first client is let in."""
     rights = AlarmRights(view, resets=resets)
     words = ConditionWords(lambda state: in_all_languages(Text.word("alarm_state", state)))
     conditions = inner.conditions = Conditions(inner.subscriptions, rights, words, _now_ms)
@@ -81,6 +84,7 @@ def serve_alarms(
     followed = Alarms(reader, conditions, contents, alarms, expires, clock.now, _now_ms)
     file = AlarmFile(folder)
     followed.restore(file)
+    conditions.sink = sink
     return AlarmTask(followed, conditions, file)
 
 
@@ -108,6 +112,7 @@ def _alarms(
     certificate: x509.Certificate,
 ) -> Iterator[Alarm]:
     common: dict[tuple[str, str], Fields] = {}
+    notifiers = Notifiers(tree.notifiers)
     for place in alarm_places(tree.notifiers, site.fronts):
         kind, key = types[place.kind], (place.kind, place.name)
         if key not in common:
@@ -118,7 +123,7 @@ def _alarms(
             node_id(place.id, tree.namespace),
             tree.notifiers[place.owner],
             place.source_name,
-            tuple(emitters_of(tree.notifiers, place.owner)),
+            tuple(notifiers.emitters(place.owner)),
             common[key],
         )
         yield Alarm(place, Condition(described, content=contents.nothing), kind)

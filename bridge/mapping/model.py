@@ -35,6 +35,10 @@ class FamilyTable(Table):
     name: str
     vendor: str
     source: str = Field(description="the manual that the facts of this file are taken from")
+    drive_type: Literal["frequency_converter", "servo_drive", "variable_speed_drive"] | None = Field(
+        None,
+        description="what OPC 40400-1 calls its drives, for OPC UA. Left out: a drive, of whatever type",
+    )
     profile: int | None = Field(
         None,
         ge=0,

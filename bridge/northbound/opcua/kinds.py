@@ -18,19 +18,16 @@ from bridge.northbound.opcua.structures import (
     property_attributes,
     value_type,
 )
-from bridge.uaserver.address_space import is_empty
-from bridge.uaserver.hierarchy import related
+from bridge.uaserver.address_space import constant, is_empty
+from bridge.uaserver.hierarchy import reference_to
 from bridge.uaserver.library import (
     AttributeIds,
     ObjectIds,
     change,
-    data_value,
-    get,
     make,
     node_id,
     text,
     ua,
-    variant,
 )
 
 Node = ObjectNode | MethodNode | VariableNode | PropertyNode
@@ -103,12 +100,9 @@ class Kinds:
             change(held, SourceTimestamp=self._built_at, ServerTimestamp=self._built_at)
         to_type = ()
         if type_id != ObjectIds.Null:
-            to_type = (reference_to(self._space, type_id, ObjectIds.HasTypeDefinition, forward=True),)
+            kind = node_id(ObjectIds.HasTypeDefinition)
+            to_type = (reference_to(self._space, node_id(type_id), kind, forward=True),)
         return NodeKind(attributes, node_class, node_id(type_id), to_type)
-
-
-def constant(value: object, kind: ua.VariantType) -> AttributeValue:
-    return AttributeValue(data_value(variant(value, kind)))
 
 
 def _name(name: str, namespace: int) -> Name:
@@ -123,31 +117,6 @@ def _name(name: str, namespace: int) -> Name:
 
 def _description(words: str) -> AttributeValue:
     return constant(text(words), ua.VariantType.LocalizedText)
-
-
-def reference_to(
-    space: AddressSpace, target: int, reference: int, *, forward: bool
-) -> ua.ReferenceDescription:
-    """A reference of this type to a node of the standard's, as asyncua describes it."""
-    where = node_id(target)
-    fields = {
-        name: get(space.read_attribute_value(where, attribute).Value, "Value")
-        for name, attribute in (
-            ("NodeClass", AttributeIds.NodeClass),
-            ("BrowseName", AttributeIds.BrowseName),
-            ("DisplayName", AttributeIds.DisplayName),
-        )
-    }
-    of_type = next(related(space, where, ObjectIds.HasTypeDefinition), None)
-    if of_type:
-        fields["TypeDefinition"] = get(of_type, "NodeId")
-    return make(
-        ua.ReferenceDescription,
-        ReferenceTypeId=node_id(reference),
-        IsForward=forward,
-        NodeId=where,
-        **fields,
-    )
 
 
 def _key(node: Node) -> Hashable:

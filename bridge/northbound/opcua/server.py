@@ -6,6 +6,7 @@ import asyncio
 import gc
 import logging
 import socket
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -20,8 +21,10 @@ from bridge.northbound.opcua.accounts import Accounts, security_policies
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.change_publisher import Publisher
+from bridge.northbound.opcua.devices import Devices, read_models
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.nameplates import Nameplate
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.tree import Tree
@@ -44,8 +47,8 @@ _log = logging.getLogger(__name__)
 class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
-    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``. ``bound`` is a
-    listening socket where somebody else holds the port.
+    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``. ``nameplates``
+    are those of the drives. ``bound`` is a listening socket where somebody else holds the port.
     """
 
     def __init__(
@@ -55,11 +58,13 @@ class OpcUaServer:
         state_dir: Path,
         site_name: str,
         bound: socket.socket | None = None,
+        nameplates: Mapping[str, Nameplate] | None = None,
     ) -> None:
         self._view = view
         self._settings = settings
         self._folder = state_dir / "opcua"
         self._site_name = site_name
+        self._nameplates = nameplates or {}
         self._users: Accounts | None = None
         self._server: BoundServer | None = None
         self._socket = bound
@@ -143,7 +148,12 @@ class OpcUaServer:
         await self._describe(server, own.application_uri, users)
         namespace = await server.register_namespace(NAMESPACE)
         image = self._view.image
-        tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
+        models = await asyncio.to_thread(read_models)
+        indexes = [await server.register_namespace(uri) for uri in models.namespaces]
+        objects = layout(image.points)
+        devices = Devices(models, objects[0], self._nameplates)
+        tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, objects, devices.point)
+        devices.open(inner.aspace, [*indexes, namespace], image, self._view.epoch_ns, tree.watched)
         inner.application = Backend(
             users,
             Writer(self._view, inner.aspace, tree.writable),

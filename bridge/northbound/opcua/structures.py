@@ -97,13 +97,24 @@ def _described(name: str, arguments: tuple[Argument, ...]) -> Property:
 
 
 @cache
+def units_of(unit: str) -> ua.Variant:
+    """Engineering units of a point with this unit."""
+    return variant(_unit(unit), ua.VariantType.ExtensionObject)
+
+
+@cache
+def range_of(low: float, high: float) -> ua.Variant:
+    return variant(make(ua.Range, Low=low, High=high), ua.VariantType.ExtensionObject)
+
+
+@cache
 def _engineering_units(unit: str) -> Property:
-    return _structure("EngineeringUnits", _unit(unit), ObjectIds.EUInformation)
+    return Property("EngineeringUnits", units_of(unit), ObjectIds.EUInformation)
 
 
 @cache
 def _range(low: float, high: float) -> Property:
-    return _structure("EURange", make(ua.Range, Low=low, High=high), ObjectIds.Range)
+    return Property("EURange", range_of(low, high), ObjectIds.Range)
 
 
 @cache

@@ -14,12 +14,13 @@ from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.image import Image
 from bridge.northbound.opcua.data_values import EpochNs
-from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node, constant, reference_to
+from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
 from bridge.northbound.opcua.point_values import AllWatched, PointValue
 from bridge.northbound.opcua.structures import PropertyNode, property_nodes
-from bridge.uaserver.address_space import Attributes, Callbacks, Nodes
-from bridge.uaserver.library import AttributeIds, ObjectIds, get, node_id, ua
+from bridge.uaserver.address_space import Attributes, Callbacks, constant, put_behind
+from bridge.uaserver.hierarchy import reference_to
+from bridge.uaserver.library import AttributeIds, ObjectIds, node_id, ua
 
 _ORGANIZES: Final = node_id(ObjectIds.Organizes)
 _HAS_COMPONENT: Final = node_id(ObjectIds.HasComponent)
@@ -107,6 +108,7 @@ class Tree:
     """The nodes of ``trees`` in ``space``. Raises ValueError where two have the same id.
 
     ``notifiers`` are the objects that send events, by their names, ``watched`` the variables with watchers.
+    ``point`` finds the point that a node beside the tree stands for.
     """
 
     def __init__(
@@ -116,15 +118,17 @@ class Tree:
         image: Image,
         epoch_ns: EpochNs,
         trees: Sequence[ObjectNode],
+        point: Callable[[str], VariableNode | None] = lambda _name: None,
     ) -> None:
         self._image = image
+        self._point = point
         self._epoch_ns = epoch_ns
         self._nodes: dict[str, _TreeNode] = {}
         self._latest_property: _TreeNode | None = None
         self.namespace = namespace
         self.kinds = Kinds(space)
-        self.to_objects = reference_to(space, ObjectIds.ObjectsFolder, ObjectIds.Organizes, forward=False)
-        self.to_server = reference_to(space, ObjectIds.Server, ObjectIds.HasNotifier, forward=False)
+        self.to_objects = reference_to(space, node_id(ObjectIds.ObjectsFolder), _ORGANIZES, forward=False)
+        self.to_server = reference_to(space, node_id(ObjectIds.Server), _HAS_NOTIFIER, forward=False)
         self.notifiers: dict[str, ua.NodeId] = {}
         self.watched: AllWatched = {}
         self.never_called: Callbacks = {}
@@ -149,8 +153,7 @@ class Tree:
         server = space[node_id(ObjectIds.Server)]
         server.references += [one.refer(_HAS_NOTIFIER) for one in notifiers]
         server.attributes[AttributeIds.EventNotifier] = constant(SUBSCRIBE_TO_EVENTS, ua.VariantType.Byte)
-        # asyncua puts a mapping of its own there, too, for nodes that it loads when they are asked for.
-        space._nodes = Nodes(get(space, "_nodes"), self._find)  # pyright: ignore[reportPrivateUsage]
+        put_behind(space, self._find)
 
     def method(self, where: ua.NodeId) -> MethodNode | None:
         node = self._node(where)
@@ -158,7 +161,7 @@ class Tree:
 
     def writable(self, where: ua.NodeId) -> VariableNode | None:
         """The variable, where it is one that clients may write."""
-        node = self._node(where)
+        node = self._node(where) or self._point(self._name(where))
         return node if isinstance(node, VariableNode) and node.writable else None
 
     def _node(self, where: ua.NodeId) -> Node | None:

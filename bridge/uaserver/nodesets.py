@@ -290,7 +290,7 @@ class NodesetStore:
         )
 
     def _fields(self, row: Row) -> list[ua.StructureField]:
-        """Those that it inherits, and its own."""
+        """Fields that it inherits, and its own."""
         above = self._rows.get(_above(row))
         inherited = self._fields(above) if above else []
         own = row.definition.fields if row.definition else []

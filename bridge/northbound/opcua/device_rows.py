@@ -9,8 +9,10 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Final
 
+from bridge.northbound.opcua.data_values import VARIANT_TYPE
 from bridge.northbound.opcua.nameplates import Nameplate
 from bridge.northbound.opcua.nodes import ObjectNode, VariableKind, VariableNode
+from bridge.northbound.opcua.structures import READ, READ_WRITE
 from bridge.uaserver.library import ObjectIds, ua
 from bridge.uaserver.nodesets import Reference, Row
 
@@ -165,7 +167,7 @@ class _Maker:
             self._group(device, "Configuration", "parameter")
 
     def _nameplate_of(self, owner: Row) -> None:
-        """What the nameplate interfaces of DI (§4.5) have in common, as far as it is known."""
+        """Properties of DI's nameplate interfaces (OPC 10000-100 §4.5), as far as they are known."""
         plate = self._nameplate
         self._text(owner, "Manufacturer", plate.manufacturer)
         if plate.model:
@@ -212,7 +214,8 @@ class _Maker:
         is_analog = point.kind is VariableKind.ANALOG
         kind = ObjectIds.AnalogUnitType if is_analog else ObjectIds.BaseDataVariableType
         row = self._variable(group, self._layout.own(name), kind)
-        row.data_type, row.access = f"0;i={ObjectIds.Double}", 3 if point.writable else 1
+        row.data_type = f"0;i={VARIANT_TYPE[point.point.data_type].value}"
+        row.access = READ_WRITE if point.writable else READ
         row.description = point.point.description
         self.made.derived[_id(row)] = Derived(Conversion.SAME, (point,))
         if is_analog:

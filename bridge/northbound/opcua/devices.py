@@ -124,7 +124,7 @@ class _Values:
         return present_value(self._image, point.index, value_type(point), self._epoch_ns)
 
     def _text(self, point: VariableNode) -> ua.DataValue:
-        """A number that is 0 was never set: CiA 301 §7.5.2.18 has it for what a device does not support."""
+        """Text of a number. One that is 0 was never set (CiA 301 §7.5.2.18)."""
         told = self._present(point)
         if _is_bad(told):
             return told
@@ -135,7 +135,7 @@ class _Values:
         return data_value(text, told.StatusCode, told.SourceTimestamp, told.ServerTimestamp)
 
     def _health(self, points: Sequence[VariableNode]) -> ua.DataValue:
-        """As old and as good as the state of the drive."""
+        """Health of a drive, as old and as good as its state."""
         told = self._present(points[0])
         if _is_bad(told):
             return told

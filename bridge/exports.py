@@ -109,7 +109,7 @@ def _register(row: Row) -> tuple[object, ...]:
 
 
 def _point(point: Point, *, is_writable: bool) -> tuple[object, ...]:
-    return (point.data_type.value, point.unit, "rw" if is_writable else "r", point.description)
+    return (point.data_type.value, point.unit, "rw" if is_writable else "r", str(point.description))
 
 
 def _catalogue(project: Project) -> Catalogue:

@@ -209,6 +209,8 @@ class InnerServer(InternalServer):
     """
 
     application: ServedApplication[Any]
+    locales: Sequence[str] = ("en",)
+    """LocaleIds of the texts in the address space."""
 
     def __init__(self, *, no_security: bool) -> None:
         super().__init__()

@@ -216,7 +216,6 @@ class _Maker:
         row = self._variable(group, self._layout.own(name), kind)
         row.data_type = f"0;i={VARIANT_TYPE[point.point.data_type].value}"
         row.access = READ_WRITE if point.writable else READ
-        row.description = point.point.description
         self.made.derived[_id(row)] = Derived(Conversion.SAME, (point,))
         if is_analog:
             self._content(row, "EngineeringUnits", ObjectIds.EUInformation, Conversion.UNITS, point)

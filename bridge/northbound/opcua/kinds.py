@@ -18,6 +18,8 @@ from bridge.northbound.opcua.structures import (
     property_attributes,
     value_type,
 )
+from bridge.northbound.opcua.words import named, spoken
+from bridge.text import Words
 from bridge.uaserver.address_space import constant, is_empty
 from bridge.uaserver.hierarchy import reference_to
 from bridge.uaserver.library import (
@@ -105,8 +107,9 @@ class Kinds:
         return NodeKind(attributes, node_class, node_id(type_id), to_type)
 
 
-def _name(name: str, namespace: int) -> Name:
-    qualified, words = ua.QualifiedName(name, namespace), text(name)
+def _name(name: str, namespace: int, is_ours: bool) -> Name:
+    """``is_ours``: a name of the program's, which it can say in each language."""
+    qualified, words = ua.QualifiedName(name, namespace), named(name) if is_ours else text(name)
     return Name(
         qualified,
         words,
@@ -115,8 +118,8 @@ def _name(name: str, namespace: int) -> Name:
     )
 
 
-def _description(words: str) -> AttributeValue:
-    return constant(text(words), ua.VariantType.LocalizedText)
+def _description(words: Words) -> AttributeValue:
+    return constant(spoken(words), ua.VariantType.LocalizedText)
 
 
 def _key(node: Node) -> Hashable:

@@ -31,6 +31,7 @@ from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
+from bridge.text import LANGUAGES
 from bridge.uaserver import decoding
 from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
@@ -143,6 +144,7 @@ class OpcUaServer:
         quieten()
         decoding.install()
         inner = InnerServer(no_security=self._settings.no_security)
+        inner.locales = LANGUAGES
         inner.certificate, inner.private_key = own.certificate, own.private_key
         server = BoundServer(inner, bound, trusted)
         await self._describe(server, own.application_uri, users)

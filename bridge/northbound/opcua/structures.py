@@ -17,6 +17,8 @@ from bridge.northbound.opcua.nodes import (
     VariableNode,
     enum_strings,
 )
+from bridge.northbound.opcua.words import spoken, state_named
+from bridge.text import Text
 from bridge.uaserver.library import ObjectIds, make, node_id, text, ua, variant
 
 READ: Final = 1
@@ -89,7 +91,7 @@ def _described(name: str, arguments: tuple[Argument, ...]) -> Property:
             Name=argument.name,
             DataType=node_id(_ARGUMENT_TYPE[argument.type]),
             ValueRank=_SCALAR,
-            Description=text(argument.description),
+            Description=spoken(argument.description),
         )
         for argument in arguments
     ]
@@ -119,7 +121,7 @@ def _range(low: float, high: float) -> Property:
 
 @cache
 def _enum_strings(states: tuple[tuple[int, str], ...]) -> Property:
-    return _texts("EnumStrings", [text(state) for state in enum_strings(states)])
+    return _texts("EnumStrings", [state_named(state) for state in enum_strings(states)])
 
 
 def _structure(name: str, value: object, data_type: int) -> Property:
@@ -130,7 +132,10 @@ def _texts(name: str, value: object) -> Property:
     return Property(name, variant(value, ua.VariantType.LocalizedText), ObjectIds.LocalizedText)
 
 
-_TWO_STATE: Final = (_texts("FalseState", text("false")), _texts("TrueState", text("true")))
+_TWO_STATE: Final = (
+    _texts("FalseState", spoken(Text.of("truth.false"))),
+    _texts("TrueState", spoken(Text.of("truth.true"))),
+)
 
 
 def _unit(unit: str) -> ua.EUInformation:
@@ -139,7 +144,7 @@ def _unit(unit: str) -> ua.EUInformation:
         NamespaceUri=UNIT_NAMESPACE,
         UnitId=unit_id(unit),
         DisplayName=text(unit),
-        Description=text(unit_description(unit)),
+        Description=spoken(unit_description(unit)),
     )
 
 

@@ -18,6 +18,7 @@ from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
 from bridge.northbound.opcua.point_values import AllWatched, PointValue
 from bridge.northbound.opcua.structures import PropertyNode, property_nodes
+from bridge.text import Text, Words
 from bridge.uaserver.address_space import Attributes, Callbacks, constant, put_behind
 from bridge.uaserver.hierarchy import reference_to
 from bridge.uaserver.library import AttributeIds, ObjectIds, node_id, ua
@@ -80,8 +81,10 @@ class _TreeNode:
     @property
     def name(self) -> Name:
         # The names of properties are the standard's, in the standard's namespace.
-        namespace = 0 if isinstance(self.node, PropertyNode) else self._tree.namespace
-        return self._tree.kinds.name(self.node.browse_name, namespace)
+        is_property = isinstance(self.node, PropertyNode)
+        of_site = isinstance(self.node, ObjectNode) and not self.node.folder
+        namespace = 0 if is_property else self._tree.namespace
+        return self._tree.kinds.name(self.node.browse_name, namespace, not is_property and not of_site)
 
     def id_attribute(self) -> AttributeValue:
         made = constant(self.nodeid, ua.VariantType.NodeId)
@@ -202,12 +205,14 @@ class Tree:
         return PointValue(self._image, self._epoch_ns, node, self.watched)
 
 
-def _description(node: Node) -> str:
+def _description(node: Node) -> Words:
     match node:
         case MethodNode():
             return node.description
-        case VariableNode():
-            return node.point.description if node.bit is None else f"bit {node.bit} of {node.point.leaf}"
+        case VariableNode(bit=None):
+            return node.point.description
+        case VariableNode(bit=bit):
+            return Text.of("point.bit", number=bit, word=node.point.leaf)
         case _:
             return ""
 

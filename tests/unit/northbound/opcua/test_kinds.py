@@ -37,7 +37,7 @@ def test_nodes_of_one_kind_share_what_they_have(space: AddressSpace) -> None:
         ua.NodeId(ua.ObjectIds.BaseDataVariableType),
         ua.NodeId(ua.ObjectIds.AnalogUnitType),
     )
-    assert kinds.name("Speed", 2) is kinds.name("Speed", 2)
+    assert kinds.name("Speed", 2, True) is kinds.name("Speed", 2, True)
 
 
 def test_a_kind_has_nothing_that_is_empty(space: AddressSpace) -> None:

@@ -18,7 +18,7 @@ from bridge.northbound.opcua.data_values import EpochNs, present_value
 from bridge.northbound.opcua.device_rows import DEVICE, Conversion, Derived, DeviceLayout, DeviceRows
 from bridge.northbound.opcua.nameplates import Nameplate
 from bridge.northbound.opcua.nodes import ObjectNode, VariableNode
-from bridge.northbound.opcua.point_values import AllWatched, DerivedValue
+from bridge.northbound.opcua.point_values import HEALTH, SAME, TEXT_OF_NUMBER, AllWatched, DerivedValue
 from bridge.northbound.opcua.structures import range_of, units_of, value_type
 from bridge.text import Text
 from bridge.uaserver.address_space import put_behind
@@ -29,8 +29,11 @@ _FILE: Final = Path(__file__).parent / "nodesets" / "models.json"
 _KEPT: Final = 4
 """Drives whose rows are kept once made: clients look at one after the other."""
 
-# Above -1, the places of points and their bits.
-_PLACES: Final = {Conversion.SAME: -2, Conversion.TEXT: -3, Conversion.HEALTH: -4}
+_PLACES: Final = {
+    Conversion.SAME: SAME,
+    Conversion.TEXT: TEXT_OF_NUMBER,
+    Conversion.HEALTH: HEALTH,
+}
 
 # DeviceHealthEnumeration (OPC 10000-100 §4.5.4), after NAMUR NE 107.
 _NORMAL, _FAILURE, _CHECK_FUNCTION, _OFF_SPEC = 0, 1, 2, 3

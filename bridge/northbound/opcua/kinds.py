@@ -40,6 +40,7 @@ _TYPE_DEFINITION: Final = {
     VariableKind.PLAIN: ObjectIds.BaseDataVariableType,
     VariableKind.ANALOG: ObjectIds.AnalogUnitType,
     VariableKind.MULTI_STATE: ObjectIds.MultiStateDiscreteType,
+    VariableKind.MULTI_STATE_VALUE: ObjectIds.MultiStateValueDiscreteType,
     VariableKind.TWO_STATE: ObjectIds.TwoStateDiscreteType,
 }
 

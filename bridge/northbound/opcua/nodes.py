@@ -29,6 +29,8 @@ class VariableKind(Enum):
     PLAIN = "BaseDataVariableType"
     ANALOG = "AnalogUnitType"
     MULTI_STATE = "MultiStateDiscreteType"
+    MULTI_STATE_VALUE = "MultiStateValueDiscreteType"
+    """With codes that are negative, or too large for a list of texts."""
     TWO_STATE = "TwoStateDiscreteType"
 
 
@@ -238,8 +240,9 @@ _MOST_STATES: Final = 256
 
 def _variable(point: Point, index: int) -> VariableNode:
     kind = VariableKind.PLAIN
-    if point.states and all(0 <= code < _MOST_STATES for code, _ in point.states):
-        kind = VariableKind.MULTI_STATE
+    if point.states:
+        is_list = all(0 <= code < _MOST_STATES for code, _ in point.states)
+        kind = VariableKind.MULTI_STATE if is_list else VariableKind.MULTI_STATE_VALUE
     elif point.unit:
         kind = VariableKind.ANALOG
     bits = tuple(

@@ -16,6 +16,8 @@ from bridge.uaserver.address_space import Callbacks
 from bridge.uaserver.library import ua
 
 _WHOLE_POINT: Final = -1
+# Places of what is made of a point.
+SAME, TEXT_OF_NUMBER, HEALTH, TEXT_OF_STATE = -2, -3, -4, -5
 
 
 @dataclass(frozen=True, slots=True)

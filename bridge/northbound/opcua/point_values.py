@@ -12,7 +12,7 @@ from bridge.image import Image
 from bridge.northbound.opcua.data_values import EpochNs, present_value
 from bridge.northbound.opcua.nodes import VariableNode
 from bridge.northbound.opcua.structures import value_type
-from bridge.uaserver.address_space import Callbacks
+from bridge.uaserver.address_space import Watchers
 from bridge.uaserver.library import ua
 
 _WHOLE_POINT: Final = -1
@@ -24,7 +24,7 @@ SAME, TEXT_OF_NUMBER, HEALTH, TEXT_OF_STATE = -2, -3, -4, -5
 class WatchedVariable:
     """A variable that is watched, or was once, and how to read it."""
 
-    callbacks: Callbacks
+    watchers: Watchers
     read: Callable[[], ua.DataValue]
 
 
@@ -53,11 +53,11 @@ class PointValue(AttributeValue):
     value_callback = read  # pyright: ignore[reportAssignmentType]
 
     @property
-    def datachange_callbacks(self) -> Callbacks:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def datachange_callbacks(self) -> Watchers:  # pyright: ignore[reportIncompatibleVariableOverride]
         node = self._node
         place = _WHOLE_POINT if node.bit is None else node.bit
         of_point = self._watched.setdefault(node.index, {})
-        return of_point.setdefault(place, WatchedVariable({}, self.read)).callbacks
+        return of_point.setdefault(place, WatchedVariable({}, self.read)).watchers
 
 
 class DerivedValue(AttributeValue):
@@ -83,9 +83,9 @@ class DerivedValue(AttributeValue):
         return self._read()
 
     @property
-    def datachange_callbacks(self) -> Callbacks:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def datachange_callbacks(self) -> Watchers:  # pyright: ignore[reportIncompatibleVariableOverride]
         known = self._watched.get(self._points[0].index, {}).get(self._place)
         variable = known or WatchedVariable({}, self._read)
         for point in self._points:
             self._watched.setdefault(point.index, {})[self._place] = variable
-        return variable.callbacks
+        return variable.watchers

@@ -14,20 +14,18 @@ from typing import Final
 import bridge
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
-from bridge.command import EventKind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua.accounts import Accounts, security_policies
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.change_publisher import Publisher
-from bridge.northbound.opcua.devices import Devices, read_models
-from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
+from bridge.northbound.opcua.devices import read_models
+from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nameplates import Nameplate
-from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
-from bridge.northbound.opcua.tree import Tree
+from bridge.northbound.opcua.site_space import NAMESPACE, fill
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -35,11 +33,10 @@ from bridge.text import LANGUAGES
 from bridge.uaserver import decoding
 from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
-from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
+from bridge.uaserver.library import ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.session import InnerServer
 
-NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
 
 _log = logging.getLogger(__name__)
@@ -148,14 +145,13 @@ class OpcUaServer:
         inner.certificate, inner.private_key = own.certificate, own.private_key
         server = BoundServer(inner, bound, trusted)
         await self._describe(server, own.application_uri, users)
-        namespace = await server.register_namespace(NAMESPACE)
-        image = self._view.image
         models = await asyncio.to_thread(read_models)
-        indexes = [await server.register_namespace(uri) for uri in models.namespaces]
-        objects = layout(image.points)
-        devices = Devices(models, objects[0], self._nameplates)
-        tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, objects, devices.point)
-        devices.open(inner.aspace, [*indexes, namespace], image, self._view.epoch_ns, tree.watched)
+        # The points' comes first, as it always has.
+        uris = [NAMESPACE, *models.namespaces]
+        indexes = {uri: await server.register_namespace(uri) for uri in uris}
+        image, epoch_ns = self._view.image, self._view.epoch_ns
+        site = fill(inner.aspace, models, indexes, image, epoch_ns, self._nameplates)
+        tree = site.tree
         inner.application = Backend(
             users,
             Writer(self._view, inner.aspace, tree.writable),
@@ -163,7 +159,8 @@ class OpcUaServer:
             self._view,
             self._pulse,
         )
-        events = self._events(inner, tree)
+        events = EventSender(epoch_ns, inner.subscriptions, tree.notifiers, site.event_types)
+        self._view.on_event(events.on_event)
         inner.subscriptions.prepare()
         self._server = server
         await server.start()
@@ -186,15 +183,6 @@ class OpcUaServer:
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
 
-    def _events(self, inner: InnerServer, tree: Tree) -> EventSender:
-        base = _event_type(inner, node_id(BASE_TYPE, tree.namespace), node_id(ObjectIds.BaseEventType))
-        types = {
-            kind: _event_type(inner, node_id(type_name(kind), tree.namespace), base) for kind in EventKind
-        }
-        events = EventSender(self._view.epoch_ns, inner.subscriptions, tree.notifiers, types)
-        self._view.on_event(events.on_event)
-        return events
-
     def _tell(self) -> None:
         settings = self._settings
         _log.info("OPC UA on %s", self.endpoint_url)
@@ -206,23 +194,6 @@ class OpcUaServer:
             )
         if settings.anonymous == "none" and not settings.user:
             _log.warning('OPC UA: nobody can log in: no [[opcua.user]] and anonymous = "none"')
-
-
-def _event_type(inner: InnerServer, where: ua.NodeId, parent: ua.NodeId) -> ua.NodeId:
-    """A new type below ``parent``. Raises UaError where there is one already."""
-    name = str(where.Identifier)
-    item = make(
-        ua.AddNodesItem,
-        RequestedNewNodeId=where,
-        BrowseName=ua.QualifiedName(name, where.NamespaceIndex),
-        NodeClass=ua.NodeClass.ObjectType,
-        ParentNodeId=parent,
-        ReferenceTypeId=node_id(ObjectIds.HasSubtype),
-        NodeAttributes=make(ua.ObjectTypeAttributes, DisplayName=text(name)),
-    )
-    (result,) = inner.node_mgt_service.add_nodes([item])
-    get(result, "StatusCode").check()
-    return where
 
 
 def built_at() -> datetime:

@@ -21,7 +21,7 @@ from bridge.northbound.opcua.point_values import TEXT_OF_STATE, AllWatched, Deri
 from bridge.northbound.opcua.structures import VALUE_AS_TEXT, PropertyNode, property_nodes, value_type
 from bridge.northbound.opcua.words import state_named
 from bridge.text import Text, Words
-from bridge.uaserver.address_space import Attributes, Callbacks, constant, put_behind
+from bridge.uaserver.address_space import Attributes, Watchers, constant, put_behind
 from bridge.uaserver.hierarchy import reference_to
 from bridge.uaserver.library import AttributeIds, ObjectIds, data_value, node_id, text, ua, variant
 
@@ -145,8 +145,8 @@ class Tree:
         self.to_server = reference_to(space, node_id(ObjectIds.Server), _HAS_NOTIFIER, forward=False)
         self.notifiers: dict[str, ua.NodeId] = {}
         self.watched: AllWatched = {}
-        self.never_called: Callbacks = {}
-        """Callbacks of attributes that never change: one empty table for all of them."""
+        self.never_called: Watchers = {}
+        """Watchers of attributes that never change: one empty table for all of them."""
         for tree in trees:
             self._add(tree, None, _ORGANIZES)
         self._attach(space, [self._nodes[tree.id] for tree in trees])

@@ -194,7 +194,7 @@ def test_who_watches_a_health_is_told_by_each_of_its_points(served: Served) -> N
     told = {
         served.image.points[index].leaf
         for index, places in served.tree.watched.items()
-        if any(7 in one.callbacks for one in places.values())
+        if any(7 in one.watchers for one in places.values())
     }
     assert told == {"state", "status_word", "watchdog_state", "follows"}
 

@@ -1,0 +1,75 @@
+"""Address space of a site: its points, its drives as devices of the published models, its types of events.
+The server serves it, and ``export opcua --nodeset2`` writes it down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from asyncua.server.address_space import AddressSpace, NodeManagementService
+
+from bridge.command import EventKind
+from bridge.image import Image
+from bridge.northbound.opcua.data_values import EpochNs
+from bridge.northbound.opcua.devices import Devices
+from bridge.northbound.opcua.events import BASE_TYPE, type_name
+from bridge.northbound.opcua.nameplates import Nameplate
+from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.tree import Tree
+from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
+from bridge.uaserver.nodesets import Models
+
+NAMESPACE: Final = "urn:drivebridge:points"
+
+
+@dataclass(frozen=True, slots=True)
+class SiteSpace:
+    """``event_types`` are by the kind of event."""
+
+    tree: Tree
+    event_types: Mapping[EventKind, ua.NodeId]
+
+
+def fill(
+    space: AddressSpace,
+    models: Models,
+    indexes: Mapping[str, int],
+    image: Image,
+    epoch_ns: EpochNs,
+    nameplates: Mapping[str, Nameplate],
+) -> SiteSpace:
+    """Put a site into ``space``. ``indexes`` are those of the namespaces by URI. Raises ValueError for a
+    point that has no place."""
+    own = indexes[NAMESPACE]
+    objects = layout(image.points)
+    devices = Devices(models, objects[0], nameplates)
+    tree = Tree(space, own, image, epoch_ns, objects, devices.point)
+    namespaces = [*(indexes[uri] for uri in models.namespaces), own]
+    devices.open(space, namespaces, image, epoch_ns, tree.watched)
+    return SiteSpace(tree, _event_types(NodeManagementService(space), own))
+
+
+def _event_types(management: NodeManagementService, namespace: int) -> dict[EventKind, ua.NodeId]:
+    top = node_id(ObjectIds.BaseEventType)
+    base = _event_type(management, node_id(BASE_TYPE, namespace), top, is_abstract=True)
+    return {kind: _event_type(management, node_id(type_name(kind), namespace), base) for kind in EventKind}
+
+
+def _event_type(
+    management: NodeManagementService, where: ua.NodeId, parent: ua.NodeId, *, is_abstract: bool = False
+) -> ua.NodeId:
+    """A new type below ``parent``. Raises UaError where there is one already."""
+    name = str(where.Identifier)
+    item = make(
+        ua.AddNodesItem,
+        RequestedNewNodeId=where,
+        BrowseName=ua.QualifiedName(name, where.NamespaceIndex),
+        NodeClass=ua.NodeClass.ObjectType,
+        ParentNodeId=parent,
+        ReferenceTypeId=node_id(ObjectIds.HasSubtype),
+        NodeAttributes=make(ua.ObjectTypeAttributes, DisplayName=text(name), IsAbstract=is_abstract),
+    )
+    (result,) = management.add_nodes([item])
+    get(result, "StatusCode").check()
+    return where

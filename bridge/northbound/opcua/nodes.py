@@ -21,6 +21,8 @@ GROUPS: Final = ("command", "status", "actual", "parameter", "supervision", "ide
 
 DEVICE_GROUPS: Final = ("input", "output", "parameter", "supervision")
 """Folders of a node that is no drive, beside ``node``."""
+_TELEGRAM_GROUPS: Final = ("command", "output")
+"""Groups whose points are written in telegrams: with their bits."""
 _IN_DEVICE: Final = 3
 """Words in the name of a point in one of these groups."""
 
@@ -78,7 +80,7 @@ class VariableNode:
 
     @property
     def writable(self) -> bool:
-        return self.bit is None and self.point.writable
+        return self.point.writable and (self.bit is None or self.point.path[-2] in _TELEGRAM_GROUPS)
 
 
 @dataclass(slots=True)

@@ -335,6 +335,9 @@ class OpcUaTable(ListeningTable):
     certificate: str | None = None
     private_key: str | None = None
     trusted_dir: str | None = None
+    powertrain_draft: bool = Field(
+        False, description="true serves a draft of OPC 40400-2, which is not published yet"
+    )
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 

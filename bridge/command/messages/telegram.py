@@ -128,8 +128,8 @@ class TelegramDecoder:
     ) -> Telegram:
         """The words to be sent; setpoints that are not written stay as ``before``. ``held`` is the control
         word that counts where none is written. A name with a number behind a dot is one bit: of the control
-        word, of a setpoint word or of a value, all else of which stays. ``is_heard``: the drive's status is of
-        now. Raises ``Refusal``."""
+        word, of a setpoint word or of a value, all else of which stays. ``is_heard``: the drive's status is
+        of now. Raises ``Refusal``."""
         values, bits = _apart(values)
         control_word = _as_word("control_word", values["control_word"]) if "control_word" in values else None
         if "control_word" in bits:

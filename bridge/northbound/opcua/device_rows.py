@@ -39,6 +39,26 @@ _DRIVE_TYPES: Final[Mapping[str, int]] = {
 _MAIN: Final = ("velocity", "frequency", "position")
 """Leaves of what a drive is led by, the first that it has."""
 _HEALTH: Final = ("status/state", "status/status_word", "supervision/watchdog_state", "supervision/follows")
+MAINS: Final = ("MainSetpoint", "MainActualValue")
+DRAFT_TYPES: Final = (
+    "DraftFunctionalModelType",
+    "DraftDriveAxisType",
+    "DraftLockType",
+    "DraftLogbookType",
+)
+"""Types of what we make of OPC 40400-2."""
+EDITION: Final = "OPC 40400-2: draft, no edition is published; announced for 2027-01-01"
+_OF_AXIS: Final = ("Start", "Stop", "QuickStop", "DisableVoltage", "ResetFault")
+_OF_LOCK: Final = ("TakeControl", "ReleaseControl", "KeepAlive")
+_LOGBOOK: Final = (
+    "status/fault_number",
+    "status/fault_text",
+    "status/fault_cause",
+    "status/fault_remedy",
+    "status/emcy_code",
+    "supervision/last_fault",
+    "supervision/last_fault_text",
+)
 _Class = ua.NodeClass
 
 
@@ -70,7 +90,7 @@ class DeviceRows:
 
 class DeviceLayout:
     """Devices of the drives below ``drives``, the folder of the points' layout. ``places`` are those of the
-    namespaces by URI, ``own`` is that of the points."""
+    namespaces by URI, ``own`` is that of the points. ``with_draft``: with what we make of OPC 40400-2."""
 
     def __init__(
         self,
@@ -78,6 +98,8 @@ class DeviceLayout:
         nameplates: Mapping[str, Nameplate],
         places: Mapping[str, int],
         own: int,
+        *,
+        with_draft: bool,
     ) -> None:
         self._drives = {
             drive.id: (node, drive) for node in drives.objects for drive in node.objects if not drive.folder
@@ -85,6 +107,7 @@ class DeviceLayout:
         self._nameplates = nameplates
         self._places = places
         self._own = own
+        self.with_draft = with_draft
 
     @property
     def drives(self) -> Collection[str]:
@@ -103,6 +126,20 @@ class DeviceLayout:
         maker = _Maker(self, node, found, self._nameplates.get(drive, Nameplate()))
         maker.make()
         return maker.made
+
+    def draft_types(self) -> DeviceRows:
+        """Types of the draft, of our own namespace; none without it."""
+        made = DeviceRows()
+        for name in DRAFT_TYPES if self.with_draft else ():
+            top = f"0;i={ObjectIds.BaseObjectType}"
+            made.rows[name] = Row(
+                id=self.point(name),
+                node_class=int(_Class.ObjectType),
+                browse_name=self.own(name),
+                display_name=name,
+                references=[_back(ObjectIds.HasSubtype, top)],
+            )
+        return made
 
     def of(self, uri: str, number: int) -> str:
         """NodeId of a node of a model."""
@@ -165,6 +202,8 @@ class _Maker:
         self._group(device, "Diagnostics", "supervision")
         if parameters:
             self._group(device, "Configuration", "parameter")
+        if layout.with_draft:
+            self._draft(device)
 
     def _nameplate_of(self, owner: Row) -> None:
         """Properties of DI's nameplate interfaces (OPC 10000-100 §4.5), as far as they are known."""
@@ -196,7 +235,7 @@ class _Maker:
 
     def _operational(self, device: Row) -> None:
         group = self._functional_group(device, "Operational")
-        for leaf_group, name in (("command", "MainSetpoint"), ("actual", "MainActualValue")):
+        for leaf_group, name in zip(("command", "actual"), MAINS, strict=True):
             main = next(
                 (
                     self._points[f"{leaf_group}/{leaf}"]
@@ -239,6 +278,31 @@ class _Maker:
 
     def _of_group(self, group: str) -> Iterator[VariableNode]:
         return (one for name, one in self._points.items() if name.startswith(f"{group}/"))
+
+    def _draft(self, device: Row) -> None:
+        """Axis, lock and logbook, as OPC 40400-2 has announced them, with types of ours."""
+        layout = self._layout
+        model = self._below(device, layout.own("FunctionalModelDraft"), layout.point(DRAFT_TYPES[0]))
+        edition = self._property(model, layout.own("Edition"), ObjectIds.String)
+        edition.value = ("String", EDITION)
+        axis, lock, logbook = (
+            self._below(model, layout.own(name), layout.point(kind))
+            for name, kind in zip(("Axis", "Lock", "Logbook"), DRAFT_TYPES[1:], strict=True)
+        )
+        mains = (f"{self._drive.id}/{DEVICE}/Operational/{name}" for name in MAINS)
+        self._refer(axis, ObjectIds.HasComponent, [one for one in mains if one in self.made.rows])
+        self._refer(axis, ObjectIds.HasComponent, (one.id for one in self._of_group("status")))
+        self._methods(axis, _OF_AXIS)
+        self._methods(lock, _OF_LOCK)
+        self._refer(lock, ObjectIds.HasComponent, self._named(("supervision/owner",)))
+        self._refer(logbook, ObjectIds.HasComponent, self._named(_LOGBOOK))
+
+    def _methods(self, owner: Row, names: Collection[str]) -> None:
+        found = (one.id for one in self._drive.methods if one.browse_name in names)
+        self._refer(owner, ObjectIds.HasComponent, found)
+
+    def _named(self, leaves: Sequence[str]) -> Iterator[str]:
+        return (self._points[leaf].id for leaf in leaves if leaf in self._points)
 
     # rows
 

@@ -51,14 +51,23 @@ def read_models(file: Path = _FILE) -> Models:
 
 
 class Devices:
-    """Devices of a site in ``models``. ``namespaces`` are the indexes of the models' namespaces, ``own`` is
-    that of the points."""
+    """Devices of a site in ``models``, which are changed. ``with_draft``: with ours of OPC 40400-2."""
 
-    def __init__(self, models: Models, drives: ObjectNode, nameplates: Mapping[str, Nameplate]) -> None:
+    def __init__(
+        self,
+        models: Models,
+        drives: ObjectNode,
+        nameplates: Mapping[str, Nameplate],
+        *,
+        with_draft: bool = False,
+    ) -> None:
         places = {uri: place for place, uri in enumerate(models.namespaces, 1)}
         self._models = models
-        self.layout = DeviceLayout(drives, nameplates, places, len(places) + 1)
+        self.layout = DeviceLayout(drives, nameplates, places, len(places) + 1, with_draft=with_draft)
         self._rows = lru_cache(_KEPT)(self.layout.made)
+        self._draft = self.layout.draft_types()
+        base, below = f"0;i={ObjectIds.BaseObjectType}", f"0;i={ObjectIds.HasSubtype}"
+        models.outside += [(base, below, True, row.id) for row in self._draft.rows.values()]
         device_set = next(row for row in models.nodes if row.id == self.layout.device_set)
         below = f"0;i={ObjectIds.HasComponent}"
         device_set.references += [(below, True, self.layout.device_id(name)) for name in self.layout.drives]
@@ -78,7 +87,9 @@ class Devices:
 
     def rows(self, name: str) -> DeviceRows | None:
         drive, is_device, _ = name.partition(f"/{DEVICE}")
-        return self._rows(drive) if is_device and drive in self.layout.drives else None
+        if is_device and drive in self.layout.drives:
+            return self._rows(drive)
+        return self._draft if name in self._draft.rows else None
 
     def point(self, name: str) -> VariableNode | None:
         """The point that a node stands for as it is."""

@@ -28,10 +28,14 @@ def nodeset_of(catalogue: Catalogue, version: str) -> str:
     get(standard_address_space, "fill_address_space")(NodeManagementService(space))
     models = read_models()
     indexes = {uri: index for index, uri in enumerate([NAMESPACE, *models.namespaces], 2)}
-    fill(space, models, indexes, Image(catalogue.points), round, nameplates_of(catalogue))
+    settings = catalogue.site.opcua
+    draft = settings is not None and settings.powertrain_draft
+    image, nameplates = Image(catalogue.points), nameplates_of(catalogue)
+    fill(space, models, indexes, image, round, nameplates, with_draft=draft)
     writer = NodesetWriter(space, {index: uri for uri, index in indexes.items()}, LANGUAGES)
     starts = [
         node_id(ObjectIds.BaseEventType),
+        node_id(ObjectIds.BaseObjectType),
         node_id(ObjectIds.ObjectsFolder),
         node_id(_DEVICE_SET, indexes[DI]),
     ]

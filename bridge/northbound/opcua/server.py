@@ -150,7 +150,8 @@ class OpcUaServer:
         uris = [NAMESPACE, *models.namespaces]
         indexes = {uri: await server.register_namespace(uri) for uri in uris}
         image, epoch_ns = self._view.image, self._view.epoch_ns
-        site = fill(inner.aspace, models, indexes, image, epoch_ns, self._nameplates)
+        draft = self._settings.powertrain_draft
+        site = fill(inner.aspace, models, indexes, image, epoch_ns, self._nameplates, with_draft=draft)
         tree = site.tree
         inner.application = Backend(
             users,

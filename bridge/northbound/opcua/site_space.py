@@ -38,12 +38,14 @@ def fill(
     image: Image,
     epoch_ns: EpochNs,
     nameplates: Mapping[str, Nameplate],
+    *,
+    with_draft: bool,
 ) -> SiteSpace:
     """Put a site into ``space``. ``indexes`` are those of the namespaces by URI. Raises ValueError for a
     point that has no place."""
     own = indexes[NAMESPACE]
     objects = layout(image.points)
-    devices = Devices(models, objects[0], nameplates)
+    devices = Devices(models, objects[0], nameplates, with_draft=with_draft)
     tree = Tree(space, own, image, epoch_ns, objects, devices.point)
     namespaces = [*(indexes[uri] for uri in models.namespaces), own]
     devices.open(space, namespaces, image, epoch_ns, tree.watched)

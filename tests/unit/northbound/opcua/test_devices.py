@@ -31,14 +31,14 @@ PARTS = (Ids.HasComponent, Ids.HasProperty, Ids.HasAddIn, Ids.HasOrderedComponen
 class Served:
     """The demo's drives in an address space, and the image that they show."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, with_draft: bool = False) -> None:
         project = load_project(DEMO)
         catalogue = Catalogue.of(project.site, project.families)
         models = read_models()
         self.image = Image(catalogue.points)
         self.space = standard_space()
         trees = layout(self.image.points)
-        devices = Devices(models, trees[0], nameplates_of(catalogue))
+        devices = Devices(models, trees[0], nameplates_of(catalogue), with_draft=with_draft)
         self.tree = Tree(self.space, OWN, self.image, lambda at: round(at * 1e9), trees, devices.point)
         indexes = list(range(3, 3 + len(models.namespaces)))
         self.di = indexes[models.namespaces.index(DI_URI)]
@@ -197,6 +197,29 @@ def test_who_watches_a_health_is_told_by_each_of_its_points(served: Served) -> N
         if any(7 in one.watchers for one in places.values())
     }
     assert told == {"state", "status_word", "watchdog_state", "follows"}
+
+
+class TestDraft:
+    """What we make of OPC 40400-2 before it is published."""
+
+    def test_without_the_key_there_is_none(self, served: Served) -> None:
+        device = node_id("conveyor/fu1/Device", OWN)
+        assert not [name for name in parts(served.space, device) if "Draft" in name]
+        assert node_id("DraftLockType", OWN) not in served.space
+
+    def test_it_says_that_it_is_a_draft_and_has_types_of_our_own_alone(self) -> None:
+        served = Served(with_draft=True)
+        model = "conveyor/fu1/Device/FunctionalModelDraft"
+        assert served.read(f"{model}/Edition").Value.Value.endswith("announced for 2027-01-01")
+        for name in ("", "/Axis", "/Lock", "/Logbook"):
+            kind = type_of(served.space, node_id(model + name, OWN))
+            assert kind.NamespaceIndex == OWN
+            assert supertypes(served.space, kind)[1:] == [node_id(Ids.BaseObjectType)]
+        lock = parts(served.space, node_id(f"{model}/Lock", OWN)).values()
+        names = ("TakeControl", "ReleaseControl", "KeepAlive", "supervision/owner")
+        assert {one.Identifier for one in lock} == {f"conveyor/fu1/{name}" for name in names}
+        below = [one.NodeId for one in related(served.space, node_id(Ids.BaseObjectType), Ids.HasSubtype)]
+        assert node_id("DraftLogbookType", OWN) in below
 
 
 def test_without_the_models_it_says_what_to_run(tmp_path: Path) -> None:

@@ -40,8 +40,8 @@ async def until(is_so: Callable[[], Awaitable[bool]], what: str) -> None:
         await asyncio.sleep(0.05)
 
 
-async def exercise(device: Node) -> dict[str, object]:
-    parts = await named(device)
+async def exercise(asset: Node) -> dict[str, object]:
+    parts = await named(asset)
     methods, operational = parts["MethodSet"], await named(parts["Operational"])
     names = {name: found.nodeid for name, found in (await named(methods)).items()}
     setpoint, actual = operational["MainSetpoint"], operational["MainActualValue"]
@@ -60,11 +60,11 @@ async def exercise(device: Node) -> dict[str, object]:
     async def stands() -> bool:
         return abs(await actual.read_value()) < 0.01 * wanted
 
-    await until(runs, f"{device} runs")
+    await until(runs, f"{asset} runs")
     ran_at = await actual.read_value()
     health = await parts["DeviceHealth"].read_value()
     await methods.call_method(names["Stop"])
-    await until(stands, f"{device} stands")
+    await until(stands, f"{asset} stands")
     identification = await named(parts["Identification"])
     plate = {}
     for name, node in identification.items():
@@ -72,7 +72,7 @@ async def exercise(device: Node) -> dict[str, object]:
         text = value.Value.Value
         plate[name] = text.Text if isinstance(text, ua.LocalizedText) else text
     return {
-        "drive": (await device.read_display_name()).Text,
+        "drive": (await asset.read_display_name()).Text,
         "unit": unit,
         "wanted": wanted,
         "ran_at": ran_at,
@@ -86,10 +86,10 @@ async def main(port: int) -> None:
         powertrain, di = [await client.get_namespace_index(uri) for uri in (POWERTRAIN, DI)]
         types = await subtypes(client.get_node(ua.NodeId(DRIVE_TYPE, powertrain)))
         names = {kind.nodeid: (await kind.read_browse_name()).Name for kind in types}
-        for device in await client.get_node(ua.NodeId(DEVICE_SET, di)).get_children():
-            kind = await device.read_type_definition()
+        for asset in await client.get_node(ua.NodeId(DEVICE_SET, di)).get_children():
+            kind = await asset.read_type_definition()
             if kind in names:
-                print(json.dumps({"type": names[kind], **await exercise(device)}), flush=True)
+                print(json.dumps({"type": names[kind], **await exercise(asset)}), flush=True)
 
 
 if __name__ == "__main__":

@@ -9,8 +9,8 @@ from asyncua.server.standard_address_space import standard_address_space
 
 from bridge.catalogue import Catalogue
 from bridge.image import Image
-from bridge.northbound.opcua.device_rows import DI
-from bridge.northbound.opcua.devices import read_models
+from bridge.northbound.opcua.asset_rows import DI
+from bridge.northbound.opcua.assets import read_models
 from bridge.northbound.opcua.nameplates import nameplates_of
 from bridge.northbound.opcua.nodeset_file import NodesetWriter
 from bridge.northbound.opcua.site_space import NAMESPACE, fill

@@ -17,10 +17,10 @@ from bridge.base.errors import OperationFailed
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua.accounts import Accounts, security_policies
+from bridge.northbound.opcua.assets import read_models
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.change_publisher import Publisher
-from bridge.northbound.opcua.devices import read_models
 from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nameplates import Nameplate

@@ -1,4 +1,4 @@
-"""Address space of a site: its points, its drives as devices of the published models, its types of events.
+"""Address space of a site: its points, its drives as assets of the published models, its types of events.
 The server serves it, and ``export opcua --nodeset2`` writes it down."""
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from asyncua.server.address_space import AddressSpace, NodeManagementService
 
 from bridge.command import EventKind
 from bridge.image import Image
+from bridge.northbound.opcua.assets import Assets
 from bridge.northbound.opcua.data_values import EpochNs
-from bridge.northbound.opcua.devices import Devices
 from bridge.northbound.opcua.events import BASE_TYPE, type_name
 from bridge.northbound.opcua.nameplates import Nameplate
 from bridge.northbound.opcua.nodes import layout
@@ -45,10 +45,10 @@ def fill(
     point that has no place."""
     own = indexes[NAMESPACE]
     objects = layout(image.points)
-    devices = Devices(models, objects[0], nameplates, with_draft=with_draft)
-    tree = Tree(space, own, image, epoch_ns, objects, devices.point)
+    assets = Assets(models, objects[0], nameplates, with_draft=with_draft)
+    tree = Tree(space, own, image, epoch_ns, objects, assets.point)
     namespaces = [*(indexes[uri] for uri in models.namespaces), own]
-    devices.open(space, namespaces, image, epoch_ns, tree.watched)
+    assets.open(space, namespaces, image, epoch_ns, tree.watched)
     return SiteSpace(tree, _event_types(NodeManagementService(space), own))
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from asyncua import Server, ua
 
-from bridge.northbound.opcua.devices import read_models
+from bridge.northbound.opcua.assets import read_models
 from bridge.uaserver.address_space import put_behind
 from bridge.uaserver.nodesets import NodesetStore, NoInstances
 from tests.support import sites
@@ -100,9 +100,9 @@ async def test_asyncua_imports_it(exported: Path) -> None:
     def node(name: str) -> object:
         return server.get_node(ua.NodeId(name, own))
 
-    device = node("conveyor/fu1/Device")
-    assert (await device.read_type_definition()).Identifier == 1016
-    assert (await node("conveyor/fu1/Device/Manufacturer").read_value()).Text == "Getriebebau NORD"
+    asset = node("conveyor/fu1/Asset")
+    assert (await asset.read_type_definition()).Identifier == 1016
+    assert (await node("conveyor/fu1/Asset/Manufacturer").read_value()).Text == "Getriebebau NORD"
     units = await node("conveyor/fu1/command/frequency/EngineeringUnits").read_value()
     assert (units.DisplayName.Text, units.Description.Text) == ("Hz", "hertz")
     states = await node("conveyor/fu1/status/state/EnumStrings").read_value()

@@ -1,4 +1,4 @@
-"""Drives as devices of the published models: OPC 40400-1 (Powertrain), OPC 10000-100 (DI), OPC 40001-1
+"""Drives as assets of the published models: OPC 40400-1 (Powertrain), OPC 10000-100 (DI), OPC 40001-1
 (Machinery). Rows beside the nodes of the points, most of which only refer to them (ADR 26). Knows nothing of
 the server."""
 
@@ -16,8 +16,8 @@ from bridge.northbound.opcua.structures import READ, READ_WRITE
 from bridge.uaserver.library import ObjectIds, ua
 from bridge.uaserver.nodesets import Reference, Row
 
-DEVICE: Final = "Device"
-"""Last part of the id of a drive's device."""
+ASSET: Final = "Asset"
+"""Last part of the id of a drive's asset."""
 
 DI: Final = "http://opcfoundation.org/UA/DI/"
 MACHINERY: Final = "http://opcfoundation.org/UA/Machinery/"
@@ -81,15 +81,15 @@ class Derived:
 
 
 @dataclass(slots=True)
-class DeviceRows:
+class AssetRows:
     """The nodes of one drive by their ids. ``derived`` are those whose value is made of points."""
 
     rows: dict[str, Row] = field(default_factory=dict[str, Row])
     derived: dict[str, Derived] = field(default_factory=dict[str, Derived])
 
 
-class DeviceLayout:
-    """Devices of the drives below ``drives``, the folder of the points' layout. ``places`` are those of the
+class AssetLayout:
+    """Assets of the drives below ``drives``, the folder of the points' layout. ``places`` are those of the
     namespaces by URI, ``own`` is that of the points. ``with_draft``: with what we make of OPC 40400-2."""
 
     def __init__(
@@ -117,19 +117,19 @@ class DeviceLayout:
     def device_set(self) -> str:
         return self.of(DI, _DEVICE_SET)
 
-    def device_id(self, drive: str) -> str:
-        return f"{self._own};s={drive}/{DEVICE}"
+    def asset_id(self, drive: str) -> str:
+        return f"{self._own};s={drive}/{ASSET}"
 
-    def made(self, drive: str) -> DeviceRows:
-        """Rows of the drive's device. Raises KeyError for what is no drive."""
+    def made(self, drive: str) -> AssetRows:
+        """Rows of the drive's asset. Raises KeyError for what is no drive."""
         node, found = self._drives[drive]
         maker = _Maker(self, node, found, self._nameplates.get(drive, Nameplate()))
         maker.make()
         return maker.made
 
-    def draft_types(self) -> DeviceRows:
+    def draft_types(self) -> AssetRows:
         """Types of the draft, of our own namespace; none without it."""
-        made = DeviceRows()
+        made = AssetRows()
         for name in DRAFT_TYPES if self.with_draft else ():
             top = f"0;i={ObjectIds.BaseObjectType}"
             made.rows[name] = Row(
@@ -162,9 +162,9 @@ class _Maker:
     """Maker of the rows of one drive."""
 
     def __init__(
-        self, layout: DeviceLayout, node: ObjectNode, drive: ObjectNode, nameplate: Nameplate
+        self, layout: AssetLayout, node: ObjectNode, drive: ObjectNode, nameplate: Nameplate
     ) -> None:
-        self.made = DeviceRows()
+        self.made = AssetRows()
         self._layout = layout
         self._drive = drive
         self._nameplate = nameplate
@@ -180,30 +180,30 @@ class _Maker:
     def make(self) -> None:
         layout, drive = self._layout, self._drive
         kind = layout.of(POWERTRAIN, _DRIVE_TYPES.get(self._nameplate.drive_type, _DRIVE))
-        device = self._object(DEVICE, layout.own(drive.id), kind)
-        device.references.append(_back(ObjectIds.HasComponent, layout.device_set))
-        self._nameplate_of(device)
+        asset = self._object(ASSET, layout.own(drive.id), kind)
+        asset.references.append(_back(ObjectIds.HasComponent, layout.device_set))
+        self._nameplate_of(asset)
         identification = self._below(
-            device,
+            asset,
             layout.name(DI, "Identification"),
             layout.of(MACHINERY, _COMPONENT_IDENTIFICATION),
             ObjectIds.HasAddIn,
         )
         self._nameplate_of(identification)
-        self._health(device)
-        methods = self._below(device, layout.name(DI, "MethodSet"), f"0;i={ObjectIds.BaseObjectType}")
+        self._health(asset)
+        methods = self._below(asset, layout.name(DI, "MethodSet"), f"0;i={ObjectIds.BaseObjectType}")
         self._refer(methods, ObjectIds.HasComponent, (method.id for method in drive.methods))
         parameters = [one.id for one in self._of_group("parameter")]
         if parameters:
-            kept = self._below(device, layout.name(DI, "ParameterSet"), f"0;i={ObjectIds.BaseObjectType}")
+            kept = self._below(asset, layout.name(DI, "ParameterSet"), f"0;i={ObjectIds.BaseObjectType}")
             self._refer(kept, ObjectIds.HasComponent, parameters)
-        self._operational(device)
-        self._group(device, "Status", "status", "actual")
-        self._group(device, "Diagnostics", "supervision")
+        self._operational(asset)
+        self._group(asset, "Status", "status", "actual")
+        self._group(asset, "Diagnostics", "supervision")
         if parameters:
-            self._group(device, "Configuration", "parameter")
+            self._group(asset, "Configuration", "parameter")
         if layout.with_draft:
-            self._draft(device)
+            self._draft(asset)
 
     def _nameplate_of(self, owner: Row) -> None:
         """Properties of DI's nameplate interfaces (OPC 10000-100 §4.5), as far as they are known."""
@@ -227,14 +227,14 @@ class _Maker:
         row = self._property(owner, name, ObjectIds.LocalizedText)
         row.value = ("LocalizedText", words) if words else None
 
-    def _health(self, device: Row) -> None:
+    def _health(self, asset: Row) -> None:
         points = tuple(self._points[leaf] for leaf in _HEALTH if leaf in self._points)
-        row = self._variable(device, self._layout.name(DI, "DeviceHealth"), ObjectIds.BaseDataVariableType)
+        row = self._variable(asset, self._layout.name(DI, "DeviceHealth"), ObjectIds.BaseDataVariableType)
         row.data_type = self._layout.of(DI, _DEVICE_HEALTH)
         self.made.derived[_id(row)] = Derived(Conversion.HEALTH, points)
 
-    def _operational(self, device: Row) -> None:
-        group = self._functional_group(device, "Operational")
+    def _operational(self, asset: Row) -> None:
+        group = self._functional_group(asset, "Operational")
         for leaf_group, name in zip(("command", "actual"), MAINS, strict=True):
             main = next(
                 (
@@ -267,29 +267,29 @@ class _Maker:
         row = self._property(owner, f"0;{name}", data_type)
         self.made.derived[_id(row)] = Derived(conversion, (point,))
 
-    def _group(self, device: Row, name: str, *groups: str) -> None:
-        row = self._functional_group(device, name)
+    def _group(self, asset: Row, name: str, *groups: str) -> None:
+        row = self._functional_group(asset, name)
         for group in groups:
             self._refer(row, ObjectIds.Organizes, (one.id for one in self._of_group(group)))
 
-    def _functional_group(self, device: Row, name: str) -> Row:
+    def _functional_group(self, asset: Row, name: str) -> Row:
         layout = self._layout
-        return self._below(device, layout.name(DI, name), layout.of(DI, _FUNCTIONAL_GROUP))
+        return self._below(asset, layout.name(DI, name), layout.of(DI, _FUNCTIONAL_GROUP))
 
     def _of_group(self, group: str) -> Iterator[VariableNode]:
         return (one for name, one in self._points.items() if name.startswith(f"{group}/"))
 
-    def _draft(self, device: Row) -> None:
+    def _draft(self, asset: Row) -> None:
         """Axis, lock and logbook, as OPC 40400-2 has announced them, with types of ours."""
         layout = self._layout
-        model = self._below(device, layout.own("FunctionalModelDraft"), layout.point(DRAFT_TYPES[0]))
+        model = self._below(asset, layout.own("FunctionalModelDraft"), layout.point(DRAFT_TYPES[0]))
         edition = self._property(model, layout.own("Edition"), ObjectIds.String)
         edition.value = ("String", EDITION)
         axis, lock, logbook = (
             self._below(model, layout.own(name), layout.point(kind))
             for name, kind in zip(("Axis", "Lock", "Logbook"), DRAFT_TYPES[1:], strict=True)
         )
-        mains = (f"{self._drive.id}/{DEVICE}/Operational/{name}" for name in MAINS)
+        mains = (f"{self._drive.id}/{ASSET}/Operational/{name}" for name in MAINS)
         self._refer(axis, ObjectIds.HasComponent, [one for one in mains if one in self.made.rows])
         self._refer(axis, ObjectIds.HasComponent, (one.id for one in self._of_group("status")))
         self._methods(axis, _OF_AXIS)
@@ -355,8 +355,8 @@ def _id(row: Row) -> str:
 
 
 def _path(row: Row) -> str:
-    """The part of its id from the device on."""
-    return DEVICE + _id(row).partition(f"/{DEVICE}")[2]
+    """The part of its id from the asset on."""
+    return ASSET + _id(row).partition(f"/{ASSET}")[2]
 
 
 def _join(above: Row, below: Row, kind: int) -> None:

@@ -1,4 +1,4 @@
-"""The drives as devices of the published models: rows made when somebody looks at them, values of points."""
+"""The drives as assets of the published models: rows made when somebody looks at them, values of points."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from bridge.base.errors import Unavailable
 from bridge.catalogue.codes import WatchdogState
 from bridge.drive import FAULTED
 from bridge.image import Image, Value
+from bridge.northbound.opcua.asset_rows import ASSET, AssetLayout, AssetRows, Conversion, Derived
 from bridge.northbound.opcua.data_values import EpochNs, present_value
-from bridge.northbound.opcua.device_rows import DEVICE, Conversion, Derived, DeviceLayout, DeviceRows
 from bridge.northbound.opcua.nameplates import Nameplate
 from bridge.northbound.opcua.nodes import ObjectNode, VariableNode
 from bridge.northbound.opcua.point_values import HEALTH, SAME, TEXT_OF_NUMBER, AllWatched, DerivedValue
@@ -50,8 +50,8 @@ def read_models(file: Path = _FILE) -> Models:
         raise Unavailable(Text.of("opcua.no_models", file=str(file))) from None
 
 
-class Devices:
-    """Devices of a site in ``models``, which are changed. ``with_draft``: with ours of OPC 40400-2."""
+class Assets:
+    """Assets of a site in ``models``, which are changed. ``with_draft``: with ours of OPC 40400-2."""
 
     def __init__(
         self,
@@ -63,14 +63,14 @@ class Devices:
     ) -> None:
         places = {uri: place for place, uri in enumerate(models.namespaces, 1)}
         self._models = models
-        self.layout = DeviceLayout(drives, nameplates, places, len(places) + 1, with_draft=with_draft)
+        self.layout = AssetLayout(drives, nameplates, places, len(places) + 1, with_draft=with_draft)
         self._rows = lru_cache(_KEPT)(self.layout.made)
         self._draft = self.layout.draft_types()
         base, below = f"0;i={ObjectIds.BaseObjectType}", f"0;i={ObjectIds.HasSubtype}"
         models.outside += [(base, below, True, row.id) for row in self._draft.rows.values()]
         device_set = next(row for row in models.nodes if row.id == self.layout.device_set)
         below = f"0;i={ObjectIds.HasComponent}"
-        device_set.references += [(below, True, self.layout.device_id(name)) for name in self.layout.drives]
+        device_set.references += [(below, True, self.layout.asset_id(name)) for name in self.layout.drives]
 
     def open(
         self,
@@ -85,9 +85,9 @@ class Devices:
         values = _Values(self, image, epoch_ns, watched)
         put_behind(space, NodesetStore(self._models, space, namespaces, values).find)
 
-    def rows(self, name: str) -> DeviceRows | None:
-        drive, is_device, _ = name.partition(f"/{DEVICE}")
-        if is_device and drive in self.layout.drives:
+    def rows(self, name: str) -> AssetRows | None:
+        drive, is_asset, _ = name.partition(f"/{ASSET}")
+        if is_asset and drive in self.layout.drives:
             return self._rows(drive)
         return self._draft if name in self._draft.rows else None
 
@@ -100,20 +100,20 @@ class Devices:
 
 
 class _Values:
-    """Rows and values of devices as ``NodesetStore`` asks for them."""
+    """Rows and values of assets as ``NodesetStore`` asks for them."""
 
-    def __init__(self, devices: Devices, image: Image, epoch_ns: EpochNs, watched: AllWatched) -> None:
-        self._devices = devices
+    def __init__(self, assets: Assets, image: Image, epoch_ns: EpochNs, watched: AllWatched) -> None:
+        self._assets = assets
         self._image = image
         self._epoch_ns = epoch_ns
         self._watched = watched
 
     def row(self, name: str) -> Row | None:
-        found = self._devices.rows(name)
+        found = self._assets.rows(name)
         return found.rows.get(name) if found else None
 
     def value(self, name: str) -> AttributeValue | None:
-        found = self._devices.rows(name)
+        found = self._assets.rows(name)
         derived = found.derived.get(name) if found else None
         return self._made(derived) if derived else None
 

@@ -1,4 +1,4 @@
-"""Drives as devices of Powertrain, DI and Machinery: their types are kept, and nothing is invented."""
+"""Drives as assets of Powertrain, DI and Machinery: their types are kept, and nothing is invented."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from asyncua.server.address_space import AddressSpace
 from bridge.base.errors import Unavailable
 from bridge.catalogue import Catalogue
 from bridge.image import Image, Quality
-from bridge.northbound.opcua.devices import Devices, read_models
+from bridge.northbound.opcua.assets import Assets, read_models
 from bridge.northbound.opcua.nameplates import nameplates_of
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.tree import Tree
@@ -38,11 +38,11 @@ class Served:
         self.image = Image(catalogue.points)
         self.space = standard_space()
         trees = layout(self.image.points)
-        devices = Devices(models, trees[0], nameplates_of(catalogue), with_draft=with_draft)
-        self.tree = Tree(self.space, OWN, self.image, lambda at: round(at * 1e9), trees, devices.point)
+        assets = Assets(models, trees[0], nameplates_of(catalogue), with_draft=with_draft)
+        self.tree = Tree(self.space, OWN, self.image, lambda at: round(at * 1e9), trees, assets.point)
         indexes = list(range(3, 3 + len(models.namespaces)))
         self.di = indexes[models.namespaces.index(DI_URI)]
-        devices.open(self.space, [*indexes, OWN], self.image, lambda at: 0, self.tree.watched)
+        assets.open(self.space, [*indexes, OWN], self.image, lambda at: 0, self.tree.watched)
 
     def read(self, name: str, attribute: Attribute = Attribute.Value) -> ua.DataValue:
         return self.space.read_attribute_value(node_id(name, OWN), attribute)
@@ -52,7 +52,7 @@ class Served:
         self.image.set(index, value, 1.0)
         self.image.judge([index], quality, 1.0)
 
-    def devices(self) -> list[ua.NodeId]:
+    def assets(self) -> list[ua.NodeId]:
         found = related(self.space, node_id(5001, self.di), Ids.HasComponent)
         return [one.NodeId for one in found if one.NodeId.NamespaceIndex == OWN]
 
@@ -81,7 +81,7 @@ def type_of(space: AddressSpace, where: ua.NodeId) -> ua.NodeId | None:
 def all_below(space: AddressSpace, where: ua.NodeId) -> Iterator[ua.NodeId]:
     yield where
     for below in parts(space, where).values():
-        if "/Device" in str(below.Identifier):
+        if "/Asset" in str(below.Identifier):
             yield from all_below(space, below)
 
 
@@ -92,13 +92,13 @@ def declared_in(space: AddressSpace, kind: ua.NodeId) -> dict[str, ua.NodeId]:
     return found
 
 
-def test_every_drive_is_a_device_with_all_that_its_types_demand(served: Served) -> None:
+def test_every_drive_is_an_asset_with_all_that_its_types_demand(served: Served) -> None:
     space = served.space
-    names = [str(one.Identifier) for one in served.devices()]
-    assert names == [f"{drive}/Device" for drive in ("conveyor/fu1", "conveyor/fu2", "conveyor/fu3",
+    names = [str(one.Identifier) for one in served.assets()]
+    assert names == [f"{drive}/Asset" for drive in ("conveyor/fu1", "conveyor/fu2", "conveyor/fu3",
                      "conveyor/fu4", "pump/drive", "lift/drive", "fan/drive")]  # fmt: skip
-    for device in served.devices():
-        for where in all_below(space, device):
+    for asset in served.assets():
+        for where in all_below(space, asset):
             kind = type_of(space, where)
             assert kind in space, where
             has = parts(space, where)
@@ -114,31 +114,31 @@ def test_every_drive_is_a_device_with_all_that_its_types_demand(served: Served) 
                     assert space.read_attribute_value(has[name], Attribute.DataType).Value == data_type
 
 
-def test_every_reference_of_a_device_leads_to_a_node(served: Served) -> None:
-    for device in served.devices():
-        for where in all_below(served.space, device):
+def test_every_reference_of_an_asset_leads_to_a_node(served: Served) -> None:
+    for asset in served.assets():
+        for where in all_below(served.space, asset):
             for reference in served.space[where].references:
                 assert reference.NodeId in served.space, (where, reference)
 
 
 def test_todays_nodes_are_referred_to_and_stay_as_they_are(served: Served) -> None:
-    device = node_id("conveyor/fu1/Device", OWN)
-    has = {name.partition(":")[2]: where for name, where in parts(served.space, device).items()}
+    asset = node_id("conveyor/fu1/Asset", OWN)
+    has = {name.partition(":")[2]: where for name, where in parts(served.space, asset).items()}
     methods = {one.NodeId.Identifier for one in related(served.space, has["MethodSet"], Ids.HasComponent)}
     assert "conveyor/fu1/TakeControl" in methods
     status = {one.NodeId.Identifier for one in related(served.space, has["Status"], Ids.Organizes)}
     assert {"conveyor/fu1/status/state", "conveyor/fu1/actual/current"} <= status
     drive = served.space[node_id("conveyor/fu1", OWN)]
-    assert not [one for one in drive.references if "Device" in str(one.NodeId.Identifier)]
+    assert not [one for one in drive.references if "Asset" in str(one.NodeId.Identifier)]
 
 
 def test_the_nameplate_is_what_is_known_and_no_more(served: Served) -> None:
     def plate(drive: str, name: str) -> ua.DataValue:
-        return served.read(f"{drive}/Device/Identification/{name}")
+        return served.read(f"{drive}/Asset/Identification/{name}")
 
     assert plate("conveyor/fu1", "Manufacturer").Value.Value.Text == "Getriebebau NORD"
     assert plate("fan/drive", "Manufacturer").StatusCode.value == ua.StatusCodes.BadNotSupported
-    assert node_id("fan/drive/Device/Model", OWN) not in served.space
+    assert node_id("fan/drive/Asset/Model", OWN) not in served.space
     assert plate("lift/drive", "SerialNumber").StatusCode.value == ua.StatusCodes.BadWaitingForInitialData
     served.set("lift/drive/identity/serial", 4711)
     assert plate("lift/drive", "SerialNumber").Value.Value == "4711"
@@ -166,30 +166,30 @@ def test_the_health_is_the_drives(served: Served, values: dict[str, object], hea
     }
     for leaf, value in (sound | values).items():
         served.set(f"conveyor/fu1/{leaf}", value)
-    told = served.read("conveyor/fu1/Device/DeviceHealth")
+    told = served.read("conveyor/fu1/Asset/DeviceHealth")
     assert (told.Value.Value, told.Value.VariantType) == (health, ua.VariantType.Int32)
 
 
 def test_the_health_is_as_good_as_what_the_drive_says(served: Served) -> None:
     served.set("conveyor/fu2/status/state", 2, Quality.DEAD)
-    told = served.read("conveyor/fu2/Device/DeviceHealth")
+    told = served.read("conveyor/fu2/Asset/DeviceHealth")
     assert told.StatusCode.value == ua.StatusCodes.BadNoCommunication
 
 
 def test_a_main_setpoint_is_the_point_that_leads_the_drive(served: Served) -> None:
     for drive, leaf in (("conveyor/fu1", "frequency"), ("fan/drive", "velocity")):
-        name = f"{drive}/Device/Operational/MainSetpoint"
+        name = f"{drive}/Asset/Operational/MainSetpoint"
         point = served.tree.writable(node_id(name, OWN))
         assert point and point.id == f"{drive}/command/{leaf}"
-        assert served.tree.writable(node_id(f"{drive}/Device/Operational/MainActualValue", OWN)) is None
-    units = served.read("fan/drive/Device/Operational/MainSetpoint/EngineeringUnits").Value.Value
+        assert served.tree.writable(node_id(f"{drive}/Asset/Operational/MainActualValue", OWN)) is None
+    units = served.read("fan/drive/Asset/Operational/MainSetpoint/EngineeringUnits").Value.Value
     assert units.DisplayName.Text == "1/min"
 
 
 def test_who_watches_a_health_is_told_by_each_of_its_points(served: Served) -> None:
-    node = served.space[node_id("pump/drive/Device/DeviceHealth", OWN)]
+    node = served.space[node_id("pump/drive/Asset/DeviceHealth", OWN)]
     node.attributes[Attribute.Value].datachange_callbacks[7] = print
-    again = served.space[node_id("pump/drive/Device/DeviceHealth", OWN)]
+    again = served.space[node_id("pump/drive/Asset/DeviceHealth", OWN)]
     assert again.attributes[Attribute.Value].datachange_callbacks == {7: print}
     told = {
         served.image.points[index].leaf
@@ -203,13 +203,13 @@ class TestDraft:
     """What we make of OPC 40400-2 before it is published."""
 
     def test_without_the_key_there_is_none(self, served: Served) -> None:
-        device = node_id("conveyor/fu1/Device", OWN)
-        assert not [name for name in parts(served.space, device) if "Draft" in name]
+        asset = node_id("conveyor/fu1/Asset", OWN)
+        assert not [name for name in parts(served.space, asset) if "Draft" in name]
         assert node_id("DraftLockType", OWN) not in served.space
 
     def test_it_says_that_it_is_a_draft_and_has_types_of_our_own_alone(self) -> None:
         served = Served(with_draft=True)
-        model = "conveyor/fu1/Device/FunctionalModelDraft"
+        model = "conveyor/fu1/Asset/FunctionalModelDraft"
         assert served.read(f"{model}/Edition").Value.Value.endswith("announced for 2027-01-01")
         for name in ("", "/Axis", "/Lock", "/Logbook"):
             kind = type_of(served.space, node_id(model + name, OWN))

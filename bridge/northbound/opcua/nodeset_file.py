@@ -148,7 +148,7 @@ class NodesetWriter:
         )
 
     def _value(self, made: ET.Element, node: NodeData) -> None:
-        """What does not change while the server runs."""
+        """Value that does not change while the server runs; nothing for another."""
         held = node.attributes.get(AttributeIds.Value)
         if held is None or held.value_callback is not None or held.value is None:
             return

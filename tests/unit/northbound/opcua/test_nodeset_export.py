@@ -74,5 +74,5 @@ def test_texts_are_in_both_languages_and_values_in_english(nodes: dict[str, ET.E
 
 
 def test_what_changes_has_no_value(nodes: dict[str, ET.Element]) -> None:
-    for name in ("status/state", "Device/SerialNumber", "Device/DeviceHealth", "status/status_word/fault"):
+    for name in ("status/state", "Asset/SerialNumber", "Asset/DeviceHealth", "status/status_word/fault"):
         assert nodes[f"ns=1;s=conveyor/fu1/{name}"].find(f"{SET}Value") is None, name

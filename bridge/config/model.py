@@ -338,6 +338,9 @@ class OpcUaTable(ListeningTable):
     powertrain_draft: bool = Field(
         False, description="true serves a draft of OPC 40400-2, which is not published yet"
     )
+    acknowledge_resets: bool = Field(
+        False, description="true has whoever acknowledges the alarm of a drive reset its fault"
+    )
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 

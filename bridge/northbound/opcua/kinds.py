@@ -97,7 +97,7 @@ class Kinds:
             case PropertyNode():
                 node_class, type_id = ua.NodeClass.Variable, ObjectIds.PropertyType
                 wanted = property_attributes(node.content)
-        attributes = _attributes(node_class, wanted)
+        attributes = node_attributes(node_class, wanted)
         if isinstance(node, PropertyNode):
             held = attributes[AttributeIds.Value].value
             change(held, SourceTimestamp=self._built_at, ServerTimestamp=self._built_at)
@@ -108,7 +108,7 @@ class Kinds:
         return NodeKind(attributes, node_class, node_id(type_id), to_type)
 
 
-def _name(name: str, namespace: int, is_ours: bool) -> Name:
+def _name(name: str, namespace: int, is_ours: bool = False) -> Name:
     """``is_ours``: a name of the program's, which it can say in each language."""
     qualified, words = ua.QualifiedName(name, namespace), named(name) if is_ours else text(name)
     return Name(
@@ -135,7 +135,10 @@ def _key(node: Node) -> Hashable:
             return node.content
 
 
-def _attributes(node_class: ua.NodeClass, wanted: ua.NodeAttributes) -> dict[AttributeIds, AttributeValue]:
+def node_attributes(
+    node_class: ua.NodeClass, wanted: ua.NodeAttributes
+) -> dict[AttributeIds, AttributeValue]:
+    """Attributes of a node as asyncua makes them."""
     space = AddressSpace()
     item = make(ua.AddNodesItem, RequestedNewNodeId=_ANY, NodeClass=node_class, NodeAttributes=wanted)
     # Without its checks: there is no parent.

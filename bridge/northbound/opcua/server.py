@@ -17,6 +17,8 @@ from bridge.base.errors import OperationFailed
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua.accounts import Accounts, security_policies
+from bridge.northbound.opcua.alarm_server import AlarmSite, serve_alarms
+from bridge.northbound.opcua.alarms import AlarmTask
 from bridge.northbound.opcua.assets import read_models
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
@@ -45,8 +47,9 @@ _log = logging.getLogger(__name__)
 class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
-    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``. ``nameplates``
-    are those of the drives. ``bound`` is a listening socket where somebody else holds the port.
+    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``, where the state
+    of the alarms is kept, too. ``nameplates`` are those of the drives. ``bound`` is a listening socket where
+    somebody else holds the port.
     """
 
     def __init__(
@@ -56,6 +59,7 @@ class OpcUaServer:
         state_dir: Path,
         site_name: str,
         bound: socket.socket | None = None,
+        alarm_site: AlarmSite | None = None,
         nameplates: Mapping[str, Nameplate] | None = None,
     ) -> None:
         self._view = view
@@ -63,11 +67,14 @@ class OpcUaServer:
         self._folder = state_dir / "opcua"
         self._site_name = site_name
         self._nameplates = nameplates or {}
+        self._alarm_site = alarm_site or AlarmSite()
         self._users: Accounts | None = None
         self._server: BoundServer | None = None
         self._socket = bound
         self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
+        self._follower: asyncio.Task[None] | None = None
+        self._alarms: AlarmTask | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
         self.port = int(port)
@@ -106,11 +113,11 @@ class OpcUaServer:
     async def failed(self) -> None:
         """Wait for ever, or raise ``OperationFailed`` when no client can connect any more or changes are not
         published."""
-        if self._socket is None or self._publisher is None:
+        if self._socket is None or self._publisher is None or self._follower is None:
             return
         deaf = asyncio.create_task(until_deaf(self._socket, "opcua.listen"))
         try:
-            await asyncio.wait((deaf, self._publisher), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((deaf, self._publisher, self._follower), return_when=asyncio.FIRST_COMPLETED)
             if not deaf.done():
                 raise OperationFailed("OPC UA: clients are told of no change any more")
             await deaf
@@ -120,10 +127,13 @@ class OpcUaServer:
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
         self._pulse.stop()
-        task, self._publisher = self._publisher, None
-        if task:
+        tasks = [one for one in (self._publisher, self._follower) if one]
+        self._publisher = self._follower = None
+        for task in tasks:
             task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
+        if self._alarms:
+            await self._alarms.end()
         server, self._server = self._server, None
         if server:
             await server.stop()
@@ -153,6 +163,10 @@ class OpcUaServer:
         draft = self._settings.powertrain_draft
         site = fill(inner.aspace, models, indexes, image, epoch_ns, self._nameplates, with_draft=draft)
         tree = site.tree
+        resets = self._settings.acknowledge_resets
+        self._alarms = serve_alarms(
+            inner, tree, self._view, self._alarm_site, own.certificate, self._folder, resets=resets
+        )
         inner.application = Backend(
             users,
             Writer(self._view, inner.aspace, tree.writable),
@@ -167,6 +181,7 @@ class OpcUaServer:
         await server.start()
         publisher = Publisher(image, tree.watched, events)
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
+        self._follower = asyncio.create_task(self._alarms.run(), name="opcua alarms")
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
 

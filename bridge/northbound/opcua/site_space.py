@@ -13,11 +13,11 @@ from bridge.command import EventKind
 from bridge.image import Image
 from bridge.northbound.opcua.assets import Assets
 from bridge.northbound.opcua.data_values import EpochNs
-from bridge.northbound.opcua.events import BASE_TYPE, type_name
+from bridge.northbound.opcua.event_types import BASE_TYPE, DRIVE_EVENT_FIELDS, EventTypeMaker, type_name
 from bridge.northbound.opcua.nameplates import Nameplate
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.tree import Tree
-from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
+from bridge.uaserver.library import ObjectIds, node_id, ua
 from bridge.uaserver.nodesets import Models
 
 NAMESPACE: Final = "urn:drivebridge:points"
@@ -53,25 +53,7 @@ def fill(
 
 
 def _event_types(management: NodeManagementService, namespace: int) -> dict[EventKind, ua.NodeId]:
-    top = node_id(ObjectIds.BaseEventType)
-    base = _event_type(management, node_id(BASE_TYPE, namespace), top, is_abstract=True)
-    return {kind: _event_type(management, node_id(type_name(kind), namespace), base) for kind in EventKind}
-
-
-def _event_type(
-    management: NodeManagementService, where: ua.NodeId, parent: ua.NodeId, *, is_abstract: bool = False
-) -> ua.NodeId:
-    """A new type below ``parent``. Raises UaError where there is one already."""
-    name = str(where.Identifier)
-    item = make(
-        ua.AddNodesItem,
-        RequestedNewNodeId=where,
-        BrowseName=ua.QualifiedName(name, where.NamespaceIndex),
-        NodeClass=ua.NodeClass.ObjectType,
-        ParentNodeId=parent,
-        ReferenceTypeId=node_id(ObjectIds.HasSubtype),
-        NodeAttributes=make(ua.ObjectTypeAttributes, DisplayName=text(name), IsAbstract=is_abstract),
-    )
-    (result,) = management.add_nodes([item])
-    get(result, "StatusCode").check()
-    return where
+    types = EventTypeMaker(management, namespace)
+    base = types.make(BASE_TYPE, node_id(ObjectIds.BaseEventType), DRIVE_EVENT_FIELDS)
+    types.generates(base)
+    return {kind: types.make(type_name(kind), base) for kind in EventKind}

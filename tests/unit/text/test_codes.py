@@ -19,14 +19,17 @@ from bridge.catalogue.points import LIFE_SIGN
 from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import Action
 from bridge.condition.causes import RULES
+from bridge.condition.plant_layout import MOVES_BY
 from bridge.config import NodeTable, Reaction
 from bridge.drive import DriveState
 from bridge.mapping import family_names, load_family
 from bridge.northbound.opcua.nodes import DEVICE_GROUPS
 from bridge.northbound.opcua.nodes import GROUPS as GROUP_NAMES
+from bridge.northbound.trouble_words import CONDITION_WORDS
 from bridge.project import load_project
 from bridge.text import LANGUAGES, Text
 from bridge.text.templates import parse, source, templates
+from bridge.uaserver.condition_fields import STATES
 
 
 def names() -> set[str]:
@@ -50,12 +53,15 @@ def names() -> set[str]:
 
 GROUPS: Final[Mapping[str, Iterable[str]]] = {
     "action": list(Action),
+    "alarm_state": STATES,
+    "condition": CONDITION_WORDS,
     "controller_state": [state.name.lower() for state in ControllerState],
     "drive_state": [state.label for state in DriveState],
     "nmt_command": [command_name(command) for command in NmtCommand],
     "nmt_state": [state.words for state in NmtState],
     "name": names(),
     "node_state": [state.value for state in NodeState],
+    "quantity": MOVES_BY,
     "reaction": get_args(Reaction),
     "supervision": get_args(NodeTable.model_fields["supervision"].annotation),
     "trouble": sorted({rule.cause for rule in RULES}),

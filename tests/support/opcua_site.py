@@ -102,7 +102,7 @@ async def serving(
 ) -> AsyncIterator[tuple[OpcUaServer, LocalView]]:
     view = LocalView(plant or make_plant())
     nameplates = nameplates_of(view.plant.catalogue)
-    server = OpcUaServer(view, settings, state_dir, "hall", None, nameplates)
+    server = OpcUaServer(view, settings, state_dir, "hall", nameplates=nameplates)
     await server.start()
     drives = asyncio.create_task(view.run())
     try:

@@ -138,7 +138,7 @@ class _Values:
         return present_value(self._image, point.index, value_type(point), self._epoch_ns)
 
     def _text(self, point: VariableNode) -> ua.DataValue:
-        """Text of a number. One that is 0 was never set (CiA 301 §7.5.2.18)."""
+        """Text of a number. One that is 0 was never set (1018h, CiA 301 §7.5.2)."""
         told = self._present(point)
         if _is_bad(told):
             return told

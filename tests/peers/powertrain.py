@@ -50,6 +50,8 @@ async def exercise(asset: Node) -> dict[str, object]:
     wanted = WANTED[unit]
     kind = await setpoint.read_data_type_as_variant_type()
     is_float = kind in (ua.VariantType.Float, ua.VariantType.Double)
+    # Whatever was before is over.
+    await methods.call_method(names["ResetFault"])
     await methods.call_method(names["Start"], ua.Variant(1, ua.VariantType.Int32))
 
     async def runs() -> bool:

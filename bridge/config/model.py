@@ -40,6 +40,7 @@ from bridge.config.field_types import (
     ParameterRights,
     PdoMapping,
     PlainValue,
+    PointPattern,
     Prefix,
     Reason,
     RegularExpression,
@@ -49,6 +50,7 @@ from bridge.config.field_types import (
     WordOrder,
     listed,
 )
+from bridge.config.point_patterns import HISTORY_POINTS
 from bridge.config.reaction import REACTIONS, Reaction, ReactionRule
 from bridge.tomlfile import Unfit
 
@@ -324,6 +326,19 @@ class UserTable(Table):
     password_hash: str = Field(description="the line that `drivebridge hash-password` prints")
 
 
+class OpcUaHistoryTable(Table):
+    """History that the OPC UA server keeps."""
+
+    points: list[PointPattern] = Field(default_factory=lambda: list(HISTORY_POINTS))
+    samples_per_point: int = Field(20_000, ge=10, le=10_000_000, description="10…10000000")
+    size_mb: int = Field(16, ge=1, le=10_000, description="1…10000 MB")
+    event_hours: int = Field(168, ge=0, le=87_600, description="0 (none are kept) or 1…87600 h")
+    events_mb: int = Field(8, ge=1, le=1000, description="1…1000 MB")
+    black_boxes: int = Field(3, ge=0, le=20, description="0…20 of each drive")
+    before_s: float = Field(30.0, ge=1, le=600, description="1…600 s")
+    after_s: float = Field(5.0, ge=0, le=600, description="0…600 s")
+
+
 class OpcUaTable(ListeningTable):
     listen: Endpoint = Field("127.0.0.1:4840", description="address:port")
     no_security: bool = Field(False, description="true opens an endpoint without encryption")
@@ -338,6 +353,7 @@ class OpcUaTable(ListeningTable):
     powertrain_draft: bool = Field(
         False, description="true serves a draft of OPC 40400-2, which is not published yet"
     )
+    history: OpcUaHistoryTable = Field(default_factory=lambda: OpcUaHistoryTable.model_validate({}))
     acknowledge_resets: bool = Field(
         False, description="true has whoever acknowledges the alarm of a drive reset its fault"
     )

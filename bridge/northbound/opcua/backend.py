@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -9,13 +10,16 @@ from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
 from bridge.command.messages.request import Identity, Role
 from bridge.northbound.opcua.accounts import Accounts
+from bridge.northbound.opcua.file_transfer import READING, FileTransfer, file_method
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.plant_history import PlantHistory
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.passwords import ANONYMOUS
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
-from bridge.uaserver.library import ua
+from bridge.uaserver.history import EventHistory, ValueHistory
+from bridge.uaserver.library import get, ua
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,14 +56,25 @@ class ConnectionArrivals:
 
 
 class Backend(ServedApplication[SessionUser]):
-    """Users, writes and calls of the server's sessions. ``pulse`` is that of the event loop."""
+    """Users, writes and calls of the server's sessions, and what they read of the past. ``pulse`` is that of
+    the event loop."""
 
-    def __init__(self, users: Accounts, writer: Writer, caller: Caller, view: View, pulse: Pulse) -> None:
+    def __init__(
+        self,
+        users: Accounts,
+        writer: Writer,
+        caller: Caller,
+        view: View,
+        pulse: Pulse,
+        past: PlantHistory,
+    ) -> None:
         self._users = users
         self._writer = writer
         self._caller = caller
         self._view = view
         self._pulse = pulse
+        self._past = past
+        self._transfer = FileTransfer(past.files)
 
     async def identify(self, login: LoginAttempt) -> SessionUser:
         how = login.token, login.nonce, login.key, login.address
@@ -67,6 +82,8 @@ class Backend(ServedApplication[SessionUser]):
         return SessionUser(replace(identity, connection=login.session))
 
     def may(self, user: SessionUser, where: ua.NodeId) -> bool:
+        if where in READING:
+            return True
         least = self._caller.least_role(where)
         if least is None:
             least = self._writer.least_role(where)
@@ -78,9 +95,25 @@ class Backend(ServedApplication[SessionUser]):
     async def call(
         self, user: SessionUser, calls: Sequence[ua.CallMethodRequest]
     ) -> list[ua.CallMethodResult]:
-        return await self._caller.call(user.identity, calls)
+        return list(await asyncio.gather(*(self._call(user, call) for call in calls)))
+
+    async def _call(self, user: SessionUser, call: ua.CallMethodRequest) -> ua.CallMethodResult:
+        method, file = file_method(call), self._past.file(get(call, "ObjectId"))
+        if method and file:
+            given: list[ua.Variant] = get(call, "InputArguments") or []
+            return await self._transfer.call(user.identity.connection, file, method, given)
+        (result,) = await self._caller.call(user.identity, [call])
+        return result
+
+    def value_history(self, where: ua.NodeId) -> ValueHistory | None:
+        return self._past.value_history(where)
+
+    def event_history(self, where: ua.NodeId) -> EventHistory | None:
+        return self._past.event_history(where)
 
     def on_connection(self, user: SessionUser, *, is_there: bool, has_others: bool) -> None:
+        if not is_there:
+            self._transfer.leave(user.identity.connection)
         self._view.on_connection(user.identity, is_there=is_there, has_others=has_others)
 
     def on_refused(self) -> None:

@@ -8,12 +8,15 @@ from asyncua.server.address_space import AddressSpace, NodeManagementService
 from asyncua.server.standard_address_space import standard_address_space
 
 from bridge.catalogue import Catalogue
+from bridge.config import OpcUaTable
 from bridge.image import Image
 from bridge.northbound.opcua.asset_rows import DI
 from bridge.northbound.opcua.assets import read_models
 from bridge.northbound.opcua.nameplates import nameplates_of
+from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.nodeset_file import NodesetWriter
 from bridge.northbound.opcua.site_space import NAMESPACE, fill
+from bridge.northbound.opcua.value_rings import ValueRings
 from bridge.text import LANGUAGES
 from bridge.uaserver.library import ObjectIds, get, node_id
 
@@ -28,10 +31,19 @@ def nodeset_of(catalogue: Catalogue, version: str) -> str:
     get(standard_address_space, "fill_address_space")(NodeManagementService(space))
     models = read_models()
     indexes = {uri: index for index, uri in enumerate([NAMESPACE, *models.namespaces], 2)}
-    settings = catalogue.site.opcua
-    draft = settings is not None and settings.powertrain_draft
-    image, nameplates = Image(catalogue.points), nameplates_of(catalogue)
-    fill(space, models, indexes, image, round, nameplates, with_draft=draft)
+    settings = catalogue.site.opcua or OpcUaTable.model_validate({})
+    image, kept = Image(catalogue.points), settings.history
+    fill(
+        space,
+        models,
+        indexes,
+        image,
+        round,
+        layout(image.points, ValueRings(image, round, kept).rings, kept.black_boxes),
+        nameplates_of(catalogue),
+        keeps_events=kept.event_hours > 0,
+        with_draft=settings.powertrain_draft,
+    )
     writer = NodesetWriter(space, {index: uri for uri, index in indexes.items()}, LANGUAGES)
     starts = [
         node_id(ObjectIds.BaseEventType),

@@ -23,11 +23,18 @@ from bridge.northbound.opcua.assets import read_models
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.change_publisher import Publisher
+from bridge.northbound.opcua.event_keeper import EventKeeper
+from bridge.northbound.opcua.event_log import EventLog
+from bridge.northbound.opcua.event_records import EventCodec
 from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nameplates import Nameplate
+from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.notifiers import Notifiers
+from bridge.northbound.opcua.plant_history import PlantHistory
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.site_space import NAMESPACE, fill
+from bridge.northbound.opcua.value_rings import ValueRings
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -40,6 +47,7 @@ from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.session import InnerServer
 
 _PRODUCT: Final = "urn:drivebridge"
+_MB: Final = 1_000_000
 
 _log = logging.getLogger(__name__)
 
@@ -75,6 +83,7 @@ class OpcUaServer:
         self._publisher: asyncio.Task[None] | None = None
         self._follower: asyncio.Task[None] | None = None
         self._alarms: AlarmTask | None = None
+        self._past: PlantHistory | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
         self.port = int(port)
@@ -140,6 +149,10 @@ class OpcUaServer:
         bound, self._socket = self._socket, None
         if bound:
             bound.close()
+        past, self._past = self._past, None
+        if past:
+            self._view.forget(past.on_event)
+            await past.close()
         if self._users:
             self._users.close()
 
@@ -160,12 +173,30 @@ class OpcUaServer:
         uris = [NAMESPACE, *models.namespaces]
         indexes = {uri: await server.register_namespace(uri) for uri in uris}
         image, epoch_ns = self._view.image, self._view.epoch_ns
-        draft = self._settings.powertrain_draft
-        site = fill(inner.aspace, models, indexes, image, epoch_ns, self._nameplates, with_draft=draft)
+        kept = self._settings.history
+        rings = ValueRings(image, epoch_ns, kept)
+        site = fill(
+            inner.aspace,
+            models,
+            indexes,
+            image,
+            epoch_ns,
+            layout(image.points, rings.rings, kept.black_boxes),
+            self._nameplates,
+            keeps_events=kept.event_hours > 0,
+            with_draft=self._settings.powertrain_draft,
+        )
         tree = site.tree
+        notifiers = Notifiers(tree.notifiers)
+        keeper = self._keeper(EventCodec(await server.get_namespace_array()), notifiers)
+        past = self._past = PlantHistory(
+            kept, image, epoch_ns, tree, rings, keeper, self._folder / "black_box"
+        )
+        await past.start()
+        self._view.on_event(past.on_event)
         resets = self._settings.acknowledge_resets
         self._alarms = serve_alarms(
-            inner, tree, self._view, self._alarm_site, own.certificate, self._folder, resets=resets
+            inner, tree, self._view, self._alarm_site, own.certificate, self._folder, keeper, resets=resets
         )
         inner.application = Backend(
             users,
@@ -173,13 +204,14 @@ class OpcUaServer:
             Caller(self._view, inner.aspace, tree.method),
             self._view,
             self._pulse,
+            past,
         )
-        events = EventSender(epoch_ns, inner.subscriptions, tree.notifiers, site.event_types)
+        events = EventSender(epoch_ns, inner.subscriptions, notifiers, site.event_types, keeper)
         self._view.on_event(events.on_event)
         inner.subscriptions.prepare()
         self._server = server
         await server.start()
-        publisher = Publisher(image, tree.watched, events)
+        publisher = Publisher(image, tree.watched, events, past)
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
         self._follower = asyncio.create_task(self._alarms.run(), name="opcua alarms")
         # What is there now lives as long as the process: no collection need look at it again.
@@ -198,6 +230,15 @@ class OpcUaServer:
         await server.set_build_info(_PRODUCT, "drivebridge", "drivebridge", version, version, built)
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
+
+    def _keeper(self, codec: EventCodec, notifiers: Notifiers) -> EventKeeper | None:
+        """The keeper of past events; None where none are kept."""
+        kept = self._settings.history
+        if not kept.event_hours:
+            return None
+        most_bytes = kept.events_mb * _MB
+        log = EventLog(codec, notifiers, kept.event_hours, most_bytes)
+        return EventKeeper(log, self._folder, most_bytes)
 
     def _tell(self) -> None:
         settings = self._settings

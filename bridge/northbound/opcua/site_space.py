@@ -3,7 +3,7 @@ The server serves it, and ``export opcua --nodeset2`` writes it down."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -15,7 +15,7 @@ from bridge.northbound.opcua.assets import Assets
 from bridge.northbound.opcua.data_values import EpochNs
 from bridge.northbound.opcua.event_types import BASE_TYPE, DRIVE_EVENT_FIELDS, EventTypeMaker, type_name
 from bridge.northbound.opcua.nameplates import Nameplate
-from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.nodes import ObjectNode
 from bridge.northbound.opcua.tree import Tree
 from bridge.uaserver.library import ObjectIds, node_id, ua
 from bridge.uaserver.nodesets import Models
@@ -37,16 +37,17 @@ def fill(
     indexes: Mapping[str, int],
     image: Image,
     epoch_ns: EpochNs,
+    trees: Sequence[ObjectNode],
     nameplates: Mapping[str, Nameplate],
     *,
+    keeps_events: bool,
     with_draft: bool,
 ) -> SiteSpace:
-    """Put a site into ``space``. ``indexes`` are those of the namespaces by URI. Raises ValueError for a
-    point that has no place."""
+    """Put a site into ``space``. ``indexes`` are those of the namespaces by URI, ``trees`` the layout of the
+    image's points, the drives first."""
     own = indexes[NAMESPACE]
-    objects = layout(image.points)
-    assets = Assets(models, objects[0], nameplates, with_draft=with_draft)
-    tree = Tree(space, own, image, epoch_ns, objects, assets.point)
+    assets = Assets(models, trees[0], nameplates, with_draft=with_draft)
+    tree = Tree(space, own, image, epoch_ns, trees, stands_for=assets.point, keeps_events=keeps_events)
     namespaces = [*(indexes[uri] for uri in models.namespaces), own]
     assets.open(space, namespaces, image, epoch_ns, tree.watched)
     return SiteSpace(tree, _event_types(NodeManagementService(space), own))

@@ -15,8 +15,8 @@ from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.image import Image
 from bridge.northbound.opcua.data_values import EpochNs, present_value
-from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node
-from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
+from bridge.northbound.opcua.kinds import Kinds, Name, Node
+from bridge.northbound.opcua.nodes import FileNode, LiveProperty, MethodNode, ObjectNode, VariableNode
 from bridge.northbound.opcua.point_values import TEXT_OF_STATE, AllWatched, DerivedValue, PointValue
 from bridge.northbound.opcua.structures import VALUE_AS_TEXT, PropertyNode, property_nodes, value_type
 from bridge.northbound.opcua.words import state_named
@@ -53,14 +53,14 @@ class _TreeNode:
     def references(self) -> list[ua.ReferenceDescription]:
         if self._below is None:
             self._below = [below.refer(below.reference) for below in self._tree.below(self)]
+            if isinstance(self.node, FileNode):
+                self._below += self._tree.to_file_methods
         return [*self._upwards(), *self._below, *self._tree.beside.below(self.node.id)]
 
     @property
     def attributes(self) -> Attributes:
-        own = _OWN
-        if isinstance(self.node, VariableNode):
-            own = _OWN_OF_POINT
-        elif isinstance(self.node, PropertyNode) and self.node.content is VALUE_AS_TEXT:
+        own = _OWN_BY_NODE.get(type(self.node), _OWN)
+        if isinstance(self.node, PropertyNode) and self.node.content is VALUE_AS_TEXT:
             own = _OWN_OF_TEXT
         return Attributes(self._kind.attributes, own, self)
 
@@ -87,10 +87,11 @@ class _TreeNode:
     @property
     def name(self) -> Name:
         # The names of properties are the standard's, in the standard's namespace.
-        is_property = isinstance(self.node, PropertyNode)
-        of_site = isinstance(self.node, ObjectNode) and not self.node.folder
-        namespace = 0 if is_property else self._tree.namespace
-        return self._tree.kinds.name(self.node.browse_name, namespace, not is_property and not of_site)
+        node = self.node
+        is_standard = isinstance(node, PropertyNode) or (isinstance(node, LiveProperty) and node.standard)
+        of_site = isinstance(node, ObjectNode) and not node.folder
+        namespace = 0 if is_standard else self._tree.namespace
+        return self._tree.kinds.name(node.browse_name, namespace, not is_standard and not of_site)
 
     def id_attribute(self) -> AttributeValue:
         made = constant(self.nodeid, ua.VariantType.NodeId)
@@ -107,6 +108,9 @@ class _TreeNode:
         above = cast("_TreeNode", self.above)
         return self._tree.text_of(cast("VariableNode", above.node))
 
+    def live_attribute(self) -> AttributeValue:
+        return self._tree.live[self.node.id]
+
 
 _OWN: Final[Mapping[int, Callable[[_TreeNode], AttributeValue]]] = {
     AttributeIds.NodeId: _TreeNode.id_attribute,
@@ -114,7 +118,18 @@ _OWN: Final[Mapping[int, Callable[[_TreeNode], AttributeValue]]] = {
     AttributeIds.DisplayName: lambda node: node.name.display_name,
     AttributeIds.Description: _TreeNode.description_attribute,
 }
-_OWN_OF_POINT: Final = {**_OWN, AttributeIds.Value: _TreeNode.value_attribute}
+_OWN_BY_NODE: Final[Mapping[type, Mapping[int, Callable[[_TreeNode], AttributeValue]]]] = {
+    VariableNode: {**_OWN, AttributeIds.Value: _TreeNode.value_attribute},
+    LiveProperty: {**_OWN, AttributeIds.Value: _TreeNode.live_attribute},
+}
+_FILE_METHODS: Final = (
+    ObjectIds.FileType_Open,
+    ObjectIds.FileType_Close,
+    ObjectIds.FileType_Read,
+    ObjectIds.FileType_Write,
+    ObjectIds.FileType_GetPosition,
+    ObjectIds.FileType_SetPosition,
+)
 _OWN_OF_TEXT: Final = {**_OWN, AttributeIds.Value: _TreeNode.text_attribute}
 
 
@@ -137,8 +152,9 @@ class _Nothing:
 class Tree:
     """The nodes of ``trees`` in ``space``. Raises ValueError where two have the same id.
 
-    ``notifiers`` are the objects that send events, by their names, ``watched`` the variables with watchers.
-    ``point`` finds the point that a node beside the tree stands for.
+    ``notifiers`` are the objects that send events, by their names, ``watched`` the variables with watchers,
+    ``live`` the values of live properties by their ids. ``stands_for`` finds the point that a node beside the
+    tree stands for. ``keeps_events``: past events are.
     """
 
     def __init__(
@@ -148,17 +164,24 @@ class Tree:
         image: Image,
         epoch_ns: EpochNs,
         trees: Sequence[ObjectNode],
-        point: Callable[[str], VariableNode | None] = lambda _name: None,
+        *,
+        stands_for: Callable[[str], VariableNode | None] = lambda _name: None,
+        keeps_events: bool = False,
     ) -> None:
         self._image = image
-        self._point = point
+        self._stands_for = stands_for
         self._epoch_ns = epoch_ns
         self._nodes: dict[str, _TreeNode] = {}
         self._latest_property: _TreeNode | None = None
         self.namespace = namespace
-        self.kinds = Kinds(space)
+        self.kinds = Kinds(space, keeps_events=keeps_events)
         self.to_objects = reference_to(space, node_id(ObjectIds.ObjectsFolder), _ORGANIZES, forward=False)
         self.to_server = reference_to(space, node_id(ObjectIds.Server), _HAS_NOTIFIER, forward=False)
+        # Files share the methods of their type.
+        self.to_file_methods = [
+            reference_to(space, node_id(method), _HAS_COMPONENT, forward=True) for method in _FILE_METHODS
+        ]
+        self.live: dict[str, AttributeValue] = {}
         self.notifiers: dict[str, ua.NodeId] = {}
         self.watched: AllWatched = {}
         self.beside: Beside = _Nothing()
@@ -174,6 +197,8 @@ class Tree:
         made = self._nodes[node.id] = _TreeNode(self, node, above, reference)
         if made.is_notifier:
             self.notifiers[node.id] = made.nodeid
+        if isinstance(node, LiveProperty):
+            self.live[node.id] = AttributeValue(data_value(None))
         for kind, part in _parts(node):
             self._add(part, made, kind)
 
@@ -183,16 +208,34 @@ class Tree:
         notifiers = [self._nodes[name] for name in self.notifiers]
         server = space[node_id(ObjectIds.Server)]
         server.references += [one.refer(_HAS_NOTIFIER) for one in notifiers]
-        server.attributes[AttributeIds.EventNotifier] = constant(SUBSCRIBE_TO_EVENTS, ua.VariantType.Byte)
+        server.attributes[AttributeIds.EventNotifier] = constant(self.kinds.notifies, ua.VariantType.Byte)
+        # Of each change a sample is kept: between two of them nothing has changed.
+        stepped = space[node_id(ObjectIds.HAConfiguration_Stepped)]
+        stepped.attributes[AttributeIds.Value] = constant(True, ua.VariantType.Boolean)
         put_behind(space, self._find)
 
     def method(self, where: ua.NodeId) -> MethodNode | None:
         node = self._node(where)
         return node if isinstance(node, MethodNode) else None
 
+    @property
+    def drives(self) -> list[str]:
+        """Names of the drives that have files."""
+        nodes = (held.node for held in self._nodes.values())
+        return list(dict.fromkeys(node.drive for node in nodes if isinstance(node, FileNode)))
+
+    def point(self, where: ua.NodeId) -> int | None:
+        """Place in the image of the point that a variable is; None where it is none, or one bit of it."""
+        node = self._node(where)
+        return node.index if isinstance(node, VariableNode) and node.bit is None else None
+
+    def file(self, where: ua.NodeId) -> FileNode | None:
+        node = self._node(where)
+        return node if isinstance(node, FileNode) else None
+
     def writable(self, where: ua.NodeId) -> VariableNode | None:
         """The variable, where it is one that clients may write."""
-        node = self._node(where) or self._point(self._name(where))
+        node = self._node(where) or self._stands_for(self._name(where))
         return node if isinstance(node, VariableNode) and node.writable else None
 
     def _node(self, where: ua.NodeId) -> Node | None:
@@ -269,6 +312,11 @@ def _parts(node: Node) -> Iterator[tuple[ua.NodeId, Node]]:
                 yield _ORGANIZES if node.folder else _HAS_COMPONENT, child
             for variable in node.variables:
                 yield _HAS_COMPONENT, variable
+            for file in node.files:
+                yield _HAS_COMPONENT, file
+        case FileNode():
+            for live in node.properties:
+                yield _HAS_PROPERTY, live
         case VariableNode():
             for bit in node.bits:
                 yield _HAS_COMPONENT, bit

@@ -39,7 +39,9 @@ class Served:
         self.space = standard_space()
         trees = layout(self.image.points)
         assets = Assets(models, trees[0], nameplates_of(catalogue), with_draft=with_draft)
-        self.tree = Tree(self.space, OWN, self.image, lambda at: round(at * 1e9), trees, assets.point)
+        self.tree = Tree(
+            self.space, OWN, self.image, lambda at: round(at * 1e9), trees, stands_for=assets.point
+        )
         indexes = list(range(3, 3 + len(models.namespaces)))
         self.di = indexes[models.namespaces.index(DI_URI)]
         assets.open(self.space, [*indexes, OWN], self.image, lambda at: 0, self.tree.watched)

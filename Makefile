@@ -47,8 +47,8 @@ VCAN := $(ON_VCAN) tests/lab/vcan-run -n 2 -t $(LAB_SECONDS) --
 LAB_RUN := $(ON_VCAN) tests/lab/run-lab -j $(FEW_JOBS) -t $(LAB_SECONDS) --
 PACKAGES := iproute2:ip kmod:insmod can-utils:cansend mbpoll:mbpoll nodejs:node npm:npm chromium:chromium openssl:openssl
 CLIENTS := tests/wire/node
-# What the web page is built on is fetched when the package is installed.
-SCRIPTS := tools/page_scripts.py bridge/northbound/page/package-lock.json
+# What the web page and the OPC UA server are built on is fetched when the package is installed.
+FETCHED := tools/build_hook.py tools/fetched.py tools/nodesets.py tools/page_scripts.py bridge/northbound/page/package-lock.json
 FOREIGN := build/foreign
 REGISTRIES := $(if $(filter 0,$(LAB)),PyPI,all)
 
@@ -242,12 +242,12 @@ $(VENV)/made.stamp: tools/make-venv
 	@tools/make-venv $(VENV) requirements.lock
 	@touch $@
 
-$(VENV)/demo.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock $(SCRIPTS)
+$(VENV)/demo.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock $(FETCHED)
 	@echo "Installing drivebridge into $(VENV)"
 	@$(QUIETLY) $(PIP) install --no-build-isolation -c requirements.lock -e '.[dbc]'
 	@touch $@
 
-$(VENV)/dev.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock $(SCRIPTS)
+$(VENV)/dev.stamp: $(VENV)/made.stamp pyproject.toml requirements.lock $(FETCHED)
 	@echo "Installing drivebridge and the tools for its tests into $(VENV)"
 	@$(QUIETLY) $(PIP) install --no-build-isolation -c requirements.lock -e '.[dev]'
 	@touch $@ $(VENV)/demo.stamp

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from bridge import __version__
 from bridge.base.errors import OperationFailed
 from bridge.catalogue import Catalogue, Source, rights_of
 from bridge.dbc import BusDescription, describe
@@ -18,6 +19,7 @@ from bridge.lint import family_dictionaries
 from bridge.lint.checked_bus import view_bus
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row
 from bridge.northbound.modbus.units import device_maps, drive_maps, units_of
+from bridge.northbound.opcua.nodeset_export import nodeset_of
 from bridge.northbound.zenoh.keys import KeySpace
 from bridge.project import Project
 from bridge.text import Text
@@ -78,6 +80,11 @@ def opcua_table(project: Project) -> ExportTable:
     return ExportTable(("node_id", *_POINT), list(rows))
 
 
+def opcua_nodeset(project: Project) -> str:
+    """The address space as a UANodeSet file."""
+    return nodeset_of(_catalogue(project), __version__)
+
+
 def zenoh_table(project: Project) -> ExportTable:
     """Every key: data type, unit, access, description. Raises ``OperationFailed`` without zenoh."""
     if project.site.zenoh is None:
@@ -109,7 +116,7 @@ def _register(row: Row) -> tuple[object, ...]:
 
 
 def _point(point: Point, *, is_writable: bool) -> tuple[object, ...]:
-    return (point.data_type.value, point.unit, "rw" if is_writable else "r", point.description)
+    return (point.data_type.value, point.unit, "rw" if is_writable else "r", str(point.description))
 
 
 def _catalogue(project: Project) -> Catalogue:

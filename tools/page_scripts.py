@@ -8,7 +8,7 @@ registry (``NPM_CONFIG_REGISTRY``); npm itself is not needed. What the page uses
 A browser resolves no bare module names without an import map, and an import map would be an inline script,
 which the page's content security policy forbids. So ``from "preact"`` becomes ``from "./preact.mjs"`` here.
 
-``python tools/page_scripts.py`` does it by hand.
+``python -m tools.page_scripts`` does it by hand.
 """
 
 from __future__ import annotations
@@ -21,14 +21,13 @@ import os
 import re
 import sys
 import tarfile
-import tempfile
 import urllib.error
 import urllib.request
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from tools.fetched import cache, write
 
 PAGE: Final = Path("bridge/northbound/page")
 VENDOR: Final = PAGE / "static/vendor"
@@ -59,13 +58,6 @@ class ScriptsMissing(Exception):
     """They can be had neither from the cache nor from the registry, or are not what the lock says."""
 
 
-class PageScripts(BuildHookInterface):  # type: ignore[type-arg]
-    """hatchling calls it before it collects the files of a wheel, an editable one, too."""
-
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        place(Path(self.root))
-
-
 def place(root: Path) -> None:
     """Have ``static/vendor`` below ``root`` hold what the lock says. Raises ``ScriptsMissing``."""
     lock = (root / PAGE / "package-lock.json").read_bytes()
@@ -75,8 +67,8 @@ def place(root: Path) -> None:
         return
     for package, pinned in _pinned(lock):
         for name, content in _files(package, _tarball(package, pinned["version"], pinned["integrity"])):
-            _write(root / VENDOR / name, content)
-    _write(mark, json.dumps({"made_of": made_of}).encode())
+            write(root / VENDOR / name, content)
+    write(mark, json.dumps({"made_of": made_of}).encode())
 
 
 def _pinned(lock: bytes) -> Iterator[tuple[str, dict[str, str]]]:
@@ -89,14 +81,14 @@ def _pinned(lock: bytes) -> Iterator[tuple[str, dict[str, str]]]:
 
 def _tarball(package: str, version: str, integrity: str) -> bytes:
     file_name = f"{package.rpartition('/')[2]}-{version}.tgz"
-    cached = _cache() / f"{package.replace('/', '+')}-{version}.tgz"
+    cached = cache("npm") / f"{package.replace('/', '+')}-{version}.tgz"
     if cached.exists() and is_intact(content := cached.read_bytes(), integrity):
         return content
     registry = os.environ.get("NPM_CONFIG_REGISTRY", REGISTRY).rstrip("/")
     content = _fetch(f"{registry}/{package}/-/{file_name}")
     if not is_intact(content, integrity):
         raise ScriptsMissing(f"{file_name} from {registry} is not the one that package-lock.json pins")
-    _write(cached, content)
+    write(cached, content)
     return content
 
 
@@ -109,7 +101,7 @@ def _fetch(url: str) -> bytes:
     except (urllib.error.URLError, OSError) as error:
         raise ScriptsMissing(
             f"{url}: {error}. The scripts of the web page come from there once; without a network, copy "
-            f"{_cache()} from a machine that has built this version"
+            f"{cache('npm')} from a machine that has built this version"
         ) from error
 
 
@@ -148,19 +140,6 @@ def with_own_names(script: str) -> str:
         return f"{found[1]}{found[2]}{name}{found[2]}"
 
     return _SOURCE_MAP.sub("", _IMPORT.sub(own, script))
-
-
-def _cache() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "drivebridge" / "npm"
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Whole or not at all: two builds may run at a time."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-        file.write(content)
-    Path(file.name).chmod(0o644)
-    Path(file.name).replace(path)
 
 
 if __name__ == "__main__":

@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 from bridge.image.point import DataType, Point
-from bridge.mapping.model import Parameter
 from bridge.parameter import Names, ParameterEntry
-
-_MOST_STATES: Final = 256
-"""An enumeration is shown as a list of texts from code 0 on (OPC UA Part 8 §5.3.3.3)."""
 
 
 def parameter_points(name: str, names: Names) -> list[Point]:
@@ -29,10 +23,5 @@ def _point(name: str, entry: ParameterEntry) -> Point:
         high=definition.high,
         writable=definition.writable,
         description=f"{entry.name} {definition.title}",
-        states=tuple(definition.states.items()) if _can_be_listed(definition) else (),
+        states=tuple(definition.states.items()) if definition.value_type.is_integer else (),
     )
-
-
-def _can_be_listed(definition: Parameter) -> bool:
-    is_integer = definition.value_type.is_integer
-    return is_integer and all(0 <= code < _MOST_STATES for code in definition.states)

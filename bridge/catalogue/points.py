@@ -20,15 +20,17 @@ from bridge.config import BusTable, DriveTable, NodeTable, Site
 from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec, scales_of
 from bridge.image.point import DataType, Point
 from bridge.mapping.device_signals import Signal
+from bridge.mapping.entry_types import said_of
 from bridge.mapping.model import Family, Poll, ProcessValue
 from bridge.parameter import Names
+from bridge.text import Text, Words
 
 CONNECTION_COUNTS: Final = {
-    "modbus_refused_connections": "Modbus connections that were refused",
-    "modbus_broken_connections": "Modbus connections that the bridge ended",
-    "opcua_refused_connections": "OPC UA connections, channels and logins that were refused",
-    "opcua_broken_connections": "OPC UA connections that the bridge ended",
-    "zenoh_broken_connections": "zenoh connections that have ended, whoever ended them",
+    "modbus_refused_connections": Text.of("point.modbus_refused"),
+    "modbus_broken_connections": Text.of("point.modbus_broken"),
+    "opcua_refused_connections": Text.of("point.opcua_refused"),
+    "opcua_broken_connections": Text.of("point.opcua_broken"),
+    "zenoh_broken_connections": Text.of("point.zenoh_broken"),
 }
 LIFE_SIGN: Final = "life_sign"
 """Name of the point that offers the token, in ``supervision``, and of the one that takes it, in
@@ -37,11 +39,11 @@ LIFE_SIGN: Final = "life_sign"
 _FLAG, _TEXT, _REAL = DataType.BOOL, DataType.STRING, DataType.FLOAT
 _U8, _U16, _U32 = DataType.UINT8, DataType.UINT16, DataType.UINT32
 
-_REFUSED_WRITES: Final = "refused requests since start"
-_ABORT_CODE: Final = "why the drive last refused an SDO of a client; 0: never"
+_REFUSED_WRITES: Final = Text.of("point.refused_writes")
+_ABORT_CODE: Final = Text.of("point.sdo_abort_code")
 
 
-def _point(top: str, leaf: str, data_type: DataType, description: str, **nature: Any) -> Point:
+def _point(top: str, leaf: str, data_type: DataType, description: Words, **nature: Any) -> Point:
     return Point(name=f"{top}/{leaf}", data_type=data_type, description=description, **nature)
 
 
@@ -73,9 +75,9 @@ def _drive_points(name: str, family: Family, table: DriveTable) -> list[Point]:
     setpoints, actual_values = family.carried(slot)
     values = family.values_of(slot)
     scales = scales_of(family, table.parameters)
-    as_written = "the owner's setpoint word, until a stop replaces it"
-    as_sent = "actual value word as the drive sent it"
-    last = "the owner's control word, or the stop or start that has replaced it"
+    as_written = Text.of("point.setpoint_word")
+    as_sent = Text.of("point.actual_word")
+    last = Text.of("point.control_word")
     return [
         command("control_word", _U16, last, bits=control_bits, writable=True),
         *(command(word, _U16, as_written, writable=True) for word in setpoints[1:]),
@@ -90,7 +92,7 @@ def _drive_points(name: str, family: Family, table: DriveTable) -> list[Point]:
 
 
 def _input_points(name: str, family: Family) -> list[Point]:
-    age = "age of the oldest of its TPDOs; 4294967295: one never came"
+    age = Text.of("point.oldest_pdo_age")
     return [
         _point(f"{name}/node", "pdo_age_ms", _U32, age, unit="ms"),
         _point(f"{name}/supervision", "refused_writes", _U32, _REFUSED_WRITES),
@@ -109,7 +111,7 @@ def _signal(top: str, signal: Signal, *, writable: bool = False) -> Point:
         low=signal.low,
         high=signal.high,
         writable=writable,
-        description=signal.description,
+        description=said_of(signal.description),
         states=tuple(sorted(signal.states.items())),
         bits=tuple(signal.bits),
     )
@@ -132,7 +134,7 @@ _OF_OUTPUTS: Final = (
 def _output_supervision(name: str) -> list[Point]:
     """Points of the supervision of outputs: some of a drive's, by the same names, and ``follows``."""
     points = {point.name.rpartition("/")[2]: point for point in _supervision_points(name, False)}
-    follows = "false while an output has not what its last stop gives it, after the bound"
+    follows = Text.of("point.outputs_follow")
     shared = [points[leaf] for leaf in _OF_OUTPUTS]
     return [*shared, _point(f"{name}/supervision", "follows", _FLAG, follows)]
 
@@ -141,14 +143,14 @@ def _status_points(name: str, family: Family) -> list[Point]:
     bits = tuple(family.status_word.bits)
     point = partial(_point, f"{name}/status")
     return [
-        point("status_word", _U16, "status word; shows fault while the watchdog is tripped", bits=bits),
-        point("drive_status_word", _U16, "status word as the drive sent it", bits=bits),
-        point("state", _U8, "drive state", states=DRIVE_STATES),
-        point("fault_text", _TEXT, "present fault"),
-        point("fault_number", _TEXT, "number of the present fault as its maker writes it, such as E010/10.3"),
-        point("fault_cause", _TEXT, "what may have caused the present fault, by its manual"),
-        point("fault_remedy", _TEXT, "what to do about the present fault, by its manual"),
-        point("emcy_code", _U16, "code of the last emergency message, CiA 301 §7.2.7"),
+        point("status_word", _U16, Text.of("point.status_word"), bits=bits),
+        point("drive_status_word", _U16, Text.of("point.drive_status_word"), bits=bits),
+        point("state", _U8, Text.of("point.drive_state"), states=DRIVE_STATES),
+        point("fault_text", _TEXT, Text.of("point.fault_text")),
+        point("fault_number", _TEXT, Text.of("point.fault_number")),
+        point("fault_cause", _TEXT, Text.of("point.fault_cause")),
+        point("fault_remedy", _TEXT, Text.of("point.fault_remedy")),
+        point("emcy_code", _U16, Text.of("point.emcy_code")),
     ]
 
 
@@ -161,7 +163,7 @@ def _value(name: str, value: ProcessValue, scales: dict[str, LinearScale]) -> Po
         low=low,
         high=high,
         writable=value.group == "command",
-        description=value.description,
+        description=said_of(value.description),
         states=tuple(sorted(value.states.items())),
         bits=tuple(value.bits),
     )
@@ -170,54 +172,52 @@ def _value(name: str, value: ProcessValue, scales: dict[str, LinearScale]) -> Po
 def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
     point = partial(_point, f"{name}/supervision")
     return [
-        point("owner", _TEXT, "who commands the drive"),
-        point("watchdog_state", _U8, "state of the watchdog on the controller", states=WATCHDOG_STATES),
-        point("watchdog_left_ms", _U32, "time until the trip", unit="ms"),
+        point("owner", _TEXT, Text.of("point.owner")),
+        point("watchdog_state", _U8, Text.of("point.watchdog_state"), states=WATCHDOG_STATES),
+        point("watchdog_left_ms", _U32, Text.of("point.watchdog_left"), unit="ms"),
         point(
             "fieldbus_timeout_ms",
             _U32,
-            "how long the controller may be silent; 0: off (as NORD's P151)",
+            Text.of("point.fieldbus_timeout"),
             unit="ms",
             writable=timeout_writable,
         ),
         point(
             "telegram_downtime_s",
             _REAL,
-            "how long the drive may be silent; 0: off, -0.1: errors are ignored (as P513)",
+            Text.of("point.telegram_downtime"),
             unit="s",
         ),
-        point("last_fault", _REAL, "such as 10.3 for E010/10.3"),
-        point("current_fault", _REAL, "present fault; 0: none"),
-        point("last_fault_text", _TEXT, "last fault as its maker writes it, with its text"),
-        point("trips", _U32, "watchdog trips since start"),
+        point("last_fault", _REAL, Text.of("point.last_fault")),
+        point("current_fault", _REAL, Text.of("point.current_fault")),
+        point("last_fault_text", _TEXT, Text.of("point.last_fault_text")),
+        point("trips", _U32, Text.of("point.trips")),
         point(
             "worst_case_stop_ms",
             _U32,
-            "longest time from the controller's last telegram to the stop on the bus",
+            Text.of("point.worst_case_stop"),
             unit="ms",
         ),
-        point("pdo_age_ms", _U32, "age of the last TPDO", unit="ms"),
-        point("sent_control_word", _U16, "control word that the bridge sends to the drive"),
-        point("restart_interlock", _FLAG, "true while a control word that enables is not forwarded"),
+        point("pdo_age_ms", _U32, Text.of("point.pdo_age"), unit="ms"),
+        point("sent_control_word", _U16, Text.of("point.sent_control_word")),
+        point("restart_interlock", _FLAG, Text.of("point.restart_interlock")),
         point("refused_writes", _U32, _REFUSED_WRITES),
         point(
             "worst_case_bridge_ms",
             _U32,
-            "longest time from the moment the bridge hangs to the drive's own reaction",
+            Text.of("point.worst_case_bridge"),
             unit="ms",
         ),
-        point(
-            "follows", _FLAG, "false while the drive still reports enabled after the bound of its last stop"
-        ),
-        point("last_stop", _U8, "how the last stop ended", states=LAST_STOPS),
-        point("telegrams", _U16, "counts the owner's valid telegrams, modulo 65536"),
+        point("follows", _FLAG, Text.of("point.follows")),
+        point("last_stop", _U8, Text.of("point.last_stop"), states=LAST_STOPS),
+        point("telegrams", _U16, Text.of("point.telegrams")),
         point("sdo_abort_code", _U32, _ABORT_CODE),
     ]
 
 
 def _life_points(name: str) -> list[Point]:
-    offered = "token that a telegram has to bring back, another one each second"
-    brought = "token that the owner has brought back last; 0: none that counts"
+    offered = Text.of("point.life_sign_offered")
+    brought = Text.of("point.life_sign_brought")
     return [
         _point(f"{name}/supervision", LIFE_SIGN, _U16, offered),
         _point(f"{name}/command", LIFE_SIGN, _U16, brought, writable=True),
@@ -227,89 +227,88 @@ def _life_points(name: str) -> list[Point]:
 def _identity_points(name: str) -> list[Point]:
     point = partial(_point, f"{name}/identity")
     return [
-        point("vendor", _U32, "vendor id, 1018h:1"),
-        point("product", _U32, "product code, 1018h:2"),
-        point("revision", _U32, "revision number, 1018h:3"),
-        point("serial", _U32, "serial number, 1018h:4"),
-        point("device_name", _TEXT, "device name, 1008h"),
+        point("vendor", _U32, Text.of("point.vendor")),
+        point("product", _U32, Text.of("point.product")),
+        point("revision", _U32, Text.of("point.revision")),
+        point("serial", _U32, Text.of("point.serial")),
+        point("device_name", _TEXT, Text.of("point.device_name")),
     ]
 
 
 def _node_points(node: NodeTable, polls: list[Poll]) -> list[Point]:
     point = partial(_point, f"{node.name}/node")
     return [
-        point("nmt_state", _U8, "NMT state as the node reports it", states=NMT_STATES),
-        point("supervision_state", _TEXT, "heartbeat or guarding"),
-        point("software_version", _TEXT, "version, 100Ah"),
-        point("boot_status", _TEXT, "boot-up step or result"),
-        point(
-            "current_fault", _REAL, "102.0 while a controller of its drives is silent (as NORD's P170[-01])"
+        point("nmt_state", _U8, Text.of("point.nmt_state"), states=NMT_STATES),
+        point("supervision_state", _TEXT, Text.of("point.supervision_state")),
+        point("software_version", _TEXT, Text.of("point.software_version")),
+        point("boot_status", _TEXT, Text.of("point.boot_status")),
+        point("current_fault", _REAL, Text.of("point.node_current_fault")),
+        point("last_fault", _REAL, Text.of("point.node_last_fault")),
+        point("rejected_frames", _U32, Text.of("point.rejected_frames")),
+        point("emcy_history", _TEXT, Text.of("point.emcy_history")),
+        point("emcy_suppressed", _U32, Text.of("point.emcy_suppressed")),
+        *(
+            point(poll.name, poll.data_type, said_of(poll.description), bits=tuple(poll.bits))
+            for poll in polls
         ),
-        point("last_fault", _REAL, "the one before, P170[-02]"),
-        point("rejected_frames", _U32, "received frames that did not match the expected layout"),
-        point("emcy_history", _TEXT, "the last eight emergency messages as JSON, newest first"),
-        point("emcy_suppressed", _U32, "emergency messages not reported because too many came"),
-        *(point(poll.name, poll.data_type, poll.description, bits=tuple(poll.bits)) for poll in polls),
-        point("condition", _U8, "the worst that is wrong with the node or its drives", states=CONDITIONS),
-        point("device_errors", _TEXT, "errors that the node reported at its last boot-up, 1001h and 1003h"),
-        point("state", _U8, "what the bridge does with the node", states=NODE_STATES),
+        point("condition", _U8, Text.of("point.node_condition"), states=CONDITIONS),
+        point("device_errors", _TEXT, Text.of("point.device_errors")),
+        point("state", _U8, Text.of("point.node_state"), states=NODE_STATES),
     ]
 
 
 def _bus_points(bus: BusTable) -> list[Point]:
     point = partial(_point, f"bus/{bus.name}")
     return [
-        point("state", _U8, "state of the CAN controller", states=CONTROLLER_STATES),
-        point("load", _REAL, "bus load", unit="%", low=0, high=100),
-        point(
-            "nmt_state", _U8, "the bridge's own NMT state on this bus, as in its heartbeat", states=NMT_STATES
-        ),
-        point("held_by", _TEXT, "missing nodes for which the others wait"),
-        point("second_master", _FLAG, "another master sent an NMT command within the last minute"),
-        point("unexpected_nodes", _TEXT, "nodes heard within the last minute that are not in the site file"),
-        point("duplicate_ids", _TEXT, "node ids that seemed to be used twice within the last minute"),
-        point("tx_errors", _U32, "transmit error counter"),
-        point("rx_errors", _U32, "receive error counter"),
-        point("frames_lost", _U32, "received frames lost: buffer full"),
-        point("frames_expired", _U32, "frames not sent in time and dropped"),
-        point("error_frames", _U32, "error frames of the controller"),
-        point("last_error", _TEXT, "the latest trouble in words"),
-        point("sync_window_misses", _U32, "synchronous TPDOs that came after the SYNC window"),
-        point("intruders", _U32, "frames of others on identifiers that belong to the bridge alone"),
-        point("last_intruder", _TEXT, "the latest one in words"),
-        point("condition", _U8, "the worst that is wrong on the bus or anything on it", states=CONDITIONS),
-        point("passive", _FLAG, "another bridge is in charge of the bus; this one only listens"),
+        point("state", _U8, Text.of("point.controller_state"), states=CONTROLLER_STATES),
+        point("load", _REAL, Text.of("point.bus_load"), unit="%", low=0, high=100),
+        point("nmt_state", _U8, Text.of("point.own_nmt_state"), states=NMT_STATES),
+        point("held_by", _TEXT, Text.of("point.held_by")),
+        point("second_master", _FLAG, Text.of("point.second_master")),
+        point("unexpected_nodes", _TEXT, Text.of("point.unexpected_nodes")),
+        point("duplicate_ids", _TEXT, Text.of("point.duplicate_ids")),
+        point("tx_errors", _U32, Text.of("point.tx_errors")),
+        point("rx_errors", _U32, Text.of("point.rx_errors")),
+        point("frames_lost", _U32, Text.of("point.frames_lost")),
+        point("frames_expired", _U32, Text.of("point.frames_expired")),
+        point("error_frames", _U32, Text.of("point.error_frames")),
+        point("last_error", _TEXT, Text.of("point.last_error")),
+        point("sync_window_misses", _U32, Text.of("point.sync_window_misses")),
+        point("intruders", _U32, Text.of("point.intruders")),
+        point("last_intruder", _TEXT, Text.of("point.last_intruder")),
+        point("condition", _U8, Text.of("point.bus_condition"), states=CONDITIONS),
+        point("passive", _FLAG, Text.of("point.bus_passive")),
     ]
 
 
 def _bridge_points() -> list[Point]:
     point = partial(_point, "bridge")
     return [
-        point("version", _TEXT, "version of drivebridge"),
-        point("drives_configured", _U32, "drives in the site file"),
-        point("drives_good", _U32, "drives with good data"),
-        point("refused_writes", _U32, "refused requests since start"),
-        point("audit_lost", _U32, "lines missing from the audit log"),
-        point("fronts_failing", _TEXT, "servers and fronts that are not serving, each with the reason"),
+        point("version", _TEXT, Text.of("point.version")),
+        point("drives_configured", _U32, Text.of("point.drives_configured")),
+        point("drives_good", _U32, Text.of("point.drives_good")),
+        point("refused_writes", _U32, Text.of("point.refused_writes")),
+        point("audit_lost", _U32, Text.of("point.audit_lost")),
+        point("fronts_failing", _TEXT, Text.of("point.fronts_failing")),
         point(
             "worst_trip_lateness_ms",
             _REAL,
-            "longest time from a deadline to the stop's hand-over to the bus, since start",
+            Text.of("point.worst_trip_lateness"),
             unit="ms",
         ),
         point(
             "worst_round_lateness_ms",
             _REAL,
-            "longest delay of a round of the bus process, since start",
+            Text.of("point.worst_round_lateness"),
             unit="ms",
         ),
-        point("hangs", _U32, "times for which the bus process could not run for 100 ms or longer"),
-        point("last_hang_ms", _U32, "how long it could not run the last time", unit="ms"),
-        point("condition", _U8, "the worst that is wrong anywhere", states=CONDITIONS),
-        point("troubles", _TEXT, "what is wrong as JSON, the worst first, each with what it explains"),
-        point("recent_troubles", _TEXT, "what was wrong and is over since ten minutes at most, as JSON"),
-        point("drives_waiting", _U32, "drives that do not tell their state yet, with nothing wrong"),
-        point("stops_unproven", _TEXT, "drives that may run on when the bridge falls silent"),
-        point("missed_deadlines", _U32, "deadlines of drives that the bridge had not planned, since start"),
-        *(point(leaf, _U32, f"{what}, since start") for leaf, what in CONNECTION_COUNTS.items()),
+        point("hangs", _U32, Text.of("point.hangs")),
+        point("last_hang_ms", _U32, Text.of("point.last_hang"), unit="ms"),
+        point("condition", _U8, Text.of("point.bridge_condition"), states=CONDITIONS),
+        point("troubles", _TEXT, Text.of("point.troubles")),
+        point("recent_troubles", _TEXT, Text.of("point.recent_troubles")),
+        point("drives_waiting", _U32, Text.of("point.drives_waiting")),
+        point("stops_unproven", _TEXT, Text.of("point.stops_unproven")),
+        point("missed_deadlines", _U32, Text.of("point.missed_deadlines")),
+        *(point(leaf, _U32, what) for leaf, what in CONNECTION_COUNTS.items()),
     ]

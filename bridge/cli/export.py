@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from bridge.exports import ExportTable, dbc_file, modbus_table, opcua_table, zenoh_table
+from bridge.base.errors import OperationFailed
+from bridge.exports import (
+    ExportTable,
+    dbc_file,
+    modbus_table,
+    opcua_nodeset,
+    opcua_table,
+    zenoh_table,
+)
 from bridge.project import load_project
 
 app = typer.Typer(
@@ -25,9 +33,32 @@ def modbus(site: SiteArgument, as_json: AsJson = False) -> None:
 
 
 @app.command()
-def opcua(site: SiteArgument, as_json: AsJson = False) -> None:
+def opcua(
+    site: SiteArgument,
+    as_json: AsJson = False,
+    nodeset2: Annotated[
+        bool, typer.Option("--nodeset2", help="the whole address space as a UANodeSet file instead")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="where to, instead of the terminal")
+    ] = None,
+) -> None:
     """Every variable: NodeId, data type, unit, access, description."""
-    _print(opcua_table(load_project(site)), as_json)
+    project = load_project(site)
+    if nodeset2 and as_json:
+        raise typer.BadParameter("--nodeset2 is XML, --json is not", param_hint="--json")
+    if nodeset2:
+        told = opcua_nodeset(project)
+    else:
+        table = opcua_table(project)
+        told = table.as_json() if as_json else table.as_csv()
+    if output is None:
+        print(told, end="")
+        return
+    try:
+        output.write_text(told, encoding="utf-8")
+    except OSError as error:
+        raise OperationFailed(f"{output}: {error.strerror or error}") from None
 
 
 @app.command()

@@ -358,12 +358,17 @@ def client_of(identity: Identity) -> str:
 
 def _goes_on(before: _Telegrams, entry: AuditEntry) -> bool:
     """Whether this telegram of the same controller brings only new setpoints, with the same outcome."""
-    word = entry.new.get("control_word", before.new.get("control_word"))
+    asked = _control_word(before.new)
     return (
         before.ending == entry.ending
-        and before.new.get("control_word") == word
+        and (_control_word(entry.new) or asked) == asked
         and entry.new.keys() <= before.new.keys()
     )
+
+
+def _control_word(values: Values) -> Values:
+    """The control word among the values, and its bits."""
+    return {leaf: value for leaf, value in values.items() if leaf.partition(".")[0] == "control_word"}
 
 
 def _asked(request: Request) -> Values:

@@ -350,6 +350,9 @@ class OpcUaTable(ListeningTable):
     certificate: str | None = None
     private_key: str | None = None
     trusted_dir: str | None = None
+    powertrain_draft: bool = Field(
+        False, description="true serves a draft of OPC 40400-2, which is not published yet"
+    )
     history: OpcUaHistoryTable = Field(default_factory=lambda: OpcUaHistoryTable.model_validate({}))
     acknowledge_resets: bool = Field(
         False, description="true has whoever acknowledges the alarm of a drive reset its fault"

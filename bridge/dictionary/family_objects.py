@@ -53,7 +53,7 @@ def _add_poll(dictionary: ObjectDictionary, poll: Poll) -> None:
     variable.data_type = _TYPES[poll.data_type]
     if not variable.access_type:
         variable.access_type = "ro"
-    variable.description = one_line(poll.description)
+    variable.description = one_line(str(poll.description))
     variable.bit_definitions = {name: [bit] for bit, name in enumerate(poll.bits) if name}
 
 

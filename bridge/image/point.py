@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from bridge.canopen.datatypes import INTEGERS
+from bridge.text import Words
 
 Value = bool | int | float | str
 
@@ -51,7 +52,7 @@ class Point:
     low: float | None = None
     high: float | None = None
     writable: bool = False
-    description: str = ""
+    description: Words = ""
     states: tuple[tuple[int, str], ...] = ()
     bits: tuple[str, ...] = ()
     added: int = 0

@@ -13,7 +13,7 @@ from pydantic import Field
 from bridge.canopen.datatypes import INTEGERS
 from bridge.image import DataType, Value
 from bridge.image.limits import ValueNotTaken, out_of_range
-from bridge.mapping.entry_types import Name, Ref, States, Table
+from bridge.mapping.entry_types import Name, Ref, States, Table, Wording
 from bridge.mapping.parameters import VALUE_TYPES
 from bridge.mapping.process import LARGEST_REAL, Process
 from bridge.text import Text
@@ -40,7 +40,7 @@ class Signal(Table):
     bits: Annotated[list[str], Field(max_length=32)] = Field(
         default_factory=list[str], description="names of the bits from bit 0 on"
     )
-    description: str = ""
+    description: str | Wording = ""
 
     @property
     def is_scaled(self) -> bool:

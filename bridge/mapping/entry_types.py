@@ -156,6 +156,10 @@ class Wording(Table):
     en: str
     de: str
 
+    def __str__(self) -> str:
+        """In English, for whoever knows one language."""
+        return self.en
+
     @property
     def said(self) -> Text:
         """The sentence in the reader's language."""

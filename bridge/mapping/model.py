@@ -35,6 +35,10 @@ class FamilyTable(Table):
     name: str
     vendor: str
     source: str = Field(description="the manual that the facts of this file are taken from")
+    drive_type: Literal["frequency_converter", "servo_drive", "variable_speed_drive"] | None = Field(
+        None,
+        description="type of its drives in OPC 40400-1, for OPC UA. Left out: a drive of whatever type",
+    )
     profile: int | None = Field(
         None,
         ge=0,
@@ -156,7 +160,7 @@ class Poll(Table):
     object: Ref
     data_type: Kind
     every_ms: int = Field(ge=100)
-    description: str = ""
+    description: str | Wording = ""
     bits: list[str] = Field(default_factory=list[str])
 
 

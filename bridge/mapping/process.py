@@ -248,7 +248,7 @@ class ProcessValue(Table):
         description="text where a parameter in `when` has another value; left out: that it means "
         "something else",
     )
-    description: str = ""
+    description: str | Wording = ""
 
     @property
     def leaf(self) -> str:

@@ -7,8 +7,10 @@ from collections.abc import Coroutine, Mapping
 from contextlib import AsyncExitStack
 from pathlib import Path
 
+from bridge.catalogue import Catalogue
 from bridge.northbound.listening import ListeningSocket
 from bridge.northbound.opcua.alarm_server import AlarmSite
+from bridge.northbound.opcua.nameplates import nameplates_of
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.trouble_words import PlantWords
 from bridge.northbound.view import View
@@ -43,6 +45,7 @@ def run_opcua(path: Path, signs: int | None, listening: int | None) -> Coroutine
     project = load_project(path)
     site = project.site
     settings = required(site.opcua, "opcua")
+    nameplates = nameplates_of(Catalogue.of(site, project.families))
 
     alarm_site = alarm_site_of(project)
 
@@ -51,7 +54,8 @@ def run_opcua(path: Path, signs: int | None, listening: int | None) -> Coroutine
         gc.disable()
         stack.callback(gc.enable)
         bound = None if listening is None else ListeningSocket(listening, "opcua.listen")
-        server = OpcUaServer(mirror, settings, Path(site.site.state_dir), site.site.name, bound, alarm_site)
+        folder = Path(site.site.state_dir)
+        server = OpcUaServer(mirror, settings, folder, site.site.name, bound, alarm_site, nameplates)
         await server.start()
         stack.push_async_callback(server.close)
         gc.collect()

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Protocol
 
-from asyncua.server.address_space import AttributeValue, NodeData
+from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
-from bridge.uaserver.library import AttributeIds, ua
+from bridge.uaserver.library import AttributeIds, data_value, get, ua, variant
 
 
 class Watcher(Protocol):
@@ -20,6 +20,10 @@ class Watcher(Protocol):
 
 Watchers = dict[int, Watcher]
 """Watchers of one attribute, by handle."""
+
+
+def constant(value: object, kind: ua.VariantType) -> AttributeValue:
+    return AttributeValue(data_value(variant(value, kind)))
 
 
 def is_empty(held: AttributeValue) -> bool:
@@ -60,14 +64,22 @@ class Attributes(Mapping[AttributeIds, AttributeValue]):
         return len(self._common)
 
 
-class Nodes(dict[ua.NodeId, NodeData]):
-    """The nodes that asyncua holds, and behind them those that ``find`` makes."""
+Find = Callable[[ua.NodeId], NodeData | None]
+"""Makes a node, None where there is no such one."""
 
-    def __init__(
-        self, held: Mapping[ua.NodeId, NodeData], find: Callable[[ua.NodeId], NodeData | None]
-    ) -> None:
+
+class Nodes(dict[ua.NodeId, NodeData]):
+    """The nodes that asyncua holds, and behind them those that one of ``finds`` makes."""
+
+    def __init__(self, held: Mapping[ua.NodeId, NodeData], *finds: Find) -> None:
         super().__init__(held)
-        self._find = find
+        self.finds = list(finds)
+
+    def _find(self, where: ua.NodeId) -> NodeData | None:
+        for find in self.finds:
+            if found := find(where):
+                return found
+        return None
 
     def __missing__(self, where: ua.NodeId) -> NodeData:
         found = self._find(where)
@@ -83,3 +95,12 @@ class Nodes(dict[ua.NodeId, NodeData]):
 
     def __contains__(self, where: object) -> bool:
         return super().__contains__(where) or (isinstance(where, ua.NodeId) and self._find(where) is not None)
+
+
+def put_behind(space: AddressSpace, find: Find) -> None:
+    """Have the nodes that ``find`` makes found in ``space``, where nobody before it has them."""
+    nodes = get(space, "_nodes")
+    if not isinstance(nodes, Nodes):
+        # asyncua puts a mapping of its own there, too, for nodes that it loads when they are asked for.
+        nodes = space._nodes = Nodes(nodes)  # pyright: ignore[reportPrivateUsage]
+    nodes.finds.append(find)

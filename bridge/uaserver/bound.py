@@ -31,7 +31,7 @@ class BoundServer(LibraryServer):
         await self._setup_server_nodes()
         policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
         await self._inner.start()
-        describe(self._inner.aspace)
+        describe(self._inner.aspace, self._inner.locales)
         self.bserver = TcpAcceptor(self._inner, self._bound, self.limits)
         self.bserver.set_policies(policies)
         await self.bserver.start()

@@ -7,7 +7,7 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace
 
-from bridge.uaserver.library import AttributeIds, ObjectIds, StatusCodes, get, node_id, ua
+from bridge.uaserver.library import AttributeIds, ObjectIds, StatusCodes, get, make, node_id, ua
 
 _BASE_EVENT: Final = node_id(ObjectIds.BaseEventType)
 _NULL: Final = node_id(ObjectIds.Null)
@@ -27,6 +27,26 @@ def related(
     for found in node.references if node else ():
         if get(found, "IsForward") == forward and get(found, "ReferenceTypeId") == wanted:
             yield found
+
+
+def reference_to(
+    space: AddressSpace, target: ua.NodeId, reference: ua.NodeId, *, forward: bool
+) -> ua.ReferenceDescription:
+    """A reference of this type to a node of ``space``, as asyncua describes it."""
+    fields = {
+        name: get(space.read_attribute_value(target, attribute).Value, "Value")
+        for name, attribute in (
+            ("NodeClass", AttributeIds.NodeClass),
+            ("BrowseName", AttributeIds.BrowseName),
+            ("DisplayName", AttributeIds.DisplayName),
+        )
+    }
+    of_type = next(related(space, target, ObjectIds.HasTypeDefinition), None)
+    if of_type:
+        fields["TypeDefinition"] = get(of_type, "NodeId")
+    return make(
+        ua.ReferenceDescription, ReferenceTypeId=reference, IsForward=forward, NodeId=target, **fields
+    )
 
 
 def subtypes(space: AddressSpace, root: ua.NodeId) -> set[ua.NodeId]:

@@ -6,7 +6,7 @@ without one (BadAttributeIdInvalid).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Final
 
@@ -56,11 +56,12 @@ _CHANGES_OF_HISTORY: Final = (
     "InsertAnnotation",
 )
 
+LOCALES: Final = f"{_CAN}LocaleIdArray"
+
 VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_STATUS}SecondsTillShutdown": variant(0, _Type.UInt32),
     f"{_STATUS}ShutdownReason": variant(ua.LocalizedText(), _Type.LocalizedText),
     "Server_Auditing": variant(False, _Type.Boolean),
-    f"{_CAN}LocaleIdArray": variant(["en"], _Type.String),
     f"{_CAN}MaxBrowseContinuationPoints": variant(MOST_CONTINUATION_POINTS, _Type.UInt16),
     f"{_CAN}MaxQueryContinuationPoints": variant(0, _Type.UInt16),
     f"{_CAN}MaxHistoryContinuationPoints": variant(historyread.MOST_CONTINUATION_POINTS, _Type.UInt16),
@@ -97,10 +98,11 @@ NOT_DONE: Final = (
 _NOTHING: Final = variant(None, _Type.Null)
 
 
-def describe(space: AddressSpace) -> None:
-    """Give the nodes of asyncua's in ``space`` the values that are true, and take away what is empty."""
+def describe(space: AddressSpace, locales: Sequence[str]) -> None:
+    """Give the nodes of asyncua's in ``space`` the values that are true, and take away what is empty.
+    ``locales`` are those of its texts, the first for who asks for none of them."""
     now = datetime.now(UTC)
-    for name, value in VALUES.items():
+    for name, value in {**VALUES, LOCALES: variant(list(locales), _Type.String)}.items():
         attributes = space[node_id(get(ObjectIds, name))].attributes
         attributes[AttributeIds.Value] = AttributeValue(data_value(value, None, now))
     for name in NOT_DONE:

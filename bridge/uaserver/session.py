@@ -241,6 +241,8 @@ class InnerServer(InternalServer):
     """
 
     application: ServedApplication[Any]
+    locales: Sequence[str] = ("en",)
+    """LocaleIds of the texts in the address space."""
     conditions: Conditions | None = None
     """Conditions of the application; None where it has none."""
 

@@ -17,6 +17,8 @@ from bridge.northbound.opcua.structures import (
     property_nodes,
     value_type,
 )
+from bridge.northbound.opcua.words import named, spoken
+from bridge.text import Text, Words
 from bridge.uaserver.address_space import is_empty
 from bridge.uaserver.library import make, node_id, text
 
@@ -118,7 +120,9 @@ class HeldTree:
         self._properties(method, where)
 
     def _variable(self, node: VariableNode, parent: ua.NodeId) -> None:
-        told = node.point.description if node.bit is None else f"bit {node.bit} of {node.point.leaf}"
+        told = node.point.description
+        if node.bit is not None:
+            told = Text.of("point.bit", number=node.bit, word=node.point.leaf)
         attributes = point_attributes(value_type(node), writable=node.writable, kept=node.kept)
         where = self._add(
             node, ua.NodeClass.Variable, attributes, _TYPES[node.kind], parent, Ids.HasComponent, told
@@ -145,10 +149,13 @@ class HeldTree:
         type_id: int,
         parent: ua.NodeId,
         reference: int,
-        description: str = "",
+        description: Words = "",
         namespace: int | None = None,
     ) -> ua.NodeId:
-        attributes.DisplayName, attributes.Description = text(node.browse_name), text(description)
+        of_site = isinstance(node, ObjectNode) and not node.folder
+        own = not of_site and namespace is None
+        attributes.DisplayName = named(node.browse_name) if own else text(node.browse_name)
+        attributes.Description = spoken(description)
         item = make(
             ua.AddNodesItem,
             RequestedNewNodeId=node_id(node.id, self._namespace),

@@ -14,6 +14,7 @@ from bridge.command import Identification, Outcome, Plant, PlantView, Rejection,
 from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import DONE, NODE_ACTIONS, Code, Reply
 from bridge.config import OpcUaTable
+from bridge.northbound.opcua.nameplates import nameplates_of
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support import sites
 from tests.support.node_states import node_goes, run_timers
@@ -100,7 +101,8 @@ async def serving(
     settings: OpcUaTable, state_dir: Path, plant: Plant | None = None
 ) -> AsyncIterator[tuple[OpcUaServer, LocalView]]:
     view = LocalView(plant or make_plant())
-    server = OpcUaServer(view, settings, state_dir, "hall")
+    nameplates = nameplates_of(view.plant.catalogue)
+    server = OpcUaServer(view, settings, state_dir, "hall", nameplates=nameplates)
     await server.start()
     drives = asyncio.create_task(view.run())
     try:

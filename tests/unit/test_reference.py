@@ -300,7 +300,7 @@ def test_every_command_and_option_is_described() -> None:
             for option in parameter.opts
             if option.startswith("--")
         }
-        assert set(re.findall(r"--[a-z-]+", shown)) == options, name
+        assert set(re.findall(r"--[a-z0-9-]+", shown)) == options, name
 
 
 # explanation

@@ -124,7 +124,7 @@ def polls(family: Family) -> Iterator[str]:
                 object_text(poll.object),
                 poll.data_type.value,
                 f"{poll.every_ms} ms",
-                poll.description
+                str(poll.description)
                 + (
                     "; bits: " + ", ".join(f"{bit} {name}" for bit, name in enumerate(poll.bits) if name)
                     if poll.bits

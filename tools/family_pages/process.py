@@ -112,7 +112,7 @@ def _made_of(family: Family, value: ProcessValue) -> str:
 
 
 def _meaning(family: Family, value: ProcessValue) -> str:
-    parts = [value.description] if value.description else []
+    parts = [str(value.description)] if value.description else []
     told = {meaning.word: meaning.parameter for meaning in family.meaning if meaning.group == value.group}
     if value.word_names and value.code:
         pairs = zip(value.word_names, value.code, strict=True)

@@ -15,6 +15,7 @@ from bridge.mapping.model import Family, Slot
 from bridge.text import Said, Text, render
 
 _WORD_MASK = 0xFFFF
+_WORD_BITS = 16
 
 
 class Refusal(Exception):
@@ -35,6 +36,26 @@ class Telegram:
 
     control_word: int | None
     setpoints: tuple[int, ...]
+
+
+class _Bits:
+    """Bits that a write changes in one word."""
+
+    def __init__(self) -> None:
+        self._mask = 0
+        self._bits = 0
+
+    def put(self, leaf: str, bit: str, value: Value) -> None:
+        if not bit.isdecimal() or int(bit) >= _WORD_BITS:
+            raise Refusal(Code.OUT_OF_RANGE, Text.of("telegram.no_bit", leaf=leaf, bits=_WORD_BITS))
+        if value not in (0, 1):
+            said = Text.of("value.of", name=leaf, said=Text.of("takes.bool", value=repr(value)))
+            raise Refusal(Code.OUT_OF_RANGE, said)
+        self._mask |= 1 << int(bit)
+        self._bits |= int(value) << int(bit)
+
+    def over(self, word: int) -> int:
+        return word & ~self._mask | self._bits
 
 
 class _Setpoints:
@@ -106,11 +127,16 @@ class TelegramDecoder:
         self, values: Mapping[str, Value], before: tuple[int, ...], held: int, is_heard: bool
     ) -> Telegram:
         """The words to be sent; setpoints that are not written stay as ``before``. ``held`` is the control
-        word that counts where none is written. ``is_heard``: the drive's status is of now. Raises
-        ``Refusal``."""
+        word that counts where none is written. A name with a number behind a dot is one bit: of the control
+        word, of a setpoint word or of a value, all else of which stays. ``is_heard``: the drive's status is
+        of now. Raises ``Refusal``."""
+        values, bits = _apart(values)
         control_word = _as_word("control_word", values["control_word"]) if "control_word" in values else None
+        if "control_word" in bits:
+            control_word = bits.pop("control_word").over(held if control_word is None else control_word)
         word = held if control_word is None else control_word
         in_set, was = self._set.of(word), self._set.of(held)
+        values |= {leaf: one.over(self._held(leaf, values, before, in_set)) for leaf, one in bits.items()}
         stops = control_word is not None and not self._words.enables(word)
         setpoints = _Setpoints()
         # The raw words first: where a scaled value contradicts one, it is the scaled one that is wrong.
@@ -129,6 +155,18 @@ class TelegramDecoder:
         if in_set != was:
             after = self._in_other_set(before, after, setpoints.places, was, word)
         return Telegram(control_word, after)
+
+    def _held(self, leaf: str, values: Mapping[str, Value], before: tuple[int, ...], in_set: int) -> int:
+        """The word or value that bits are changed in."""
+        if leaf in values:
+            return _as_word(leaf, values[leaf])
+        place, codec = self._setpoints.get(leaf), self._values.get(leaf)
+        if place is not None:
+            return before[place]
+        if codec is None or not codec.model.bits:
+            said = Text.of("telegram.no_bit", leaf=leaf, bits=0)
+            raise Refusal(Code.OUT_OF_RANGE, said)
+        return int(self._meanings.codec(codec, in_set)[0].from_words(before))
 
     def _written(self, leaf: str, value: Value, in_set: int) -> tuple[MaskedBits, ...]:
         place, codec = self._setpoints.get(leaf), self._values.get(leaf)
@@ -210,6 +248,19 @@ class TelegramDecoder:
             said = Text.of("telegram.set_not_known", names=names, in_set=in_set)
             raise Refusal(Code.NOT_CONFIGURED, said)
         return tuple(kept)
+
+
+def _apart(values: Mapping[str, Value]) -> tuple[dict[str, Value], dict[str, _Bits]]:
+    """Whole values, and the bits beside them by what they are bits of."""
+    whole: dict[str, Value] = {}
+    bits: dict[str, _Bits] = {}
+    for leaf, value in values.items():
+        name, _, bit = leaf.partition(".")
+        if bit:
+            bits.setdefault(name, _Bits()).put(leaf, bit, value)
+        else:
+            whole[leaf] = value
+    return whole, bits
 
 
 def _not_configured(leaf: str, why: Said) -> Refusal:

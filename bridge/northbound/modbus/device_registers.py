@@ -144,6 +144,6 @@ def _signals(
         kind, size = ("float32", 2)
         if point.data_type is not DataType.FLOAT:
             kind, size = _WIDTHS[signal.data_type]
-        rows.append(Row(table, address, leaf, kind, access, point.unit, point.description))
+        rows.append(Row(table, address, leaf, kind, access, point.unit, str(point.description)))
         address += size
     return bits, rows

@@ -271,7 +271,7 @@ def value_rows(
         elif point.data_type in (DataType.INT16, DataType.INT32):
             kind = "int32"
         access, place = _access(allows.write(point)), first + 2 * position
-        rows.append(Row(table, place, leaf, kind, access, point.unit, point.description))
+        rows.append(Row(table, place, leaf, kind, access, point.unit, str(point.description)))
     return tuple(rows)
 
 

@@ -14,11 +14,12 @@ from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.northbound.opcua.alarm_places import CERTIFICATE, AlarmPlace
 from bridge.northbound.opcua.event_types import ALARM_FIELDS
-from bridge.northbound.opcua.kinds import Kinds, Name, constant, node_attributes, reference_to
+from bridge.northbound.opcua.kinds import Kinds, Name, node_attributes
 from bridge.northbound.opcua.structures import READ, variable_attributes
-from bridge.uaserver.address_space import Attributes, Watchers
+from bridge.uaserver.address_space import Attributes, Watchers, constant
 from bridge.uaserver.condition_fields import field_value
 from bridge.uaserver.conditions import Condition, Conditions
+from bridge.uaserver.hierarchy import reference_to
 from bridge.uaserver.library import (
     AttributeIds,
     ObjectIds,
@@ -35,6 +36,7 @@ _SCALAR: Final = -1
 _HAS_CONDITION: Final = node_id(ObjectIds.HasCondition)
 _HAS_COMPONENT: Final = node_id(ObjectIds.HasComponent)
 _HAS_PROPERTY: Final = node_id(ObjectIds.HasProperty)
+_HAS_TYPE_DEFINITION: Final = node_id(ObjectIds.HasTypeDefinition)
 _METHODS: Final = {
     "": (
         ObjectIds.ConditionType_Enable,
@@ -320,11 +322,11 @@ class AlarmNodes:
         yield _AlarmNode(self, node.alarm, part).refer(reference, forward=False)
 
     def _to_type_of(self, kind: ua.NodeId) -> ua.ReferenceDescription:
-        return reference_to(self._space, kind, ObjectIds.HasTypeDefinition, forward=True)
+        return reference_to(self._space, kind, _HAS_TYPE_DEFINITION, forward=True)
 
     def _to_methods_of(self, path: str) -> tuple[ua.ReferenceDescription, ...]:
         return tuple(
-            reference_to(self._space, method, ObjectIds.HasComponent, forward=True)
+            reference_to(self._space, node_id(method), _HAS_COMPONENT, forward=True)
             for method in _METHODS.get(path, ())
         )
 

@@ -71,7 +71,7 @@ def serve_alarms(
     words = ConditionWords(lambda state: in_all_languages(Text.word("alarm_state", state)))
     conditions = inner.conditions = Conditions(inner.subscriptions, rights, words, _now_ms)
     contents = AlarmContents(view.image, site.words, tree.namespace)
-    types = _types(EventTypeMaker(inner, tree.namespace))
+    types = _types(EventTypeMaker(inner.node_mgt_service, tree.namespace))
     alarms = list(_alarms(types, tree, site, contents, certificate))
     nodes = AlarmNodes(inner.aspace, tree.namespace, tree.kinds, conditions, alarms)
     for alarm in alarms:
@@ -117,7 +117,7 @@ def _alarms(
         kind, key = types[place.kind], (place.kind, place.name)
         if key not in common:
             class_id, name = _CLASSES["drive" if place.kind == "drive" else "other"]
-            more = _of_certificate(certificate) if place.kind == CERTIFICATE else {}
+            more: Fields = _of_certificate(certificate) if place.kind == CERTIFICATE else {}
             common[key] = common_fields(kind, place.name, class_id, in_all_languages(name), more)
         described = ConditionPlace(
             node_id(place.id, tree.namespace),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from bridge.text import Text, Words
+
 UNIT_NAMESPACE: Final = "http://www.opcfoundation.org/UA/units/un/cefact"
 
 NO_UNIT_ID: Final = -1
@@ -11,41 +13,41 @@ NO_UNIT_ID: Final = -1
 
 # UNECE Recommendation 20, common codes.
 _COMMON_CODES: Final = {
-    "Hz": ("HTZ", "hertz"),
-    "kHz": ("KHZ", "kilohertz"),
-    "A": ("AMP", "ampere"),
-    "mA": ("4K", "milliampere"),
-    "V": ("VLT", "volt"),
-    "mV": ("2Z", "millivolt"),
-    "W": ("WTT", "watt"),
-    "kW": ("KWT", "kilowatt"),
-    "kWh": ("KWH", "kilowatt hour"),
-    "%": ("P1", "percent"),
-    "µs": ("B98", "microsecond"),
-    "ms": ("C26", "millisecond"),
-    "s": ("SEC", "second"),
-    "min": ("MIN", "minute"),
-    "h": ("HUR", "hour"),
-    "d": ("DAY", "day"),
-    "rpm": ("RPM", "revolutions per minute"),
-    "1/min": ("RPM", "revolutions per minute"),
-    "1/s": ("RPS", "revolutions per second"),
-    "rev": ("M44", "revolution"),
-    "°": ("DD", "degree"),
-    "rad": ("C81", "radian"),
-    "mm": ("MMT", "millimetre"),
-    "m": ("MTR", "metre"),
-    "µm": ("4H", "micrometre"),
-    "mm/s": ("C16", "millimetre per second"),
-    "m/s": ("MTS", "metre per second"),
-    "m/s²": ("MSK", "metre per second squared"),
-    "N": ("NEW", "newton"),
-    "Nm": ("NU", "newton metre"),
-    "kg": ("KGM", "kilogram"),
-    "°C": ("CEL", "degree Celsius"),
-    "K": ("KEL", "kelvin"),
-    "bar": ("BAR", "bar"),
-    "Ω": ("OHM", "ohm"),
+    "Hz": ("HTZ", Text.of("unit.hertz")),
+    "kHz": ("KHZ", Text.of("unit.kilohertz")),
+    "A": ("AMP", Text.of("unit.ampere")),
+    "mA": ("4K", Text.of("unit.milliampere")),
+    "V": ("VLT", Text.of("unit.volt")),
+    "mV": ("2Z", Text.of("unit.millivolt")),
+    "W": ("WTT", Text.of("unit.watt")),
+    "kW": ("KWT", Text.of("unit.kilowatt")),
+    "kWh": ("KWH", Text.of("unit.kilowatt_hour")),
+    "%": ("P1", Text.of("unit.percent")),
+    "µs": ("B98", Text.of("unit.microsecond")),
+    "ms": ("C26", Text.of("unit.millisecond")),
+    "s": ("SEC", Text.of("unit.second")),
+    "min": ("MIN", Text.of("unit.minute")),
+    "h": ("HUR", Text.of("unit.hour")),
+    "d": ("DAY", Text.of("unit.day")),
+    "rpm": ("RPM", Text.of("unit.revolutions_per_minute")),
+    "1/min": ("RPM", Text.of("unit.revolutions_per_minute")),
+    "1/s": ("RPS", Text.of("unit.revolutions_per_second")),
+    "rev": ("M44", Text.of("unit.revolution")),
+    "°": ("DD", Text.of("unit.degree")),
+    "rad": ("C81", Text.of("unit.radian")),
+    "mm": ("MMT", Text.of("unit.millimetre")),
+    "m": ("MTR", Text.of("unit.metre")),
+    "µm": ("4H", Text.of("unit.micrometre")),
+    "mm/s": ("C16", Text.of("unit.millimetre_per_second")),
+    "m/s": ("MTS", Text.of("unit.metre_per_second")),
+    "m/s²": ("MSK", Text.of("unit.metre_per_second_squared")),
+    "N": ("NEW", Text.of("unit.newton")),
+    "Nm": ("NU", Text.of("unit.newton_metre")),
+    "kg": ("KGM", Text.of("unit.kilogram")),
+    "°C": ("CEL", Text.of("unit.degree_celsius")),
+    "K": ("KEL", Text.of("unit.kelvin")),
+    "bar": ("BAR", Text.of("unit.bar")),
+    "Ω": ("OHM", Text.of("unit.ohm")),
 }
 
 
@@ -55,6 +57,6 @@ def unit_id(unit: str) -> int:
     return int.from_bytes(known[0].encode("ascii"), "big") if known else NO_UNIT_ID
 
 
-def unit_description(unit: str) -> str:
+def unit_description(unit: str) -> Words:
     known = _COMMON_CODES.get(unit)
     return known[1] if known else unit

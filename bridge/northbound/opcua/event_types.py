@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 
-from asyncua.server.internal_server import InternalServer
+from asyncua.server.address_space import NodeManagementService
 
 from bridge.command import EventKind
 from bridge.northbound.opcua.nodes import pascal_case
@@ -62,10 +62,10 @@ def type_name(kind: EventKind) -> str:
 
 
 class EventTypeMaker:
-    """Makes types in a server's address space, with ids that are their names, in ``namespace``."""
+    """Makes types in the address space of ``management``, with ids that are their names, in ``namespace``."""
 
-    def __init__(self, inner: InternalServer, namespace: int) -> None:
-        self._inner = inner
+    def __init__(self, management: NodeManagementService, namespace: int) -> None:
+        self._management = management
         self._namespace = namespace
 
     def make(self, name: str, parent: ua.NodeId, fields: Iterable[EventField] = ()) -> ua.NodeId:
@@ -87,7 +87,7 @@ class EventTypeMaker:
             TargetNodeId=kind,
             TargetNodeClass=ua.NodeClass.ObjectType,
         )
-        (code,) = self._inner.node_mgt_service.add_references([item])
+        (code,) = self._management.add_references([item])
         code.check()
 
     def _add_field(self, owner: ua.NodeId, above: str, field: EventField) -> None:
@@ -112,7 +112,7 @@ class EventTypeMaker:
             TargetNodeId=node_id(ObjectIds.ModellingRule_Mandatory),
             TargetNodeClass=ua.NodeClass.Object,
         )
-        (code,) = self._inner.node_mgt_service.add_references([item])
+        (code,) = self._management.add_references([item])
         code.check()
 
     def _add(
@@ -135,5 +135,5 @@ class EventTypeMaker:
             NodeAttributes=attributes,
             TypeDefinition=type_definition or ua.NodeId(),
         )
-        (result,) = self._inner.node_mgt_service.add_nodes([item])
+        (result,) = self._management.add_nodes([item])
         get(result, "StatusCode").check()

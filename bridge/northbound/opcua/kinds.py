@@ -25,19 +25,18 @@ from bridge.northbound.opcua.structures import (
     property_attributes,
     value_type,
 )
-from bridge.uaserver.address_space import is_empty
-from bridge.uaserver.hierarchy import related
+from bridge.northbound.opcua.words import named, spoken
+from bridge.text import Words
+from bridge.uaserver.address_space import constant, is_empty
+from bridge.uaserver.hierarchy import reference_to
 from bridge.uaserver.library import (
     AttributeIds,
     ObjectIds,
     change,
-    data_value,
-    get,
     make,
     node_id,
     text,
     ua,
-    variant,
 )
 
 Node = ObjectNode | MethodNode | VariableNode | PropertyNode | FileNode | LiveProperty
@@ -49,6 +48,7 @@ _TYPE_DEFINITION: Final = {
     VariableKind.PLAIN: ObjectIds.BaseDataVariableType,
     VariableKind.ANALOG: ObjectIds.AnalogUnitType,
     VariableKind.MULTI_STATE: ObjectIds.MultiStateDiscreteType,
+    VariableKind.MULTI_STATE_VALUE: ObjectIds.MultiStateValueDiscreteType,
     VariableKind.TWO_STATE: ObjectIds.TwoStateDiscreteType,
 }
 
@@ -121,21 +121,18 @@ class Kinds:
             change(held, SourceTimestamp=self._built_at, ServerTimestamp=self._built_at)
         to_type = ()
         if type_id != ObjectIds.Null:
-            to_type = (reference_to(self._space, type_id, ObjectIds.HasTypeDefinition, forward=True),)
+            kind = node_id(ObjectIds.HasTypeDefinition)
+            to_type = (reference_to(self._space, node_id(type_id), kind, forward=True),)
         if isinstance(node, VariableNode) and node.kept:
-            how = reference_to(
-                self._space, ObjectIds.HAConfiguration, ObjectIds.HasHistoricalConfiguration, forward=True
-            )
+            kind = node_id(ObjectIds.HasHistoricalConfiguration)
+            how = reference_to(self._space, node_id(ObjectIds.HAConfiguration), kind, forward=True)
             to_type = (*to_type, how)
         return NodeKind(attributes, node_class, node_id(type_id), to_type)
 
 
-def constant(value: object, kind: ua.VariantType) -> AttributeValue:
-    return AttributeValue(data_value(variant(value, kind)))
-
-
-def _name(name: str, namespace: int) -> Name:
-    qualified, words = ua.QualifiedName(name, namespace), text(name)
+def _name(name: str, namespace: int, is_ours: bool = False) -> Name:
+    """``is_ours``: a name of the program's, which it can say in each language."""
+    qualified, words = ua.QualifiedName(name, namespace), named(name) if is_ours else text(name)
     return Name(
         qualified,
         words,
@@ -144,34 +141,8 @@ def _name(name: str, namespace: int) -> Name:
     )
 
 
-def _description(words: str) -> AttributeValue:
-    return constant(text(words), ua.VariantType.LocalizedText)
-
-
-def reference_to(
-    space: AddressSpace, target: int | ua.NodeId, reference: int, *, forward: bool
-) -> ua.ReferenceDescription:
-    """A reference of this type to a node that asyncua holds, as asyncua describes it; a number is a node of
-    the standard's."""
-    where = node_id(target) if isinstance(target, int) else target
-    fields = {
-        name: get(space.read_attribute_value(where, attribute).Value, "Value")
-        for name, attribute in (
-            ("NodeClass", AttributeIds.NodeClass),
-            ("BrowseName", AttributeIds.BrowseName),
-            ("DisplayName", AttributeIds.DisplayName),
-        )
-    }
-    of_type = next(related(space, where, ObjectIds.HasTypeDefinition), None)
-    if of_type:
-        fields["TypeDefinition"] = get(of_type, "NodeId")
-    return make(
-        ua.ReferenceDescription,
-        ReferenceTypeId=node_id(reference),
-        IsForward=forward,
-        NodeId=where,
-        **fields,
-    )
+def _description(words: Words) -> AttributeValue:
+    return constant(spoken(words), ua.VariantType.LocalizedText)
 
 
 def _key(node: Node) -> Hashable:

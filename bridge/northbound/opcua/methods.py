@@ -29,7 +29,17 @@ from bridge.northbound.opcua.data_values import (
 from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode
 from bridge.northbound.opcua.writes import ask
 from bridge.northbound.view import View
-from bridge.uaserver.library import AttributeIds, ServiceError, StatusCodes, get, make, status, ua
+from bridge.uaserver.hierarchy import related
+from bridge.uaserver.library import (
+    AttributeIds,
+    ObjectIds,
+    ServiceError,
+    StatusCodes,
+    get,
+    make,
+    status,
+    ua,
+)
 
 _DIRECTIONS: Final = (-1, 0, 1)
 _AT_FAULT: Final = {Code.UNKNOWN_PARAMETER: 0, Code.READ_ONLY: 0, Code.WRITE_ONLY: 0, Code.OUT_OF_RANGE: 1}
@@ -104,10 +114,9 @@ class Caller:
         method = self._method(method_id)
         if method is None:
             return StatusCodes.BadMethodInvalid
-        if (
-            owner.nodeid.Identifier != method.target
-            or owner.nodeid.NamespaceIndex != method_id.NamespaceIndex
-        ):
+        # The drive's object, or the MethodSet of its device (Part 4 §5.11.2: who has it as a component).
+        having = related(self._space, owner.nodeid, ObjectIds.HasComponent)
+        if all(get(found, "NodeId") != method_id for found in having):
             return StatusCodes.BadMethodInvalid
         executable = self._space.read_attribute_value(method_id, AttributeIds.Executable).Value
         if executable is None or not executable.Value:

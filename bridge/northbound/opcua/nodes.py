@@ -14,12 +14,15 @@ from typing import Final
 
 from bridge.command.messages.request import Action
 from bridge.image import Point
+from bridge.text import Text
 
 GROUPS: Final = ("command", "status", "actual", "parameter", "supervision", "identity")
 """Folders that every drive has, whether or not they hold a point."""
 
 DEVICE_GROUPS: Final = ("input", "output", "parameter", "supervision")
 """Folders of a node that is no drive, beside ``node``."""
+_TELEGRAM_GROUPS: Final = ("command", "output")
+"""Groups whose points are written in telegrams: with their bits."""
 _IN_DEVICE: Final = 3
 """Words in the name of a point in one of these groups."""
 
@@ -28,6 +31,8 @@ class VariableKind(Enum):
     PLAIN = "BaseDataVariableType"
     ANALOG = "AnalogUnitType"
     MULTI_STATE = "MultiStateDiscreteType"
+    MULTI_STATE_VALUE = "MultiStateValueDiscreteType"
+    """With codes that are negative, or too large for a list of texts."""
     TWO_STATE = "TwoStateDiscreteType"
 
 
@@ -45,7 +50,7 @@ class ArgumentType(Enum):
 class Argument:
     name: str
     type: ArgumentType
-    description: str
+    description: Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +61,7 @@ class MethodNode:
     browse_name: str
     action: Action
     target: str
-    description: str
+    description: Text
     arguments: tuple[Argument, ...] = ()
     results: tuple[Argument, ...] = ()
 
@@ -77,7 +82,7 @@ class VariableNode:
 
     @property
     def writable(self) -> bool:
-        return self.bit is None and self.point.writable
+        return self.point.writable and (self.bit is None or self.point.path[-2] in _TELEGRAM_GROUPS)
 
 
 class LiveType(Enum):
@@ -160,58 +165,56 @@ class ObjectNode:
         return self.below(name, lambda: ObjectNode(f"{self.id}/{name}", pascal_case(name)))
 
 
-_DIRECTION: Final = Argument("direction", ArgumentType.INT32, "1 forward, -1 reverse, 0 as the drive is set")
-_TTL: Final = Argument("ttl_ms", ArgumentType.UINT32, "length of the lease in ms")
+_DIRECTION: Final = Argument("direction", ArgumentType.INT32, Text.of("method.direction"))
+_TTL: Final = Argument("ttl_ms", ArgumentType.UINT32, Text.of("method.ttl"))
 
-_PARAMETER: Final = Argument(
-    "name", ArgumentType.STRING, "as the vendor calls it, such as P102[2], or an object such as 2066:01"
-)
-_VALUE: Final = Argument("value", ArgumentType.ANY, "in the parameter's unit")
+_PARAMETER: Final = Argument("name", ArgumentType.STRING, Text.of("method.parameter"))
+_VALUE: Final = Argument("value", ArgumentType.ANY, Text.of("method.value"))
 
-_Methods = Sequence[tuple[Action, tuple[Argument, ...], tuple[Argument, ...], str]]
+_Methods = Sequence[tuple[Action, tuple[Argument, ...], tuple[Argument, ...], Text]]
 
 _PARAMETER_METHODS: Final[_Methods] = (
-    (Action.READ_PARAMETER, (_PARAMETER,), (_VALUE,), "read a parameter from the drive"),
-    (Action.WRITE_PARAMETER, (_PARAMETER, _VALUE), (), "write a parameter and read it back; for engineers"),
-    (Action.SAVE_PARAMETERS, (), (), "keep the node's parameters in its EEPROM; for engineers"),
+    (Action.READ_PARAMETER, (_PARAMETER,), (_VALUE,), Text.of("method.read_parameter")),
+    (Action.WRITE_PARAMETER, (_PARAMETER, _VALUE), (), Text.of("method.write_parameter")),
+    (Action.SAVE_PARAMETERS, (), (), Text.of("method.save_parameters")),
 )
 _DRIVE_METHODS: Final[_Methods] = (
-    (Action.START, (_DIRECTION,), (), "through the drive's states to operation enabled; takes up to 3 s"),
-    (Action.STOP, (), (), "ramp down, then no voltage"),
-    (Action.QUICK_STOP, (), (), "quick stop ramp, then no voltage"),
-    (Action.DISABLE_VOLTAGE, (), (), "no voltage at once: the drive coasts"),
-    (Action.RESET_FAULT, (), (), "acknowledge a fault or a watchdog trip; the drive stays stopped"),
-    (Action.TAKE_CONTROL, (_TTL,), (), "become the controller of the drive"),
-    (Action.RELEASE_CONTROL, (), (), "give control back; a running drive is stopped"),
-    (Action.KEEP_ALIVE, (), (), "a telegram without a command: restarts the watchdog's timer"),
+    (Action.START, (_DIRECTION,), (), Text.of("method.start")),
+    (Action.STOP, (), (), Text.of("method.stop")),
+    (Action.QUICK_STOP, (), (), Text.of("method.quick_stop")),
+    (Action.DISABLE_VOLTAGE, (), (), Text.of("method.disable_voltage")),
+    (Action.RESET_FAULT, (), (), Text.of("method.reset_fault")),
+    (Action.TAKE_CONTROL, (_TTL,), (), Text.of("method.take_control")),
+    (Action.RELEASE_CONTROL, (), (), Text.of("method.release_control")),
+    (Action.KEEP_ALIVE, (), (), Text.of("method.keep_alive")),
     *_PARAMETER_METHODS,
 )
 _NODE_METHODS: Final[_Methods] = (
-    (Action.RESET, (), (), "NMT reset node"),
-    (Action.RESET_COMMUNICATION, (), (), "NMT reset communication"),
-    (Action.START_NODE, (), (), "NMT start: the node is checked first"),
-    (Action.STOP_NODE, (), (), "NMT stop; the node stays stopped until it is started or starts again"),
-    (Action.ENTER_PRE_OPERATIONAL, (), (), "NMT enter pre-operational; the node stays there"),
-    (Action.ENABLE, (), (), "put the node in service"),
-    (Action.DISABLE, (), (), "take the node out of service"),
+    (Action.RESET, (), (), Text.of("method.reset")),
+    (Action.RESET_COMMUNICATION, (), (), Text.of("method.reset_communication")),
+    (Action.START_NODE, (), (), Text.of("method.start_node")),
+    (Action.STOP_NODE, (), (), Text.of("method.stop_node")),
+    (Action.ENTER_PRE_OPERATIONAL, (), (), Text.of("method.enter_pre_operational")),
+    (Action.ENABLE, (), (), Text.of("method.enable")),
+    (Action.DISABLE, (), (), Text.of("method.disable")),
 )
 _DEVICE_METHODS: Final[_Methods] = (*_NODE_METHODS, *_PARAMETER_METHODS)
 """Methods of a node that is no drive."""
 _OUTPUT_METHODS: Final[_Methods] = (
-    (Action.STOP, (), (), "make every output safe"),
-    (Action.RESET_FAULT, (), (), "acknowledge a watchdog trip; the outputs stay safe"),
-    (Action.TAKE_CONTROL, (_TTL,), (), "become the controller of the outputs"),
-    (Action.RELEASE_CONTROL, (), (), "give control back; the outputs become safe"),
-    (Action.KEEP_ALIVE, (), (), "a telegram without a value: restarts the watchdog's timer"),
+    (Action.STOP, (), (), Text.of("method.outputs_stop")),
+    (Action.RESET_FAULT, (), (), Text.of("method.outputs_reset_fault")),
+    (Action.TAKE_CONTROL, (_TTL,), (), Text.of("method.outputs_take_control")),
+    (Action.RELEASE_CONTROL, (), (), Text.of("method.outputs_release_control")),
+    (Action.KEEP_ALIVE, (), (), Text.of("method.outputs_keep_alive")),
     *_DEVICE_METHODS,
 )
 """Methods of a node that is no drive and has outputs."""
 _BUS_METHODS: Final[_Methods] = (
-    (Action.RESET, (), (), "NMT reset node to all nodes"),
-    (Action.RESET_COMMUNICATION, (), (), "NMT reset communication to all nodes"),
-    (Action.START_NODE, (), (), "NMT start for every node of the site file, each checked first"),
-    (Action.STOP_NODE, (), (), "NMT stop to all nodes"),
-    (Action.ENTER_PRE_OPERATIONAL, (), (), "NMT enter pre-operational to all nodes"),
+    (Action.RESET, (), (), Text.of("method.bus_reset")),
+    (Action.RESET_COMMUNICATION, (), (), Text.of("method.bus_reset_communication")),
+    (Action.START_NODE, (), (), Text.of("method.bus_start_node")),
+    (Action.STOP_NODE, (), (), Text.of("method.bus_stop_node")),
+    (Action.ENTER_PRE_OPERATIONAL, (), (), Text.of("method.bus_enter_pre_operational")),
 )
 
 
@@ -313,8 +316,9 @@ _MOST_STATES: Final = 256
 
 def _variable(point: Point, index: int, *, kept: bool) -> VariableNode:
     kind = VariableKind.PLAIN
-    if point.states and all(0 <= code < _MOST_STATES for code, _ in point.states):
-        kind = VariableKind.MULTI_STATE
+    if point.states:
+        is_list = all(0 <= code < _MOST_STATES for code, _ in point.states)
+        kind = VariableKind.MULTI_STATE if is_list else VariableKind.MULTI_STATE_VALUE
     elif point.unit:
         kind = VariableKind.ANALOG
     bits = tuple(

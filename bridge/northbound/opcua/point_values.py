@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +16,8 @@ from bridge.uaserver.address_space import Watchers
 from bridge.uaserver.library import ua
 
 _WHOLE_POINT: Final = -1
+# Places of what is made of a point.
+SAME, TEXT_OF_NUMBER, HEALTH, TEXT_OF_STATE = -2, -3, -4, -5
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +29,8 @@ class WatchedVariable:
 
 
 AllWatched = dict[int, dict[int, WatchedVariable]]
-"""Watched variables by index of the point, then by bit, -1 for the whole point."""
+"""Watched variables by index of the point, then by bit, -1 for the whole point, below that for what is made
+of it."""
 
 
 class PointValue(AttributeValue):
@@ -55,3 +58,34 @@ class PointValue(AttributeValue):
         place = _WHOLE_POINT if node.bit is None else node.bit
         of_point = self._watched.setdefault(node.index, {})
         return of_point.setdefault(place, WatchedVariable({}, self.read)).watchers
+
+
+class DerivedValue(AttributeValue):
+    """The attribute Value of a variable that is made of several ``points``: ``read`` makes it. ``place`` is
+    that of the conversion among the variables of a point; nodes with the same one have the same value."""
+
+    value = None
+    value_setter = None
+
+    def __init__(
+        self,
+        points: Sequence[VariableNode],
+        place: int,
+        read: Callable[[], ua.DataValue],
+        watched: AllWatched,
+    ) -> None:
+        self._points = points
+        self._place = place
+        self._read = read
+        self._watched = watched
+
+    def value_callback(self, *_: object) -> ua.DataValue:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self._read()
+
+    @property
+    def datachange_callbacks(self) -> Watchers:  # pyright: ignore[reportIncompatibleVariableOverride]
+        known = self._watched.get(self._points[0].index, {}).get(self._place)
+        variable = known or WatchedVariable({}, self._read)
+        for point in self._points:
+            self._watched.setdefault(point.index, {})[self._place] = variable
+        return variable.watchers

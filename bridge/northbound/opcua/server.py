@@ -6,6 +6,7 @@ import asyncio
 import gc
 import logging
 import socket
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -13,38 +14,38 @@ from typing import Final
 import bridge
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
-from bridge.command import EventKind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua.accounts import Accounts, security_policies
 from bridge.northbound.opcua.alarm_server import AlarmSite, serve_alarms
 from bridge.northbound.opcua.alarms import AlarmTask
+from bridge.northbound.opcua.assets import read_models
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.change_publisher import Publisher
 from bridge.northbound.opcua.event_keeper import EventKeeper
 from bridge.northbound.opcua.event_log import EventLog
 from bridge.northbound.opcua.event_records import EventCodec
-from bridge.northbound.opcua.event_types import BASE_TYPE, DRIVE_EVENT_FIELDS, EventTypeMaker, type_name
 from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.nameplates import Nameplate
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.notifiers import Notifiers
 from bridge.northbound.opcua.plant_history import PlantHistory
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
-from bridge.northbound.opcua.tree import Tree
+from bridge.northbound.opcua.site_space import NAMESPACE, fill
 from bridge.northbound.opcua.value_rings import ValueRings
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
+from bridge.text import LANGUAGES
 from bridge.uaserver import decoding
 from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
-from bridge.uaserver.library import ObjectIds, node_id, ua
+from bridge.uaserver.library import ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.session import InnerServer
 
-NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
 _MB: Final = 1_000_000
 
@@ -55,7 +56,8 @@ class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
     ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``, where the state
-    of the alarms is kept, too. ``bound`` is a listening socket where somebody else holds the port.
+    of the alarms is kept, too. ``nameplates`` are those of the drives. ``bound`` is a listening socket where
+    somebody else holds the port.
     """
 
     def __init__(
@@ -66,11 +68,13 @@ class OpcUaServer:
         site_name: str,
         bound: socket.socket | None = None,
         alarm_site: AlarmSite | None = None,
+        nameplates: Mapping[str, Nameplate] | None = None,
     ) -> None:
         self._view = view
         self._settings = settings
         self._folder = state_dir / "opcua"
         self._site_name = site_name
+        self._nameplates = nameplates or {}
         self._alarm_site = alarm_site or AlarmSite()
         self._users: Accounts | None = None
         self._server: BoundServer | None = None
@@ -160,20 +164,33 @@ class OpcUaServer:
         quieten()
         decoding.install()
         inner = InnerServer(no_security=self._settings.no_security)
+        inner.locales = LANGUAGES
         inner.certificate, inner.private_key = own.certificate, own.private_key
         server = BoundServer(inner, bound, trusted)
         await self._describe(server, own.application_uri, users)
-        namespace = await server.register_namespace(NAMESPACE)
-        image = self._view.image
+        models = await asyncio.to_thread(read_models)
+        # The points' comes first, as it always has.
+        uris = [NAMESPACE, *models.namespaces]
+        indexes = {uri: await server.register_namespace(uri) for uri in uris}
+        image, epoch_ns = self._view.image, self._view.epoch_ns
         kept = self._settings.history
-        rings = ValueRings(image, self._view.epoch_ns, kept)
-        trees = layout(image.points, rings.rings, kept.black_boxes)
-        how = inner.aspace, namespace, image, self._view.epoch_ns
-        tree = Tree(*how, trees, keeps_events=kept.event_hours > 0)
+        rings = ValueRings(image, epoch_ns, kept)
+        site = fill(
+            inner.aspace,
+            models,
+            indexes,
+            image,
+            epoch_ns,
+            layout(image.points, rings.rings, kept.black_boxes),
+            self._nameplates,
+            keeps_events=kept.event_hours > 0,
+            with_draft=self._settings.powertrain_draft,
+        )
+        tree = site.tree
         notifiers = Notifiers(tree.notifiers)
         keeper = self._keeper(EventCodec(await server.get_namespace_array()), notifiers)
         past = self._past = PlantHistory(
-            kept, image, self._view.epoch_ns, tree, rings, keeper, self._folder / "black_box"
+            kept, image, epoch_ns, tree, rings, keeper, self._folder / "black_box"
         )
         await past.start()
         self._view.on_event(past.on_event)
@@ -189,7 +206,8 @@ class OpcUaServer:
             self._pulse,
             past,
         )
-        events = self._events(inner, tree.namespace, notifiers, keeper)
+        events = EventSender(epoch_ns, inner.subscriptions, notifiers, site.event_types, keeper)
+        self._view.on_event(events.on_event)
         inner.subscriptions.prepare()
         self._server = server
         await server.start()
@@ -221,17 +239,6 @@ class OpcUaServer:
         most_bytes = kept.events_mb * _MB
         log = EventLog(codec, notifiers, kept.event_hours, most_bytes)
         return EventKeeper(log, self._folder, most_bytes)
-
-    def _events(
-        self, inner: InnerServer, namespace: int, notifiers: Notifiers, keeper: EventKeeper | None
-    ) -> EventSender:
-        types = EventTypeMaker(inner, namespace)
-        base = types.make(BASE_TYPE, node_id(ObjectIds.BaseEventType), DRIVE_EVENT_FIELDS)
-        types.generates(base)
-        made = {kind: types.make(type_name(kind), base) for kind in EventKind}
-        events = EventSender(self._view.epoch_ns, inner.subscriptions, notifiers, made, keeper)
-        self._view.on_event(events.on_event)
-        return events
 
     def _tell(self) -> None:
         settings = self._settings

@@ -17,6 +17,8 @@ from bridge.northbound.opcua.nodes import (
     VariableNode,
     enum_strings,
 )
+from bridge.northbound.opcua.words import spoken, state_named
+from bridge.text import Text
 from bridge.uaserver.library import ObjectIds, change, make, node_id, text, ua, variant
 
 READ: Final = 1
@@ -69,6 +71,9 @@ def _properties(node: VariableNode) -> Iterator[Property]:
                 yield _range(point.low + 0.0, point.high + 0.0)
         case VariableKind.MULTI_STATE:
             yield _enum_strings(point.states)
+        case VariableKind.MULTI_STATE_VALUE:
+            yield _enum_values(point.states)
+            yield VALUE_AS_TEXT
         case VariableKind.TWO_STATE:
             yield from _TWO_STATE
         case VariableKind.PLAIN:
@@ -90,7 +95,7 @@ def _described(name: str, arguments: tuple[Argument, ...]) -> Property:
             Name=argument.name,
             DataType=node_id(_ARGUMENT_TYPE[argument.type]),
             ValueRank=_SCALAR,
-            Description=text(argument.description),
+            Description=spoken(argument.description),
         )
         for argument in arguments
     ]
@@ -98,18 +103,35 @@ def _described(name: str, arguments: tuple[Argument, ...]) -> Property:
 
 
 @cache
+def units_of(unit: str) -> ua.Variant:
+    """Engineering units of a point with this unit."""
+    return variant(_unit(unit), ua.VariantType.ExtensionObject)
+
+
+@cache
+def range_of(low: float, high: float) -> ua.Variant:
+    return variant(make(ua.Range, Low=low, High=high), ua.VariantType.ExtensionObject)
+
+
+@cache
 def _engineering_units(unit: str) -> Property:
-    return _structure("EngineeringUnits", _unit(unit), ObjectIds.EUInformation)
+    return Property("EngineeringUnits", units_of(unit), ObjectIds.EUInformation)
 
 
 @cache
 def _range(low: float, high: float) -> Property:
-    return _structure("EURange", make(ua.Range, Low=low, High=high), ObjectIds.Range)
+    return Property("EURange", range_of(low, high), ObjectIds.Range)
 
 
 @cache
 def _enum_strings(states: tuple[tuple[int, str], ...]) -> Property:
-    return _texts("EnumStrings", [text(state) for state in enum_strings(states)])
+    return _texts("EnumStrings", [state_named(state) for state in enum_strings(states)])
+
+
+@cache
+def _enum_values(states: tuple[tuple[int, str], ...]) -> Property:
+    values = [make(ua.EnumValueType, Value=code, DisplayName=state_named(state)) for code, state in states]
+    return _structure("EnumValues", values, ObjectIds.EnumValueType)
 
 
 def _structure(name: str, value: object, data_type: int) -> Property:
@@ -120,7 +142,13 @@ def _texts(name: str, value: object) -> Property:
     return Property(name, variant(value, ua.VariantType.LocalizedText), ObjectIds.LocalizedText)
 
 
-_TWO_STATE: Final = (_texts("FalseState", text("false")), _texts("TrueState", text("true")))
+VALUE_AS_TEXT: Final = _texts("ValueAsText", ua.LocalizedText())
+"""The state that the value is (Part 8 §5.3.3.4): each node has its own."""
+
+_TWO_STATE: Final = (
+    _texts("FalseState", spoken(Text.of("truth.false"))),
+    _texts("TrueState", spoken(Text.of("truth.true"))),
+)
 
 
 def _unit(unit: str) -> ua.EUInformation:
@@ -129,7 +157,7 @@ def _unit(unit: str) -> ua.EUInformation:
         NamespaceUri=UNIT_NAMESPACE,
         UnitId=unit_id(unit),
         DisplayName=text(unit),
-        Description=text(unit_description(unit)),
+        Description=spoken(unit_description(unit)),
     )
 
 

@@ -8,18 +8,22 @@ references downwards are kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Final, Protocol, cast
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.image import Image
-from bridge.northbound.opcua.data_values import EpochNs
-from bridge.northbound.opcua.kinds import Kinds, Name, Node, constant, reference_to
+from bridge.northbound.opcua.data_values import EpochNs, present_value
+from bridge.northbound.opcua.kinds import Kinds, Name, Node
 from bridge.northbound.opcua.nodes import FileNode, LiveProperty, MethodNode, ObjectNode, VariableNode
-from bridge.northbound.opcua.point_values import AllWatched, PointValue
-from bridge.northbound.opcua.structures import PropertyNode, property_nodes
-from bridge.uaserver.address_space import Attributes, Nodes, Watchers
-from bridge.uaserver.library import AttributeIds, ObjectIds, data_value, get, node_id, ua
+from bridge.northbound.opcua.point_values import TEXT_OF_STATE, AllWatched, DerivedValue, PointValue
+from bridge.northbound.opcua.structures import VALUE_AS_TEXT, PropertyNode, property_nodes, value_type
+from bridge.northbound.opcua.words import state_named
+from bridge.text import Text, Words
+from bridge.uaserver.address_space import Attributes, Watchers, constant, put_behind
+from bridge.uaserver.hierarchy import reference_to
+from bridge.uaserver.library import AttributeIds, ObjectIds, data_value, node_id, text, ua, variant
 
 _ORGANIZES: Final = node_id(ObjectIds.Organizes)
 _HAS_COMPONENT: Final = node_id(ObjectIds.HasComponent)
@@ -56,6 +60,8 @@ class _TreeNode:
     @property
     def attributes(self) -> Attributes:
         own = _OWN_BY_NODE.get(type(self.node), _OWN)
+        if isinstance(self.node, PropertyNode) and self.node.content is VALUE_AS_TEXT:
+            own = _OWN_OF_TEXT
         return Attributes(self._kind.attributes, own, self)
 
     @property
@@ -83,8 +89,9 @@ class _TreeNode:
         # The names of properties are the standard's, in the standard's namespace.
         node = self.node
         is_standard = isinstance(node, PropertyNode) or (isinstance(node, LiveProperty) and node.standard)
+        of_site = isinstance(node, ObjectNode) and not node.folder
         namespace = 0 if is_standard else self._tree.namespace
-        return self._tree.kinds.name(self.node.browse_name, namespace)
+        return self._tree.kinds.name(node.browse_name, namespace, not is_standard and not of_site)
 
     def id_attribute(self) -> AttributeValue:
         made = constant(self.nodeid, ua.VariantType.NodeId)
@@ -96,6 +103,10 @@ class _TreeNode:
 
     def value_attribute(self) -> AttributeValue:
         return self._tree.value_of(cast("VariableNode", self.node))
+
+    def text_attribute(self) -> AttributeValue:
+        above = cast("_TreeNode", self.above)
+        return self._tree.text_of(cast("VariableNode", above.node))
 
     def live_attribute(self) -> AttributeValue:
         return self._tree.live[self.node.id]
@@ -119,6 +130,7 @@ _FILE_METHODS: Final = (
     ObjectIds.FileType_GetPosition,
     ObjectIds.FileType_SetPosition,
 )
+_OWN_OF_TEXT: Final = {**_OWN, AttributeIds.Value: _TreeNode.text_attribute}
 
 
 class Beside(Protocol):
@@ -141,7 +153,8 @@ class Tree:
     """The nodes of ``trees`` in ``space``. Raises ValueError where two have the same id.
 
     ``notifiers`` are the objects that send events, by their names, ``watched`` the variables with watchers,
-    ``live`` the values of live properties by their ids. ``keeps_events``: past events are.
+    ``live`` the values of live properties by their ids. ``stands_for`` finds the point that a node beside the
+    tree stands for. ``keeps_events``: past events are.
     """
 
     def __init__(
@@ -152,19 +165,21 @@ class Tree:
         epoch_ns: EpochNs,
         trees: Sequence[ObjectNode],
         *,
+        stands_for: Callable[[str], VariableNode | None] = lambda _name: None,
         keeps_events: bool = False,
     ) -> None:
         self._image = image
+        self._stands_for = stands_for
         self._epoch_ns = epoch_ns
         self._nodes: dict[str, _TreeNode] = {}
         self._latest_property: _TreeNode | None = None
         self.namespace = namespace
         self.kinds = Kinds(space, keeps_events=keeps_events)
-        self.to_objects = reference_to(space, ObjectIds.ObjectsFolder, ObjectIds.Organizes, forward=False)
-        self.to_server = reference_to(space, ObjectIds.Server, ObjectIds.HasNotifier, forward=False)
+        self.to_objects = reference_to(space, node_id(ObjectIds.ObjectsFolder), _ORGANIZES, forward=False)
+        self.to_server = reference_to(space, node_id(ObjectIds.Server), _HAS_NOTIFIER, forward=False)
         # Files share the methods of their type.
         self.to_file_methods = [
-            reference_to(space, method, ObjectIds.HasComponent, forward=True) for method in _FILE_METHODS
+            reference_to(space, node_id(method), _HAS_COMPONENT, forward=True) for method in _FILE_METHODS
         ]
         self.live: dict[str, AttributeValue] = {}
         self.notifiers: dict[str, ua.NodeId] = {}
@@ -197,8 +212,7 @@ class Tree:
         # Of each change a sample is kept: between two of them nothing has changed.
         stepped = space[node_id(ObjectIds.HAConfiguration_Stepped)]
         stepped.attributes[AttributeIds.Value] = constant(True, ua.VariantType.Boolean)
-        # asyncua puts a mapping of its own there, too, for nodes that it loads when they are asked for.
-        space._nodes = Nodes(get(space, "_nodes"), self._find)  # pyright: ignore[reportPrivateUsage]
+        put_behind(space, self._find)
 
     def method(self, where: ua.NodeId) -> MethodNode | None:
         node = self._node(where)
@@ -221,7 +235,7 @@ class Tree:
 
     def writable(self, where: ua.NodeId) -> VariableNode | None:
         """The variable, where it is one that clients may write."""
-        node = self._node(where)
+        node = self._node(where) or self._stands_for(self._name(where))
         return node if isinstance(node, VariableNode) and node.writable else None
 
     def _node(self, where: ua.NodeId) -> Node | None:
@@ -262,13 +276,28 @@ class Tree:
     def value_of(self, node: VariableNode) -> PointValue:
         return PointValue(self._image, self._epoch_ns, node, self.watched)
 
+    def text_of(self, node: VariableNode) -> DerivedValue:
+        """The state that a point is in, in words."""
+        read = partial(self._state, node, dict(node.point.states))
+        return DerivedValue((node,), TEXT_OF_STATE, read, self.watched)
 
-def _description(node: Node) -> str:
+    def _state(self, node: VariableNode, states: Mapping[int, str]) -> ua.DataValue:
+        told = present_value(self._image, node.index, value_type(node), self._epoch_ns)
+        if told.Value is None or told.Value.Value is None:
+            return told
+        state = states.get(told.Value.Value, "")
+        words = variant(state_named(state) if state else text(""), ua.VariantType.LocalizedText)
+        return data_value(words, told.StatusCode, told.SourceTimestamp, told.ServerTimestamp)
+
+
+def _description(node: Node) -> Words:
     match node:
         case MethodNode():
             return node.description
+        case VariableNode(bit=int(bit)):
+            return Text.of("point.bit", number=bit, word=node.point.leaf)
         case VariableNode():
-            return node.point.description if node.bit is None else f"bit {node.bit} of {node.point.leaf}"
+            return node.point.description
         case _:
             return ""
 

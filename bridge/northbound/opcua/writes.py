@@ -121,6 +121,8 @@ class Writer:
                 self._reject(identity, write, code)
                 continue
             owner, _, leaf = node.point.name.rpartition("/")
+            if node.bit is not None:
+                leaf = f"{leaf}.{node.bit}"
             target, _, group = owner.rpartition("/")
             telegram = latest.get(target)
             if group in _ALONE:
@@ -200,8 +202,17 @@ def _value(node: VariableNode, write: ua.WriteValue) -> Value:
     if written.Value is None:
         raise ServiceError(StatusCodes.BadTypeMismatch)
     try:
+        if node.bit is not None:
+            return _bit(node, written.Value)
         return point_value(node.point, written.Value)
     except TypeError:
         raise ServiceError(StatusCodes.BadTypeMismatch) from None
     except ValueError:
         raise ServiceError(StatusCodes.BadOutOfRange) from None
+
+
+def _bit(node: VariableNode, written: ua.Variant) -> bool:
+    """Raises TypeError for anything but true and false."""
+    if written.VariantType is not ua.VariantType.Boolean or not isinstance(written.Value, bool):
+        raise TypeError(f"{node.id} takes true or false")
+    return written.Value

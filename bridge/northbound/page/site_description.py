@@ -113,7 +113,7 @@ def _point(point: Point) -> dict[str, Any]:
         "low": point.low,
         "high": point.high,
         "writable": point.writable,
-        "description": point.description,
+        "description": str(point.description),
         "states": {str(code): text for code, text in point.states},
         "bits": list(point.bits),
     }

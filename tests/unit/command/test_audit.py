@@ -212,6 +212,13 @@ class TestBusyControllers:
         hall.write(control_word=ENABLE)
         assert hall.told() == [("telegrams", "ok", 50), ("write", "ok", 1)]
 
+    def test_a_changed_bit_of_it_is_told_at_once(self, hall: Hall) -> None:
+        hall.write(**{"control_word.11": True})
+        hall.cycle(0.5, **{"control_word.11": True})
+        hall.told()
+        hall.write(**{"control_word.11": False})
+        assert hall.told() == [("telegrams", "ok", 50), ("write", "ok", 1)]
+
     def test_a_ramp_of_setpoints_is_told_once_a_second_and_at_its_end(self, hall: Hall) -> None:
         hall.write(control_word=ENABLE, setpoint_1=0)
         hall.told()

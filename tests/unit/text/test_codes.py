@@ -14,16 +14,42 @@ import pytest
 
 from bridge.can.interface import ControllerState
 from bridge.canopen.nmt import NmtCommand, NmtState, command_name
+from bridge.catalogue import Catalogue
+from bridge.catalogue.points import LIFE_SIGN
 from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import Action
 from bridge.condition.causes import RULES
 from bridge.condition.plant_layout import MOVES_BY
 from bridge.config import NodeTable, Reaction
 from bridge.drive import DriveState
+from bridge.mapping import family_names, load_family
+from bridge.northbound.opcua.nodes import DEVICE_GROUPS
+from bridge.northbound.opcua.nodes import GROUPS as GROUP_NAMES
 from bridge.northbound.trouble_words import CONDITION_WORDS
+from bridge.project import load_project
 from bridge.text import LANGUAGES, Text
 from bridge.text.templates import parse, source, templates
 from bridge.uaserver.condition_fields import STATES
+
+
+def names() -> set[str]:
+    """Names of what OPC UA serves of every family, without the number at their end."""
+    found = {*GROUP_NAMES, *DEVICE_GROUPS, "drives", "buses", "bridge", "node", LIFE_SIGN}
+    found |= {action.value for action in Action} - {Action.WRITE, Action.SET_TIMEOUT}
+    project = load_project(Path("bridge/demo/site.toml"))
+    points = list(Catalogue.of(project.site, project.families).points)
+    for name in family_names():
+        family = load_family(name)
+        found |= {value.name for value in family.value} | {poll.name for poll in family.poll}
+        found |= {state for value in family.value for state in value.states.values()}
+        found |= {bit for word in (family.control_word, family.status_word) for bit in word.bits}
+        found |= {bit for one in (*family.value, *family.poll) for bit in one.bits}
+    shown = [point for point in points if "parameter" not in point.path]
+    found |= {point.leaf for point in shown}
+    found |= {state for point in shown for _, state in point.states}
+    found |= {bit for point in shown for bit in point.bits}
+    return {re.sub(r"(_?\d+)+$", "", name.replace(" ", "_")) for name in found if name}
+
 
 GROUPS: Final[Mapping[str, Iterable[str]]] = {
     "action": list(Action),
@@ -33,6 +59,7 @@ GROUPS: Final[Mapping[str, Iterable[str]]] = {
     "drive_state": [state.label for state in DriveState],
     "nmt_command": [command_name(command) for command in NmtCommand],
     "nmt_state": [state.words for state in NmtState],
+    "name": names(),
     "node_state": [state.value for state in NodeState],
     "quantity": MOVES_BY,
     "reaction": get_args(Reaction),

@@ -6,13 +6,20 @@ import pytest
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
-from bridge.uaserver.hierarchy import EventTypes, related, subtypes, supertypes
+from bridge.uaserver.hierarchy import EventTypes, reference_to, related, subtypes, supertypes
 
 Ids = ua.ObjectIds
 
 
 def node(number: int) -> ua.NodeId:
     return ua.NodeId(number)
+
+
+def test_a_reference_describes_its_target(space: AddressSpace) -> None:
+    found = reference_to(space, node(Ids.Server), node(Ids.HasComponent), forward=False)
+    assert (found.ReferenceTypeId, found.NodeId) == (node(Ids.HasComponent), node(Ids.Server))
+    assert (found.BrowseName.Name, found.IsForward) == ("Server", False)
+    assert found.TypeDefinition == node(Ids.ServerType)
 
 
 @pytest.mark.landing

@@ -8,7 +8,7 @@ from asyncua.server.address_space import AddressSpace, NodeManagementService
 from asyncua.server.standard_address_space import standard_address_space
 
 from bridge.uaserver.address_space import is_empty
-from bridge.uaserver.selfdescription import NOT_DONE, VALUES, describe
+from bridge.uaserver.selfdescription import LOCALES, NOT_DONE, VALUES, describe
 
 Ids = ua.AttributeIds
 
@@ -17,7 +17,7 @@ Ids = ua.AttributeIds
 def described() -> AddressSpace:
     made = AddressSpace()
     standard_address_space.fill_address_space(NodeManagementService(made))
-    describe(made)
+    describe(made, ("en", "de"))
     return made
 
 
@@ -31,6 +31,10 @@ def test_each_value_stands_in_its_node(described: AddressSpace) -> None:
         found = described.read_attribute_value(node(name), Ids.Value)
         assert found.Value == value, name
         assert found.StatusCode is None or found.StatusCode.is_good(), name
+
+
+def test_the_languages_are_those_of_the_texts(described: AddressSpace) -> None:
+    assert described.read_attribute_value(node(LOCALES), Ids.Value).Value.Value == ["en", "de"]
 
 
 def test_what_is_not_done_has_no_value(described: AddressSpace) -> None:

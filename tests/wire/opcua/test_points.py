@@ -133,6 +133,19 @@ class TestWrites:
         assert request.command == Write({"control_word": 0x047E, "setpoint_1": 0x2000})
         assert str(request.identity) == "opcua:anonymous"
 
+    async def test_bits_of_one_call_are_one_telegram_on_the_owners_word(
+        self, client: Client, view: LocalView
+    ) -> None:
+        await write(client, control_word=word(0x0470))
+        bits = [
+            (await node(client, f"conveyor/fu1/command/control_word/{name}")).nodeid
+            for name in ("ready_for_operation", "voltage_enabled", "quick_stop_lifted")
+        ]
+        assert await write_all(client, [write_value(one, ua.Variant(True)) for one in bits[1:]]) == [0, 0]
+        assert view.requests[-1].command == Write({"control_word.1": True, "control_word.2": True})
+        whole = await node(client, "conveyor/fu1/command/control_word")
+        assert await whole.read_value() == 0x0476
+
     async def test_writes_to_two_drives_are_two_telegrams(self, client: Client, view: LocalView) -> None:
         wanted = [
             write_value((await node(client, f"conveyor/{drive}/command/control_word")).nodeid, word(0x047E))
@@ -214,7 +227,7 @@ class TestWrites:
         [
             ("conveyor/fu1/status/status_word", ua.AttributeIds.Value, Codes.BadNotWritable),
             (
-                "conveyor/fu1/command/control_word/enable_operation",
+                "conveyor/fu1/status/status_word/fault",
                 ua.AttributeIds.Value,
                 Codes.BadNotWritable,
             ),

@@ -231,3 +231,64 @@ class TestAnotherParameterSet:
         assert rig.write(ENABLE, 0x1000).ok, "a raw word is the same in each"
         assert rig.write(SHUT_DOWN, frequency=10.0).ok
         assert rig.channel.setpoints == (0, 0, 0, 0)
+
+
+class TestBits:
+    """A name with a number behind a dot is one bit; all else of the word stays."""
+
+    def test_a_bit_of_the_control_word_is_changed_in_the_owners_word(self, rig: Rig):
+        rig.write(ENABLE, setpoint_1=HALF_SPEED)
+        assert rig.write(**{"control_word.11": True}).ok
+        assert rig.sent == ENABLE | 1 << 11
+        assert rig.channel.setpoints[0] == HALF_SPEED
+        assert rig.write(**{"control_word.11": False}).ok
+        assert rig.sent == ENABLE
+
+    def test_several_are_one_telegram(self, rig: Rig):
+        assert rig.write(**{"control_word.0": True, "control_word.3": True, "setpoint_1": 5}).ok
+        assert rig.channel.output.words[:2] == (SHUT_DOWN | 1 | 1 << 3, 5)
+
+    def test_they_are_written_over_the_word_beside_them(self, rig: Rig):
+        assert rig.write(**{"control_word.11": True, "control_word": ENABLE}).ok
+        assert rig.sent == ENABLE | 1 << 11
+
+    def test_a_stop_by_one_bit_is_a_stop(self, rig: Rig):
+        rig.write(ENABLE)
+        assert rig.write(**{"control_word.3": False}).ok
+        assert rig.sent == ENABLE & ~(1 << 3)
+
+    def test_a_bit_of_a_setpoint_and_of_a_value_with_bits(self, rig: Rig):
+        rig.write(setpoint_2=0x0101)
+        assert rig.write(**{"setpoint_2.1": True, "digital_outputs.1": True}).ok
+        assert rig.channel.setpoints[1] == 0x0103
+        assert rig.channel.setpoints[3] == 2
+        assert rig.write(**{"digital_outputs.0": True}).ok
+        assert rig.channel.setpoints[3] == 3
+
+    @pytest.mark.parametrize(
+        ("leaf", "value"),
+        [
+            ("control_word.16", True),
+            ("control_word.-1", True),
+            ("control_word.x", True),
+            ("control_word.1.2", True),
+            ("control_word.3", 2),
+            ("control_word.3", "on"),
+            ("frequency.3", True),
+            ("nothing.3", True),
+        ],
+    )
+    def test_what_is_no_bit_changes_nothing(self, rig: Rig, leaf: str, value: Value):
+        before = rig.channel.output
+        assert rig.write(**{"setpoint_1": 7, leaf: value}).code is Code.OUT_OF_RANGE
+        assert rig.channel.output == before
+
+    def test_a_bit_that_acknowledges_is_the_edge_that_the_word_would_be(self, rig: Rig):
+        rig.run()
+        rig.wait(10.0)
+        assert rig.watchdog == "tripped"
+        rig.write(SHUT_DOWN)
+        rig.write(**{"control_word.11": True})
+        assert rig.watchdog == "tripped", "bits beside it are no edge"
+        rig.write(**{"control_word.7": True})
+        assert rig.watchdog != "tripped"

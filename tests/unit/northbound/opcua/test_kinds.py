@@ -7,7 +7,7 @@ from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
 from bridge.image import DataType, Point
-from bridge.northbound.opcua.kinds import Kinds, constant, reference_to
+from bridge.northbound.opcua.kinds import Kinds
 from bridge.northbound.opcua.nodes import ObjectNode, VariableNode, layout
 from bridge.uaserver.address_space import is_empty
 from tests.support.opcua_held import standard_space
@@ -37,7 +37,7 @@ def test_nodes_of_one_kind_share_what_they_have(space: AddressSpace) -> None:
         ua.NodeId(ua.ObjectIds.BaseDataVariableType),
         ua.NodeId(ua.ObjectIds.AnalogUnitType),
     )
-    assert kinds.name("Speed", 2) is kinds.name("Speed", 2)
+    assert kinds.name("Speed", 2, True) is kinds.name("Speed", 2, True)
 
 
 def test_a_kind_has_nothing_that_is_empty(space: AddressSpace) -> None:
@@ -51,10 +51,3 @@ def test_where_events_come_from_can_be_subscribed_to(space: AddressSpace, notifi
     found = Kinds(space).of(ObjectNode("x", "X", folder=False, notifier=notifier))
     assert found.attributes[Ids.EventNotifier].value.Value.Value == bits
     assert found.type_id == ua.NodeId(ua.ObjectIds.BaseObjectType)
-
-
-def test_a_reference_describes_its_target(space: AddressSpace) -> None:
-    found = reference_to(space, ua.ObjectIds.Server, ua.ObjectIds.HasComponent, forward=False)
-    assert (found.BrowseName.Name, found.IsForward) == ("Server", False)
-    assert found.TypeDefinition == ua.NodeId(ua.ObjectIds.ServerType)
-    assert constant(7, ua.VariantType.Byte).value.Value.Value == 7

@@ -44,10 +44,15 @@ class Rig:
         self.view, space = View(), AddressSpace()
         known = methods(layout(make_plant().image.points)[0])
         executable = AttributeValue(ua.DataValue(ua.Variant(True)))
-        for name in (DRIVE, "conveyor", *known):
+        for name in {name.rpartition("/")[0] for name in known} | {*known}:
             node = NodeData(ua.NodeId(name, 2))
             node.attributes = {ua.AttributeIds.Executable: executable}
             space[node.nodeid] = node
+        for name in known:
+            component = ua.ReferenceDescription(
+                ReferenceTypeId=ua.NodeId(ua.ObjectIds.HasComponent), NodeId=ua.NodeId(name, 2)
+            )
+            space[ua.NodeId(name.rpartition("/")[0], 2)].references.append(component)
         self.space = space
         view: Any = self.view
         self.caller = Caller(view, space, lambda where: known.get(str(where.Identifier)))

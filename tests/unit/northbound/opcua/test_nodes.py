@@ -121,11 +121,15 @@ def test_kinds_follow_from_the_points(trees: tuple[ObjectNode, ...]) -> None:
     assert kinds["conveyor/fu1/status/status_word/fault"] is VariableKind.TWO_STATE
 
 
-def test_bits_without_a_meaning_are_left_out_and_none_is_writable(trees: tuple[ObjectNode, ...]) -> None:
+def test_bits_without_a_meaning_are_left_out_and_those_of_a_command_are_writable(
+    trees: tuple[ObjectNode, ...],
+) -> None:
     word = next(v for v in variables(trees) if v.id == "conveyor/fu1/command/control_word")
     assert word.writable
     assert 13 not in [bit.bit for bit in word.bits]
-    assert not any(bit.writable for bit in word.bits)
+    assert all(bit.writable for bit in word.bits)
+    status = next(v for v in variables(trees) if v.id == "conveyor/fu1/status/status_word")
+    assert not any(bit.writable for bit in status.bits)
 
 
 def test_only_command_points_parameters_and_the_time_out_are_writable(trees: tuple[ObjectNode, ...]) -> None:

@@ -131,6 +131,24 @@ def test_two_nodes_of_one_id_are_an_error(space: AddressSpace) -> None:
         tree_in(space, Image([word, Point(name="bridge/word/low", data_type=DataType.BOOL)]))
 
 
+@pytest.mark.parametrize(("code", "words"), [(-1, "not set"), (1000, "fast"), (7, None)])
+def test_codes_that_make_no_list_are_numbers_with_their_texts(code: int, words: str | None) -> None:
+    """MultiStateValueDiscreteType (Part 8 §5.3.3.4)."""
+    states = ((-1, "not set"), (1000, "fast"))
+    point = Point(name="bridge/speed", data_type=DataType.INT32, states=states)
+    image = Image([point])
+    made = copy_of(standard_space())
+    tree_in(made, image)
+    image.set(0, code, 1.0)
+    where = ua.NodeId("bridge/speed", NAMESPACE)
+    kinds = [one.NodeId for one in made[where].references if one.ReferenceTypeId.Identifier == 40]
+    assert kinds == [ua.NodeId(ua.ObjectIds.MultiStateValueDiscreteType)]
+    values = made.read_attribute_value(ua.NodeId("bridge/speed/EnumValues", NAMESPACE), VALUE).Value.Value
+    assert [(one.Value, one.DisplayName.Text) for one in values] == list(states)
+    told = made.read_attribute_value(ua.NodeId("bridge/speed/ValueAsText", NAMESPACE), VALUE)
+    assert (told.Value.Value.Text, told.Value.VariantType) == (words, ua.VariantType.LocalizedText)
+
+
 class TestHistory:
     KEPT, OTHER = "conveyor/fu1/actual/frequency", "conveyor/fu1/actual/current"
 

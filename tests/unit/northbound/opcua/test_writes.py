@@ -35,7 +35,7 @@ class View:
 
 
 def variables(node: ObjectNode) -> dict[str, VariableNode]:
-    found = {one.id: one for one in node.variables if one.writable}
+    found = {one.id: one for word in node.variables for one in (word, *word.bits) if one.writable}
     for below in node.objects:
         found |= variables(below)
     return found
@@ -112,3 +112,31 @@ async def test_a_request_says_when_its_message_came(rig: Rig) -> None:
     received_at.set(12.5)
     await rig.write(to(WORD))
     assert [one.received_at for one in rig.view.requests] == [12.5]
+
+
+def bit(name: str, value: object = True) -> ua.WriteValue:
+    return ua.WriteValue(ua.NodeId(f"{WORD}/{name}", 2), Ids.Value, "", ua.DataValue(ua.Variant(value)))
+
+
+async def test_bits_of_one_call_are_one_telegram(rig: Rig) -> None:
+    assert await rig.write(bit("ready_for_operation"), to(SETPOINT, 5), bit("enable_operation", False)) == [
+        0,
+        0,
+        0,
+    ]
+    (request,) = rig.view.requests
+    assert request.command.values == {"control_word.0": True, "setpoint_1": 5, "control_word.3": False}
+
+
+async def test_the_same_bit_twice_is_two_telegrams(rig: Rig) -> None:
+    assert await rig.write(bit("acknowledge_fault"), bit("acknowledge_fault", False)) == [0, 0]
+    assert [one.command.values for one in rig.view.requests] == [
+        {"control_word.7": True},
+        {"control_word.7": False},
+    ]
+
+
+@pytest.mark.parametrize("value", [1, "true", 1.0, [True]])
+async def test_a_bit_is_true_or_false(rig: Rig, value: object) -> None:
+    assert await rig.write(bit("ready_for_operation", value)) == [Codes.BadTypeMismatch]
+    assert not rig.view.requests

@@ -7,14 +7,14 @@ import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
 from bridge.command import Rejection
 from bridge.command.messages.request import Code, Identity, Outcome
 from bridge.image import DataType, Image, Point, Quality, Reading, Value
 from bridge.text import Text
 from bridge.uaserver.history import date_time
-from bridge.uaserver.library import GOOD, StatusCodes, scalar, stamped, status, ua, variant
+from bridge.uaserver.library import GOOD, StatusCodes, status, ua, variant
 
 EpochNs = Callable[[float], int]
 
@@ -88,6 +88,7 @@ INTEGER_TYPES: Final = frozenset(
     )
 )
 _NUMBER_TYPES: Final = INTEGER_TYPES | {ua.VariantType.Float, ua.VariantType.Double}
+_new: Final = object.__new__
 _NO_VALUE: Final = variant(None, ua.VariantType.Null)
 _BITS: Final = (
     variant(False, ua.VariantType.Boolean),
@@ -148,6 +149,25 @@ def _server_time(epoch_ms: int) -> datetime:
     return datetime.fromtimestamp(epoch_ms / 1000, UTC)
 
 
+def _scalar(value: object, kind: ua.VariantType) -> ua.Variant:
+    """A single value of this type. asyncua's constructor, which finds out what it is given, takes as long as
+    all else that is done for a value that has changed."""
+    made = _new(ua.Variant)
+    made.Value, made.VariantType, made.is_array, made.Dimensions = value, kind, False, None
+    return made
+
+
+def _stamped(
+    value: ua.Variant, code: ua.StatusCode, source: datetime | None, server: datetime | None
+) -> ua.DataValue:
+    """A DataValue, made as ``_scalar`` makes values."""
+    made: Any = _new(ua.DataValue)
+    made.Encoding, made.Value, made.StatusCode = 0, value, code
+    made.SourceTimestamp, made.ServerTimestamp = source, server
+    made.SourcePicoseconds = made.ServerPicoseconds = None
+    return made
+
+
 def reading_value(
     reading: Reading, variant_type: ua.VariantType, epoch_ns: int, bit: int | None = None
 ) -> ua.DataValue:
@@ -157,20 +177,20 @@ def reading_value(
     if code.is_bad():
         value = _NO_VALUE
     elif bit is None:
-        value = scalar(reading.value, variant_type)
+        value = _scalar(reading.value, variant_type)
     else:
         value = _BITS[int(reading.value) >> bit & 1]
     # A point that has never had a value has no source time either.
     stamp = None if quality is Quality.WAITING else source_time(epoch_ns)
-    return stamped(value, code, stamp, _server_time(int(time.time() * 1000)))
+    return _stamped(value, code, stamp, _server_time(int(time.time() * 1000)))
 
 
 def past_value(value: Value, quality: Quality, data_type: DataType, time_us: int) -> ua.DataValue:
     """A former value of a point of this type, as ``reading_value`` tells the present one; without a server's
     time."""
     code = QUALITY_STATUS[quality]
-    held = _NO_VALUE if code.is_bad() else scalar(value, VARIANT_TYPE[data_type])
-    return stamped(held, code, date_time(time_us), None)
+    held = _NO_VALUE if code.is_bad() else _scalar(value, VARIANT_TYPE[data_type])
+    return _stamped(held, code, date_time(time_us), None)
 
 
 def present_value(

@@ -11,6 +11,7 @@ from bridge.catalogue.specs import MemberSpec
 from bridge.image.point import Point
 
 _TAKES_LEASES: Final = (Source.OPCUA, Source.ZENOH)
+_ENGINEERS: Final = ("engineer", "admin")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,6 @@ def rights_of(catalogue: Catalogue, source: Source) -> Rights:
     site = catalogue.site
     if source is Source.OPCUA:
         users = site.opcua.user if site.opcua else []
-        return Rights(source, has_engineers=any(user.role == "engineer" for user in users))
+        return Rights(source, has_engineers=any(user.role in _ENGINEERS for user in users))
     table = site.modbus if source is Source.MODBUS else site.zenoh
     return Rights(source, sets_parameters=table is None or table.parameters == "write")

@@ -25,6 +25,7 @@ from bridge.config.field_types import (
     ControllerName,
     Downtime,
     Endpoint,
+    EndpointUrl,
     Full,
     Gateway,
     HostName,
@@ -320,8 +321,11 @@ class ModbusTable(ListeningTable):
 
 class UserTable(Table):
     name: str = Field(min_length=1, max_length=64)
-    role: Literal["observer", "operator", "engineer"] = Field(description="observer, operator or engineer")
-    password_hash: str = Field(description="the line that `drivebridge hash-password` prints")
+    role: Literal["observer", "operator", "engineer", "admin"] = Field(
+        description="observer, operator, engineer or admin"
+    )
+    password_hash: str | None = Field(None, description="the line that `drivebridge hash-password` prints")
+    certificate: str | None = None
 
 
 class OpcUaTable(ListeningTable):
@@ -334,7 +338,11 @@ class OpcUaTable(ListeningTable):
     )
     certificate: str | None = None
     private_key: str | None = None
+    trust: Literal["list", "anybody"] = "list"
     trusted_dir: str | None = None
+    endpoints: list[EndpointUrl] = Field(
+        default_factory=list[str], description="further addresses by which it is reached, opc.tcp://host:port"
+    )
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 

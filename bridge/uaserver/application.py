@@ -49,12 +49,17 @@ NOBODY = Nobody()
 
 @dataclass(frozen=True, slots=True)
 class LoginAttempt:
-    """Identity token of a session. ``nonce`` is the server's last one to this session, ``key`` the server's;
-    ``encrypted`` says whether the channel is. ``session`` is the session's name."""
+    """Identity token of a session, and the ``signature`` that came with it.
+
+    ``nonce`` is the server's last one to this session, ``key`` and ``certificate``, in DER, are those that
+    the server has shown to it; ``encrypted`` says whether the channel is. ``session`` is the session's name.
+    """
 
     token: object
+    signature: object
     nonce: bytes
     key: RSAPrivateKey
+    certificate: bytes
     address: str
     session: str
     encrypted: bool

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 import secrets
+from dataclasses import dataclass
 from typing import Any, Final, cast
 
 from asyncua.crypto.permission_rules import User, UserRole
@@ -16,6 +17,8 @@ from asyncua.server.address_space import AddressSpace
 from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession, SessionState
 from asyncua.server.subscription_service import SubscriptionService
+from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.base.guard import Guard
 from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
@@ -35,6 +38,7 @@ from bridge.uaserver.library import (
     variant,
 )
 from bridge.uaserver.monitoring import loop_time
+from bridge.uaserver.own_addresses import OwnAddresses
 from bridge.uaserver.publishing import PublishQueue
 from bridge.uaserver.quotas import make_room
 from bridge.uaserver.reading import checked_times, window
@@ -53,6 +57,14 @@ _NOTHING: Final = variant(None, ua.VariantType.Null)
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
 
 
+@dataclass(frozen=True, slots=True)
+class ShownCertificate:
+    """Certificate of the server, in DER, with its key."""
+
+    certificate: bytes
+    key: RSAPrivateKey
+
+
 class Session(InternalSession):
     """One client. ``channel_certificate`` is that of the channel the session was made on."""
 
@@ -69,6 +81,8 @@ class Session(InternalSession):
         self.label = f"session {secrets.token_hex(_NAME_BYTES)}"
         self.identity: UserIdentity = NOBODY
         self.channel_certificate: bytes | None = None
+        self.shown = server.shown
+        """Certificate of the server when the session came to its connection: a client encrypts for it."""
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
         self.holder: object | None = None
@@ -208,6 +222,7 @@ class InnerServer(InternalServer):
         super().__init__()
         self.guard = Guard("OPC UA")
         self.no_security = no_security
+        self.addresses = OwnAddresses()
         # asyncua's own lets `admin` in with any password, as Admin. Logins are checked in the processor.
         self.user_manager = None  # pyright: ignore[reportAttributeAccessIssue]
         self.allow_remote_admin = False
@@ -222,6 +237,11 @@ class InnerServer(InternalServer):
     def create_session(self, name: str, user: User | None = None, external: bool = False) -> InternalSession:
         return Session(self, self.aspace, self.subscription_service, name)
 
+    def _mangle_endpoint_url(
+        self, ep_url: str, params_ep_url: str | None = None, sockname: tuple[str, int] | None = None
+    ) -> str:
+        return self.addresses.answer(ep_url, params_ep_url, str(sockname[0]) if sockname else "")
+
     async def get_endpoints(
         self, params: ua.GetEndpointsParameters | None = None, sockname: tuple[str, int] | None = None
     ) -> list[ua.EndpointDescription]:
@@ -229,6 +249,12 @@ class InnerServer(InternalServer):
         endpoints = await super().get_endpoints(params, sockname)
         profiles: list[str] = (get(params, "ProfileUris") if params else None) or []
         return [one for one in endpoints if not profiles or get(one, "TransportProfileUri") in profiles]
+
+    @property
+    def shown(self) -> ShownCertificate:
+        """Certificate that the server shows at present, and its key."""
+        certificate = self.certificate.public_bytes(Encoding.DER) if self.certificate else b""
+        return ShownCertificate(certificate, self.private_key)
 
     @property
     def sessions(self) -> list[Session]:

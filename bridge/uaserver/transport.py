@@ -86,7 +86,7 @@ class Processor(UaProcessor):
     def __init__(self, server: InnerServer, transport: asyncio.Transport, limits: TransportLimits) -> None:
         super().__init__(server, transport, limits)
         self._server = server
-        self._connection = SecureChannel(self._connection.security_policy, self._limits)
+        self._connection: SecureChannel = SecureChannel(self._connection.security_policy, self._limits)
         self._waiting: set[asyncio.Task[Any]] = set()
         self._source = source_of(str(self.name[0]) if isinstance(self.name, tuple) else str(self.name))
         self._connection.source = self._source
@@ -250,6 +250,7 @@ class Processor(UaProcessor):
             params = struct_from_binary(ua.CreateSessionParameters, body.copy())
             certificate = self._channel_certificate()
             self._check_client_certificate(params, certificate)
+            self._connection.judge_again(get(get(params, "ClientDescription"), "ApplicationUri") or "")
             await self._make_room()
             answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
             if isinstance(self.session, Session):
@@ -261,7 +262,7 @@ class Processor(UaProcessor):
             params = struct_from_binary(ua.ActivateSessionParameters, body.copy())
             # Nothing awaits between here and activate_session, so this login is for this call.
             try:
-                session.admitted = await self._login(session, get(params, "UserIdentityToken"))
+                session.admitted = await self._login(session, params)
             except ServiceError:
                 self._server.application.on_refused()
                 raise
@@ -276,6 +277,12 @@ class Processor(UaProcessor):
             self._hold(self.session)
         return answer
 
+    def open_secure_channel(self, algohdr: Any, seqhdr: Any, body: Any) -> None:
+        """Raises ServiceError, also for a renewal by a client that has lost its trust meanwhile."""
+        if self._connection.is_open():
+            self._connection.judge_again()
+        super().open_secure_channel(algohdr, seqhdr, body)
+
     async def _make_room(self) -> None:
         try:
             await make_room_for_session(self._source, self._server.sessions)
@@ -285,6 +292,8 @@ class Processor(UaProcessor):
             raise
 
     def _hold(self, session: Session) -> None:
+        if session.holder is not self:
+            session.shown = self._server.shown
         session.holder, session.most_bytes = self, self._limits.max_message_size
 
     async def _session_watchdog_loop(self) -> None:
@@ -376,11 +385,20 @@ class Processor(UaProcessor):
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
         return session
 
-    async def _login(self, session: Session, token: Any) -> UserIdentity:
+    async def _login(self, session: Session, params: Any) -> UserIdentity:
         """Raises ServiceError, also for another user than that of a session which comes from another channel
         (Part 4 §5.6.3): whoever has its token and its certificate is not yet its user."""
-        key, nonce = self._server.private_key, session.nonce or b""
-        login = LoginAttempt(token, nonce, key, session.address, session.label, encrypted=self._is_secured())
+        own = session.shown if session.holder is self else self._server.shown
+        login = LoginAttempt(
+            get(params, "UserIdentityToken"),
+            get(params, "UserTokenSignature"),
+            session.nonce or b"",
+            own.key,
+            self._connection.security_policy.host_certificate or own.certificate,
+            session.address,
+            session.label,
+            encrypted=self._is_secured(),
+        )
         who: UserIdentity = await self._server.application.identify(login)
         if session.holder is not self and session.is_activated() and not who.is_same(session.identity):
             tell(

@@ -62,8 +62,7 @@ class Backend(ServedApplication[SessionUser]):
         self._pulse = pulse
 
     async def identify(self, login: LoginAttempt) -> SessionUser:
-        how = login.token, login.nonce, login.key, login.address
-        identity = await self._users.identify(*how, encrypted=login.encrypted)
+        identity = await self._users.identify(login)
         return SessionUser(replace(identity, connection=login.session))
 
     def may(self, user: SessionUser, where: ua.NodeId) -> bool:

@@ -18,11 +18,14 @@ from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua.accounts import Accounts, security_policies
 from bridge.northbound.opcua.backend import Backend
-from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.change_publisher import Publisher
+from bridge.northbound.opcua.client_trust import ClientTrust, client_store
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.own_files import own_folder
+from bridge.northbound.opcua.own_watch import OwnWatch
+from bridge.northbound.opcua.ownnames import names_of
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.opcua.writes import Writer
@@ -33,6 +36,7 @@ from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
 from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
 from bridge.uaserver.librarylog import quieten
+from bridge.uaserver.own_addresses import OwnAddresses
 from bridge.uaserver.session import InnerServer
 
 NAMESPACE: Final = "urn:drivebridge:points"
@@ -44,7 +48,7 @@ _log = logging.getLogger(__name__)
 class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
-    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``. ``bound`` is a
+    ``state_dir`` is the site's; certificates are in its folder ``certificates``. ``bound`` is a
     listening socket where somebody else holds the port.
     """
 
@@ -58,13 +62,15 @@ class OpcUaServer:
     ) -> None:
         self._view = view
         self._settings = settings
-        self._folder = state_dir / "opcua"
+        self._state_dir = state_dir
+        self._folder = state_dir
         self._site_name = site_name
         self._users: Accounts | None = None
         self._server: BoundServer | None = None
         self._socket = bound
         self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
+        self._renewals: asyncio.Task[None] | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
         self.port = int(port)
@@ -83,10 +89,12 @@ class OpcUaServer:
         Raises ``FileFaults`` for a user, certificate or key that cannot be used, and ``Unavailable``
         where the port cannot be opened or the folder not be written.
         """
-        self._users = Accounts(self._settings)
+        store = client_store(self._settings, self._state_dir)
+        store.prepare()
+        self._users = Accounts(self._settings, store.lists)
+        self._folder = own_folder(self._state_dir)
         own = await asyncio.to_thread(server_identity, self._settings, self._folder)
-        trusted_dir = self._settings.trusted_dir
-        trusted = TrustedCertificates(Path(trusted_dir)) if trusted_dir else None
+        trusted = ClientTrust(store, needs_trust=self._settings.trust == "list")
         bound = self._socket = self._socket or listen(self._settings.listen, "opcua.listen")
         bound.setblocking(False)
         # Connections inherit it: who fills their buffers is noticed.
@@ -117,10 +125,11 @@ class OpcUaServer:
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
         self._pulse.stop()
-        task, self._publisher = self._publisher, None
-        if task:
+        tasks = [task for task in (self._publisher, self._renewals) if task]
+        self._publisher = self._renewals = None
+        for task in tasks:
             task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
         server, self._server = self._server, None
         if server:
             await server.stop()
@@ -133,11 +142,14 @@ class OpcUaServer:
     # steps of start
 
     async def _serve(
-        self, bound: socket.socket, own: ServerIdentity, trusted: TrustedCertificates | None, users: Accounts
+        self, bound: socket.socket, own: ServerIdentity, trusted: ClientTrust, users: Accounts
     ) -> None:
         quieten()
         decoding.install()
         inner = InnerServer(no_security=self._settings.no_security)
+        inner.addresses = OwnAddresses(
+            names_of(self._settings.listen, self._settings.names), self._settings.endpoints
+        )
         inner.certificate, inner.private_key = own.certificate, own.private_key
         server = BoundServer(inner, bound, trusted)
         await self._describe(server, own.application_uri, users)
@@ -157,6 +169,10 @@ class OpcUaServer:
         await server.start()
         publisher = Publisher(image, tree.watched, events)
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
+        watch = OwnWatch(self._settings, self._folder, own.application_uri)
+        self._renewals = asyncio.create_task(
+            watch.run(lambda own: server.renew(own.certificate, own.private_key)), name="opcua renewals"
+        )
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
 

@@ -48,10 +48,14 @@ def users() -> list[UserTable]:
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def strict(users: list[UserTable], tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Served]:
+async def strict(
+    users: list[UserTable], scada: Peer, stranger: Peer, tmp_path_factory: pytest.TempPathFactory
+) -> AsyncIterator[Served]:
     """As a site file that says nothing else: no open endpoint, nobody without a name."""
-    settings = OpcUaTable(listen="127.0.0.1:0", user=users)
-    async with serving(settings, tmp_path_factory.mktemp("strict")) as found:
+    settings, folder = OpcUaTable(listen="127.0.0.1:0", user=users), tmp_path_factory.mktemp("strict")
+    for peer in (scada, stranger):
+        peer.trusted_in(folder)
+    async with serving(settings, folder) as found:
         yield found
 
 
@@ -149,6 +153,7 @@ class TestEncrypted:
             await client.send_hello()
             await client.open_secure_channel()
             claimed = ua.CreateSessionParameters()
+            claimed.ClientDescription.ApplicationUri = stranger.uri
             claimed.ClientNonce, claimed.ClientCertificate = bytes(32), scada.certificate
             with pytest.raises(ua.uaerrors.BadSecurityChecksFailed):
                 await client.uaclient.create_session(claimed)
@@ -182,10 +187,7 @@ class TestTrust:
         self, users: list[UserTable], tmp_path: Path
     ) -> None:
         """Their names are the client's own: a new one each time must not be a new line each time."""
-        trusted = tmp_path / "trusted"
-        trusted.mkdir()
-        settings = OpcUaTable(listen="127.0.0.1:0", user=users, trusted_dir=str(trusted))
-        async with serving(settings, tmp_path) as served:
+        async with serving(OpcUaTable(listen="127.0.0.1:0", user=users), tmp_path) as served:
             with quiet_log() as log:
                 for number in range(3):
                     with pytest.raises((ua.UaError, ConnectionError)):
@@ -193,14 +195,16 @@ class TestTrust:
                             pass
         told = [line for line in log.lines if "refused certificates" in line]
         assert len(told) == 1, told
-        assert "refused certificates from 127.0.0.1: SHA-256 " in told[0]
+        assert "refused certificates from 127.0.0.1: " in told[0]
         assert "made-up-0" in told[0]
+        assert "BadCertificateUntrusted: it is not trusted. drivebridge certificates trust SITE " in told[0]
 
     @pytest.mark.landing
     async def test_the_server_s_identity_stays_over_a_restart_under_another_host_name(
         self, users: list[UserTable], scada: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """A container has another name each time: no client has to trust it anew."""
+        scada.trusted_in(tmp_path)
         settings = OpcUaTable(listen="127.0.0.1:0", user=users)
         seen: list[tuple[bytes, str, str]] = []
         for name in ("hall-3", "9f31c2aa0b17"):

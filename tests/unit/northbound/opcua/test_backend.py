@@ -30,8 +30,8 @@ class Told:
     def __init__(self) -> None:
         self.calls: list[tuple[object, ...]] = []
 
-    async def identify(self, *how: object, encrypted: bool) -> Identity:
-        self.calls.append((*how, encrypted))
+    async def identify(self, login: LoginAttempt) -> Identity:
+        self.calls.append((login,))
         return user().identity
 
     async def write(self, identity: Identity, writes: object) -> list[object]:
@@ -78,10 +78,10 @@ def test_what_a_user_may_write_and_call_follows_from_the_role(where: str, least:
 
 async def test_a_login_becomes_a_user_whose_connection_is_the_session() -> None:
     told = Told()
-    login = LoginAttempt("token", b"nonce", KEY, "10.0.0.1", "session 1f3a", encrypted=True)
+    login = LoginAttempt("token", None, b"nonce", KEY, b"own", "10.0.0.1", "session 1f3a", encrypted=True)
     found = await backend(told).identify(login)
     assert found.identity == user(connection="session 1f3a").identity
-    assert told.calls == [("token", b"nonce", KEY, "10.0.0.1", True)]
+    assert told.calls == [(login,)]
 
 
 def test_a_user_is_the_same_over_any_session_and_nobody_is_none() -> None:
@@ -89,7 +89,7 @@ def test_a_user_is_the_same_over_any_session_and_nobody_is_none() -> None:
     assert not user().is_same(user("eva"))
     assert not user().is_same(NOBODY)
     assert (user("anonymous").is_anonymous, user().is_anonymous) == (True, False)
-    assert [user(role=role).has_rights for role in Role] == [False, True, True]
+    assert [user(role=role).has_rights for role in Role] == [False, True, True, True]
 
 
 async def test_the_view_is_told_by_the_identity() -> None:

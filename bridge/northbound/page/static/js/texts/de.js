@@ -16,6 +16,7 @@ export const de = {
   "theme.dark": "dunkel",
   "role.observer": "Beobachter",
   "role.operator": "Bediener",
+  "role.admin": "Administrator",
   "role.engineer": "Inbetriebnehmer",
   "page.plant": "Anlage",
   "page.drive": "Antrieb",

@@ -16,6 +16,7 @@ export const en = {
   "theme.dark": "dark",
   "role.observer": "observer",
   "role.operator": "operator",
+  "role.admin": "administrator",
   "role.engineer": "engineer",
   "page.plant": "Plant",
   "page.drive": "Drive",

@@ -22,6 +22,7 @@ from bridge.uaserver.library import (
     get,
     make,
     node_id,
+    notification,
     status,
     text,
     ua,
@@ -86,38 +87,50 @@ class ValueItem:
     _last: ua.DataValue | None = None
     _held: ua.DataValue | None = None
     _due: float = -math.inf
+    _released: int = 0
+    """Number of the oldest in the queue that a triggering item has reported."""
 
     @property
     def has_something(self) -> bool:
         return bool(self.queue)
 
     @property
+    def has_report(self) -> bool:
+        """Whether the next in the queue is to be told."""
+        return self._released > 0 or (self.mode == Monitoring.Reporting and self.has_something)
+
+    @property
     def is_holding(self) -> bool:
         """Whether a value waits for the next sample."""
         return self._held is not None
 
-    def change(self, value: ua.DataValue, now: float) -> None:
-        """The attribute may have changed. Between two samples the newest value waits for the next."""
+    def change(self, value: ua.DataValue, now: float) -> bool:
+        """The attribute may have changed; whether something is queued. Between two samples the newest value
+        waits for the next."""
         if self.mode == Monitoring.Disabled:
-            return
+            return False
+        is_queued = False
         if self._held is not None and now - self._due > 2 * _HALF_GRID_S:
             # Nobody has looked since: what was there when the sample was due is told, too.
-            self.sample(self._due + _HALF_GRID_S)
+            is_queued = self.sample(self._due + _HALF_GRID_S)
         self._held = value
-        self.sample(now)
+        return self.sample(now) or is_queued
 
-    def sample(self, now: float) -> None:
+    def sample(self, now: float) -> bool:
+        """Whether something is queued."""
         held = self._held
         if held is None or now < self._due:
-            return
+            return False
         self._held = None
         if self.settings.sampling_ms > LEAST_SAMPLING_MS:
             # Half the time between two looks early is not too early.
             self._due = now + self.settings.sampling_ms / 1000 - _HALF_GRID_S
         value = self.window.part(held)
-        if self.filter.reports(self._last, value):
-            self._last = value
-            self._append(value)
+        if not self.filter.reports(self._last, value):
+            return False
+        self._last = value
+        self._append(value)
+        return True
 
     def _append(self, value: ua.DataValue) -> None:
         size = self.settings.queue_size
@@ -126,11 +139,20 @@ class ValueItem:
         elif size == 1:
             self.queue[0] = value
         elif self.settings.discard_oldest:
-            self.queue.popleft()
+            self._pop()
             self.queue.append(value)
             self.queue[0] = _overflown(self.queue[0])
         else:
             self.queue[-1] = _overflown(value)
+
+    def _pop(self) -> ua.DataValue:
+        self._released = max(0, self._released - 1)
+        return self.queue.popleft()
+
+    def release(self) -> None:
+        """A triggering item has triggered: what is queued is told once."""
+        if self.mode == Monitoring.Sampling:
+            self._released = len(self.queue)
 
     def repeat(self) -> None:
         """Have something to tell: what is queued, or what was told last."""
@@ -142,6 +164,7 @@ class ValueItem:
             self.queue.clear()
             self._last = self._held = None
             self._due = -math.inf
+        self._released = 0
         self.mode = mode
 
     def modify(self, settings: ItemSettings, filter_: ChangeFilter, window: Window) -> None:
@@ -155,12 +178,12 @@ class ValueItem:
             place = 0 if settings.discard_oldest else -1
             kept[place] = _overflown(kept[place])
         self.queue = deque(kept)
+        gone = lost if settings.discard_oldest else 0
+        self._released = min(max(0, self._released - gone), len(kept))
 
     def notification(self) -> ua.MonitoredItemNotification:
         """The next in the queue, which is taken off it."""
-        value = self.window.timed(self.queue.popleft())
-        handle = self.settings.client_handle
-        return make(ua.MonitoredItemNotification, ClientHandle=handle, Value=value)
+        return notification(self.settings.client_handle, self.window.timed(self._pop()))
 
 
 def _overflown(value: ua.DataValue) -> ua.DataValue:
@@ -182,10 +205,21 @@ class EventItem:
     queue: deque[list[ua.Variant]] = field(default_factory=deque["list[ua.Variant]"])
     _loss: list[ua.Variant] | None = None
     """The event that says that others were lost. It is kept in addition to the queue's size."""
+    _released: int = 0
+    """Number of the oldest, the loss included, that a triggering item has reported."""
 
     @property
     def has_something(self) -> bool:
         return bool(self.queue) or self._loss is not None
+
+    @property
+    def has_report(self) -> bool:
+        """Whether the next in the queue is to be told."""
+        return self._released > 0 or (self.mode == Monitoring.Reporting and self.has_something)
+
+    @property
+    def _count(self) -> int:
+        return len(self.queue) + (self._loss is not None)
 
     def hear(self, event: Occurrence) -> bool:
         """Whether the event is queued."""
@@ -199,15 +233,25 @@ class EventItem:
         while len(self.queue) > size:
             if self.settings.discard_oldest:
                 self.queue.popleft()
+                # A loss takes the place of the first that is lost.
+                if self._loss is not None and self._released > 1:
+                    self._released -= 1
             else:
                 self.queue.pop()
             if self._loss is None:
                 self._loss = self.filter.fields(_loss(self.node))
+        self._released = min(self._released, self._count)
+
+    def release(self) -> None:
+        """A triggering item has triggered: what is queued is told once."""
+        if self.mode == Monitoring.Sampling:
+            self._released = self._count
 
     def set_mode(self, mode: ua.MonitoringMode) -> None:
         if mode == Monitoring.Disabled:
             self.queue.clear()
             self._loss = None
+        self._released = 0
         self.mode = mode
 
     def modify(self, settings: ItemSettings, filter_: EventFilter) -> None:
@@ -216,6 +260,7 @@ class EventItem:
 
     def notification(self) -> ua.EventFieldList:
         """The next to tell. A loss comes before what was kept, or behind it where the newest had to go."""
+        self._released = max(0, self._released - 1)
         if self._loss is not None and (self.settings.discard_oldest or not self.queue):
             fields, self._loss = self._loss, None
         else:

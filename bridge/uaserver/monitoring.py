@@ -23,6 +23,7 @@ from bridge.uaserver.library import (
     StatusCodes,
     change,
     get,
+    make,
     status,
     ua,
 )
@@ -147,8 +148,8 @@ class MonitoredItems:
         """Have the item told of every change, and of what there is now."""
 
         async def tell(_handle: int, value: ua.DataValue) -> None:
-            item.change(subscription.owner.seen(item.target, value), loop_time())
-            subscription.noticed(item)
+            is_queued = item.change(subscription.owner.seen(item.target, value), loop_time())
+            subscription.noticed(item, is_queued=is_queued)
 
         where = get(item.target, "NodeId"), get(item.target, "AttributeId")
         _, item.handle = get(self._space, "add_datachange_callback")(*where, tell)
@@ -157,8 +158,8 @@ class MonitoredItems:
 
     def _look(self, subscription: Subscription, item: ValueItem) -> None:
         value = self._space.read_attribute_value(get(item.target, "NodeId"), get(item.target, "AttributeId"))
-        item.change(subscription.owner.seen(item.target, value), loop_time())
-        subscription.noticed(item)
+        is_queued = item.change(subscription.owner.seen(item.target, value), loop_time())
+        subscription.noticed(item, is_queued=is_queued)
 
     def modify(
         self, found: Subscription, params: ua.ModifyMonitoredItemsParameters
@@ -203,6 +204,25 @@ class MonitoredItems:
             found.noticed(item)
 
         return [code_of(set_one, number) for number in get(params, "MonitoredItemIds")]
+
+    def set_triggering(
+        self, found: Subscription, params: ua.SetTriggeringParameters
+    ) -> ua.SetTriggeringResult:
+        """Raises ServiceError for a triggering item that is not there."""
+        trigger = _item(found, get(params, "TriggeringItemId")).number
+
+        def remove(number: int) -> None:
+            found.links.remove(trigger, number)
+
+        def add(number: int) -> None:
+            found.links.add(trigger, _item(found, number))
+
+        # Part 4 §5.13.5.2: what is to be removed comes first.
+        return make(
+            ua.SetTriggeringResult,
+            RemoveResults=[code_of(remove, number) for number in get(params, "LinksToRemove") or ()],
+            AddResults=[code_of(add, number) for number in get(params, "LinksToAdd") or ()],
+        )
 
     def delete(self, found: Subscription, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
         return [

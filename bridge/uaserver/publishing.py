@@ -16,7 +16,7 @@ _MORE_THAN_SUBSCRIPTIONS: Final = 10
 """A server takes more Publish requests than there are subscriptions, but not without end."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PublishRequest:
     """Publish request that is not answered yet. ``results`` are those of its acknowledgements.
 
@@ -29,6 +29,8 @@ class PublishRequest:
     refuse: Callable[[int], None]
     most_bytes: int = MOST_BYTES
     """Approximate size of the notifications: the last one may go beyond it."""
+    handle: int = 0
+    """What its client calls it, also in a Cancel."""
     results: list[ua.StatusCode] = field(default_factory=list[ua.StatusCode])
 
 
@@ -78,6 +80,14 @@ class PublishQueue:
         """The last word of a subscription that this session has no longer."""
         self._parting.append(result)
         self._serve(now)
+
+    def cancel(self, handle: int) -> int:
+        """Answer the requests that the client calls so (OPC 10000-4 §5.7.5); how many there were."""
+        cancelled = [one for one in self._requests if one.handle == handle and one.is_open()]
+        for request in cancelled:
+            self._requests.remove(request)
+            request.refuse(StatusCodes.BadRequestCancelledByClient)
+        return len(cancelled)
 
     def refuse_all(self, code: int, now: float) -> None:
         while request := self._take(now):

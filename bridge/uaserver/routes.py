@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import inspect
 import logging
-import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -20,8 +19,8 @@ from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import struct_from_binary
 
 from bridge.uaserver.browsing import Browser
-from bridge.uaserver.encoding import Results
-from bridge.uaserver.library import ServiceError, StatusCodes, UaError, change, get, make, status, ua
+from bridge.uaserver.encoding import UNSENDABLE, Results
+from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.uaserver.monitoring import MonitoredItems, loop_time
 from bridge.uaserver.publishing import MOST_BYTES, PublishRequest
 from bridge.uaserver.services import request_type
@@ -33,8 +32,6 @@ MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100
 
 _log = logging.getLogger(__name__)
-
-_UNSENDABLE: Final = (UaError, ValueError, TypeError, AttributeError, struct.error)
 
 _Act = Callable[[Session, Any], Any]
 """Given the session and the parameters of the request."""
@@ -52,7 +49,7 @@ class ServiceRequest:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """``operations`` is the field of the parameters that has them, ``most`` how many there may be. What
+    """``operations`` are the fields of the parameters that have them, ``most`` how many there may be. What
     ``act`` returns is the field ``answer`` of the response. Without it a Publish request waits until there is
     something to tell."""
 
@@ -66,7 +63,7 @@ class Route:
         """Raises ServiceError for what is to be answered as a fault."""
         params = struct_from_binary(get(ua, f"{self.name}Parameters"), request.body)
         if self.operations:
-            _limit(get(params, self.operations), self.most)
+            _limit(sum(len(get(params, field) or ()) for field in self.operations.split()), self.most)
         if self.act is None:
             _publish(session, params, request)
             return
@@ -94,6 +91,10 @@ def _call(session: Session, params: Any) -> Any:
     return session.application.call(session.identity, get(params, "MethodsToCall"))
 
 
+def _cancel(session: Session, params: Any) -> ua.CancelResult:
+    return make(ua.CancelResult, CancelCount=session.publishing.cancel(get(params, "RequestHandle")))
+
+
 def _view(act: Callable[[Browser, Any], Any]) -> _Act:
     return lambda session, params: act(session.browser, params)
 
@@ -115,6 +116,7 @@ _RESULTS: Final = "Parameters.Results"
 ROUTES: Final[Mapping[ua.NodeId, Route]] = {
     request_type(route.name): route
     for route in (
+        Route("Cancel", _cancel, answer="Parameters"),
         Route("Browse", _browse, "NodesToBrowse"),
         Route("BrowseNext", _view(Browser.browse_next), "ContinuationPoints", _RESULTS),
         Route("TranslateBrowsePathsToNodeIds", _view(Browser.translate), "BrowsePaths"),
@@ -140,16 +142,22 @@ ROUTES: Final[Mapping[ua.NodeId, Route]] = {
         Route("CreateMonitoredItems", _subscription(Subscriptions.create_items), "ItemsToCreate"),
         Route("ModifyMonitoredItems", _items(MonitoredItems.modify), "ItemsToModify"),
         Route("SetMonitoringMode", _items(MonitoredItems.set_mode), "MonitoredItemIds", _RESULTS),
+        Route(
+            "SetTriggering",
+            _items(MonitoredItems.set_triggering),
+            "LinksToRemove LinksToAdd",
+            "Parameters",
+        ),
         Route("DeleteMonitoredItems", _items(MonitoredItems.delete), "MonitoredItemIds"),
     )
 }
 """Routes by the type of the requests."""
 
 
-def _limit(operations: Sequence[object] | None, most: int) -> None:
+def _limit(operations: int, most: int) -> None:
     if not operations:
         raise ServiceError(StatusCodes.BadNothingToDo)
-    if len(operations) > most:
+    if operations > most:
         raise ServiceError(StatusCodes.BadTooManyOperations)
 
 
@@ -163,7 +171,7 @@ def _publish(session: Session, params: ua.PublishParameters, request: ServiceReq
             request.send(make(ua.PublishResponse, Parameters=result))
         except ServiceError as error:
             refuse(int(error.code))
-        except _UNSENDABLE as error:
+        except UNSENDABLE as error:
             _log.warning("a message of a subscription cannot be sent: %r", error)
             refuse(StatusCodes.BadEncodingError)
 
@@ -176,5 +184,6 @@ def _publish(session: Session, params: ua.PublishParameters, request: ServiceReq
     expires_at = loop_time() + hint_ms / 1000 if hint_ms else float("inf")
     # Half of what the client accepts: the last notification may go beyond the limit.
     most_bytes = min(MOST_BYTES, session.most_bytes // 2)
-    waiting = PublishRequest(expires_at, request.is_open, answer, refuse, most_bytes)
+    handle: int = request.header.RequestHandle
+    waiting = PublishRequest(expires_at, request.is_open, answer, refuse, most_bytes, handle)
     session.subscriptions.publish(session, acknowledged, waiting)

@@ -53,7 +53,11 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
             "without `deleteSubscriptions`, and after a time-out, they live on for their lifetime, for a "
             "transfer",
         ),
-        _no("Cancel", "a request under way has its outcome"),
+        Service(
+            "Cancel",
+            "Publish requests that wait are answered with BadRequestCancelledByClient; a Write or Call is "
+            "carried out and has its outcome",
+        ),
     ),
     "NodeManagement": (
         _no("AddNodes", "the address space follows from the site file"),
@@ -92,7 +96,11 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
         Service("CreateMonitoredItems", "every attribute, events; see [Subscriptions](#subscriptions)"),
         Service("ModifyMonitoredItems", "all parameters"),
         Service("SetMonitoringMode", "disabled, sampling, reporting"),
-        _no("SetTriggering", "items do not trigger each other"),
+        Service(
+            "SetTriggering",
+            "what a linked item has queued is told once, at the end of the publishing interval; at most "
+            "2000 links of a subscription, else BadResourceUnavailable",
+        ),
         Service("DeleteMonitoredItems", "what is queued of them goes, too"),
     ),
     "Subscription": (

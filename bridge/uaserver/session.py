@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 import secrets
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, cast
 
@@ -49,6 +50,7 @@ _LONGEST_SESSION_MS: Final = 120_000.0
 _TOKEN_BYTES: Final = 32
 _NAME_BYTES: Final = 4
 """Length of the name by which a session is told from others of its user, also from those before a restart."""
+_MOST_LOCALES: Final = 10
 _READ: Final = 1
 """Bit of an access level."""
 _OBSERVER_ACCESS: Final = data_value(variant(_READ, ua.VariantType.Byte))
@@ -93,6 +95,8 @@ class Session(InternalSession):
         """Largest answer that its client accepts on that connection, in bytes."""
         self.left_at = 0.0
         """Monotonic time at which it lost its last connection."""
+        self.locales: Sequence[str] = ()
+        """LocaleIds of its client, the preferred one first."""
         self.admitted: UserIdentity | None = None
         """User for whom ``activate_session`` is; set by the processor once the login has been checked."""
 
@@ -122,6 +126,8 @@ class Session(InternalSession):
         if not admitted.is_same(self.identity):
             self._tell(is_there=False)  # for the user before
         self.identity = admitted
+        # Part 4 §5.6.3: who names none later on keeps those that he has named.
+        self.locales = (get(params, "LocaleIds") or self.locales)[:_MOST_LOCALES]
         self._tell(is_there=True)
         # Never Admin: that role may change the address space and write anything.
         self.user = User(UserRole.User, admitted.name)

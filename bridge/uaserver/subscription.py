@@ -5,16 +5,19 @@ Of time it knows what ``on_cycle`` is told; ``subscriptions`` has the timer.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
 from bridge.uaserver.application import UserIdentity
 from bridge.uaserver.encoding import weight
 from bridge.uaserver.eventfilter import Occurrence
-from bridge.uaserver.items import EventItem, Item, Monitoring, ValueItem
+from bridge.uaserver.items import EventItem, Item, ValueItem
+from bridge.uaserver.languages import speaking
 from bridge.uaserver.library import ServiceError, StatusCodes, get, make, status, ua
+from bridge.uaserver.notifications import changes
 from bridge.uaserver.publishing import PublishQueue, PublishRequest
+from bridge.uaserver.triggering import TriggeringLinks
 
 LEAST_INTERVAL_MS: Final = 50.0
 MOST_INTERVAL_MS: Final = 3_600_000.0
@@ -63,6 +66,7 @@ class SubscriptionOwner(Protocol):
 
     session_id: ua.NodeId
     address: str
+    locales: Sequence[str]
     identity: UserIdentity
     channel_certificate: bytes | None
     publishing: PublishQueue
@@ -93,6 +97,7 @@ class Subscription:
         self.owner = owner
         self.terms = agreed
         self.items: dict[int, Item] = {}
+        self.links = TriggeringLinks()
         self._enabled = enabled
         self._listeners: dict[int, EventItem] = {}
         self._ready: dict[int, Item] = {}
@@ -118,8 +123,11 @@ class Subscription:
 
     # what there is to tell
 
-    def noticed(self, item: Item) -> None:
-        """Look at an item whose value, or queue, may have changed."""
+    def noticed(self, item: Item, *, is_queued: bool = False) -> None:
+        """Look at an item whose value, or queue, may have changed. ``is_queued``: it has queued something,
+        which triggers those that are linked to it."""
+        if is_queued:
+            self.links.fire(item.number)
         if isinstance(item, ValueItem) and item.is_holding:
             self._holding[item.number] = item
         if item.has_something:
@@ -133,11 +141,12 @@ class Subscription:
     def drop(self, item: Item) -> None:
         for held in (self.items, self._listeners, self._ready, self._holding):
             held.pop(item.number, None)
+        self.links.drop(item.number)
 
     def hear(self, event: Occurrence) -> None:
         for item in self._listeners.values():
             if item.hear(event):
-                self._ready[item.number] = item
+                self.noticed(item, is_queued=True)
 
     def repeat_values(self) -> None:
         """Tell every value again that nothing newer is queued for."""
@@ -154,10 +163,11 @@ class Subscription:
         if self._silent >= self.terms.lifetime:
             return False
         for item in list(self._holding.values()):
-            item.sample(now)
+            is_queued = item.sample(now)
             if not item.is_holding:
                 del self._holding[item.number]
-            self.noticed(item)
+            self.noticed(item, is_queued=is_queued)
+        self.links.release()
         self._quiet += 1
         if self._quiet >= self.terms.keep_alive or (self._enabled and any(self._reporting())):
             self.owner.publishing.ask(self, now)
@@ -176,8 +186,7 @@ class Subscription:
         self.touch()
 
     def _reporting(self) -> Iterator[Item]:
-        waiting = (item for item in self._ready.values() if item.has_something)
-        return (item for item in waiting if item.mode == Monitoring.Reporting)
+        return (item for item in self._ready.values() if item.has_report)
 
     # messages
 
@@ -185,7 +194,8 @@ class Subscription:
         values, events = self._collect(request.most_bytes) if self._enabled else ([], [])
         data: list[object] = []
         if values:
-            data.append(make(ua.DataChangeNotification, MonitoredItems=values))
+            with speaking(self.owner.locales):
+                data.append(changes(values))
         if events:
             data.append(make(ua.EventNotificationList, Events=events))
         message = make(ua.NotificationMessage, SequenceNumber=self._sequence, NotificationData=data)
@@ -211,7 +221,7 @@ class Subscription:
         events: list[ua.EventFieldList] = []
         left, bytes_left = self.terms.most_per_message, most_bytes
         for item in list(self._reporting()):
-            while left and item.has_something:
+            while left and item.has_report:
                 left -= 1
                 if isinstance(item, ValueItem):
                     values.append(item.notification())

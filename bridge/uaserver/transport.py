@@ -16,6 +16,7 @@ import asyncio
 import logging
 import struct
 from collections import deque
+from collections.abc import Sequence
 from typing import Any, Final
 
 from asyncua.common.connection import TransportLimits
@@ -33,6 +34,7 @@ from bridge.uaserver.arrivals import NEVER, received_at
 from bridge.uaserver.client_notices import tell
 from bridge.uaserver.connection_limits import ConnectionStage
 from bridge.uaserver.encoding import encode
+from bridge.uaserver.languages import speaking
 from bridge.uaserver.library import (
     InvalidSignature,
     ServiceError,
@@ -119,6 +121,10 @@ class Processor(UaProcessor):
         """Bytes of messages and answers that are neither complete nor sent."""
         answer = self.session.answer if isinstance(self.session, Session) else None
         return self._incoming + (len(answer.encoded) if answer else 0)
+
+    @property
+    def _locales(self) -> Sequence[str]:
+        return self.session.locales if isinstance(self.session, Session) else ()
 
     def _begin(self) -> None:
         most = (
@@ -237,7 +243,8 @@ class Processor(UaProcessor):
             self._transport.abort()
             return
         response.ResponseHeader.RequestHandle = requesthandle
-        body = encode(response)
+        with speaking(self._locales):
+            body = encode(response)
         if len(body) > self._limits.max_message_size:
             raise ServiceError(StatusCodes.BadResponseTooLarge)
         self._transport.write(self._connection.message_to_binary(body, msgtype, seqhdr.RequestId))
@@ -311,7 +318,9 @@ class Processor(UaProcessor):
         def is_open() -> bool:
             return session.holder is self and not self._transport.is_closing()
 
-        await route.carry_out(session, ServiceRequest(requesthdr, body, send, is_open))
+        # Results are encoded as they are found.
+        with speaking(session.locales):
+            await route.carry_out(session, ServiceRequest(requesthdr, body, send, is_open))
         return True
 
     async def close(self) -> None:

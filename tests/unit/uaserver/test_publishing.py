@@ -35,8 +35,12 @@ class Rig:
         self.got: list[ua.PublishResult] = []
         self.refused: list[int] = []
 
-    def request(self, expires_at: float = math.inf, open_: bool = True, now: float = 0.0) -> PublishRequest:
-        made = PublishRequest(expires_at, lambda: open_, self.got.append, self.refused.append)
+    def request(
+        self, expires_at: float = math.inf, open_: bool = True, now: float = 0.0, handle: int = 0
+    ) -> PublishRequest:
+        made = PublishRequest(
+            expires_at, lambda: open_, self.got.append, self.refused.append, handle=handle
+        )
         self.queue.put(made, 1, now)
         return made
 
@@ -107,3 +111,14 @@ def test_closing_answers_what_waits_and_leaves_nothing() -> None:
     rig.queue.close(0.0)
     rig.request()
     assert rig.told == []
+
+
+def test_what_is_cancelled_is_answered_and_the_others_wait_on() -> None:
+    rig = Rig()
+    for handle, open_ in ((1, True), (2, True), (1, True), (1, False)):
+        rig.request(handle=handle, open_=open_)
+    assert rig.queue.cancel(1) == 2, "one has lost its connection"
+    assert rig.refused == 2 * [Codes.BadRequestCancelledByClient]
+    assert rig.queue.cancel(1) == 0
+    rig.ask("a")
+    assert rig.told == ["a"]

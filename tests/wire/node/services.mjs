@@ -1,8 +1,8 @@
 // Asks node-opcua's way for what each service answers, and prints it as one line of JSON.
 // node services.mjs URL
 import {
-  AttributeIds, DataChangeFilter, DataChangeTrigger, DeadbandType, MessageSecurityMode, OPCUAClient,
-  SecurityPolicy, TimestampsToReturn, constructEventFilter, ofType,
+  AttributeIds, DataChangeFilter, DataChangeTrigger, DeadbandType, MessageSecurityMode, MonitoringMode,
+  OPCUAClient, SecurityPolicy, TimestampsToReturn, constructEventFilter, ofType,
 } from "node-opcua-client";
 
 const [url] = process.argv.slice(2);
@@ -52,6 +52,17 @@ seen.beyond = await monitored(id("conveyor/fu1/actual/frequency"), percent(101))
 seen.rangeless = await monitored(id("conveyor/fu1/status/state"), percent(5));
 seen.events = await monitored(
   "i=2253", constructEventFilter(["EventType", "Message"], ofType("i=2041")), AttributeIds.EventNotifier);
+
+const watch = (nodeId, monitoringMode) => subscription.monitor(
+  { nodeId, attributeId: AttributeIds.Value }, { samplingInterval: -1, queueSize: 1, discardOldest: true },
+  TimestampsToReturn.Both, monitoringMode);
+const sampled = await watch("i=2255", MonitoringMode.Sampling);
+const linked = new Promise((resolve) => sampled.on("changed", (value) => resolve(value.value.value.length > 1)));
+// The time changes each second.
+const clock = await watch("i=2258", MonitoringMode.Sampling);
+const links = await subscription.setTriggering(clock, [sampled], []);
+seen.links = links.addResults.map((code) => code.name);
+seen.linked = await linked;
 
 await subscription.terminate();
 await session.close();

@@ -109,6 +109,8 @@ async def test_node_opcua_walks_through_the_services(tmp_path: Path) -> None:
         "beyond": "BadDeadbandFilterInvalid",
         "rangeless": "BadDeadbandFilterInvalid",
         "events": "Good",
+        "links": ["Good"],
+        "linked": True,
     }
 
 

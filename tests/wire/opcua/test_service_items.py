@@ -146,6 +146,38 @@ class TestItems:
         assert [code.value for code in codes] == [Codes.Good, Codes.BadMonitoredItemIdInvalid]
         assert [one.Value.Value for one in await told(client, 1)] == [1.0]
 
+    async def test_an_item_that_samples_is_told_once_another_has_something(
+        self, client: Client, view: LocalView
+    ) -> None:
+        number = await subscription(client, RequestedMaxKeepAliveCount=1)
+        load(view, 1.0)
+        wanted = [
+            item(NAMESPACES, mode=Mode.Sampling, ClientHandle=1),
+            item(await point(client, LOAD), ClientHandle=2),
+        ]
+        linked, trigger = [one.MonitoredItemId for one in await monitored(client, number, wanted)]
+
+        async def set_links(add: list[int], remove: list[int]) -> list[list[int]]:
+            asked = {"SubscriptionId": number, "TriggeringItemId": trigger}
+            links = {"LinksToAdd": add, "LinksToRemove": remove}
+            found = (await ask(client, "SetTriggering", **asked, **links)).Parameters
+            return [[code.value for code in codes or []] for codes in (found.AddResults, found.RemoveResults)]
+
+        assert [one.Value.Value for one in await told(client, 1)] == [1.0]
+        unknown = Codes.BadMonitoredItemIdInvalid
+        # What is to be removed comes first.
+        assert await set_links([linked, 4711], [linked]) == [[Codes.Good, unknown], [unknown]]
+        assert (await published(client)).NotificationMessage.NotificationData == []
+        load(view, 2.0)
+        array = await client.get_namespace_array()
+        assert [one.Value.Value for one in await told(client, 2)] == [array, 2.0]
+        assert await set_links([], [linked]) == [[], [Codes.Good]]
+        with pytest.raises(Errors.BadNothingToDo):
+            await set_links([], [])
+        trigger = 4711
+        with pytest.raises(Errors.BadMonitoredItemIdInvalid):
+            await set_links([linked], [])
+
     async def test_a_percent_deadband_is_a_part_of_the_range(self, client: Client, view: LocalView) -> None:
         """The load reaches from 0 to 100 %."""
         number = await subscription(client)

@@ -117,6 +117,20 @@ class TestSubscriptions:
         with pytest.raises(Errors.BadNoSubscription):
             await waiting
 
+    async def test_what_waits_can_be_cancelled_by_its_handle(self, client: Client) -> None:
+        await subscription(client, 5000)
+        waiting = [asyncio.create_task(published(client)) for _ in range(2)]
+        await asyncio.sleep(0.05)
+        handle: int = client.uaclient.protocol._request_handle  # that of the second
+        for count in (1, 0):
+            answer = await ask(client, "Cancel", RequestHandle=handle)
+            assert answer.Parameters.CancelCount == count
+        with pytest.raises(Errors.BadRequestCancelledByClient):
+            await waiting[1]
+        assert not waiting[0].done()
+        await ask(client, "Cancel", RequestHandle=handle - 1)
+        await asyncio.gather(*waiting, return_exceptions=True)
+
     async def test_the_mode_is_set_where_it_can_be(self, client: Client, view: LocalView) -> None:
         number = await subscription(client, PublishingEnabled=False, RequestedMaxKeepAliveCount=1)
         await monitored(client, number, [item(await point(client, LOAD))])

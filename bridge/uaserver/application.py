@@ -24,8 +24,8 @@ class UserIdentity(Protocol):
         ...
 
     @property
-    def has_rights(self) -> bool:
-        """May do more than read."""
+    def rank(self) -> int:
+        """Height of its role; 0 may only read. Where there is not room for all, the lowest one yields."""
         ...
 
     def is_same(self, other: Any) -> bool:
@@ -38,7 +38,7 @@ class Nobody:
 
     name = ""
     is_anonymous = True
-    has_rights = False
+    rank = -1
 
     def is_same(self, other: object) -> bool:
         return self is other
@@ -73,6 +73,11 @@ class ServedApplication(Protocol[U]):
 
     async def identify(self, login: LoginAttempt) -> U:
         """Raises ServiceError for who is not let in."""
+        ...
+
+    @property
+    def highest_rank(self) -> int:
+        """Rank that no user exceeds."""
         ...
 
     def may(self, user: U, where: ua.NodeId) -> bool:

@@ -11,7 +11,7 @@ import math
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, cast
+from typing import Any, Final, Protocol, cast
 
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.address_space import AddressSpace
@@ -22,8 +22,10 @@ from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.base.guard import Guard
+from bridge.base.sources import source_of
 from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
 from bridge.uaserver.browsing import Browser
+from bridge.uaserver.client_notices import tell
 from bridge.uaserver.connection_limits import MOST_CONNECTIONS
 from bridge.uaserver.encoding import Results
 from bridge.uaserver.library import (
@@ -59,6 +61,14 @@ _NOTHING: Final = variant(None, ua.VariantType.Null)
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
 
 
+class Connection(Protocol):
+    """Connection that a session is activated on."""
+
+    def end(self, code: int) -> None:
+        """Close it, and tell the client why."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class ShownCertificate:
     """Certificate of the server, in DER, with its key."""
@@ -87,7 +97,7 @@ class Session(InternalSession):
         """Certificate of the server when the session came to its connection: a client encrypts for it."""
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
-        self.holder: object | None = None
+        self.holder: Connection | None = None
         """The processor of the connection that it is activated on."""
         self.answer: Results | None = None
         """Answer that is being encoded for it."""
@@ -205,6 +215,14 @@ class Session(InternalSession):
                 await self.close_session(delete_subs=False)
                 return
             await asyncio.sleep(left_s)
+
+    async def evict(self) -> None:
+        """End it, with its subscriptions and its connection, for somebody with a higher role."""
+        holder = self.holder
+        tell("sessions that made room for a higher role", source_of(self.address), self.identity.name)
+        await self.close_session()
+        if holder:
+            holder.end(StatusCodes.BadTcpServerTooBusy)
 
     async def close_session(self, delete_subs: bool = True) -> None:
         # asyncua closes it again when its connection ends, and would have the subscriptions deleted then.

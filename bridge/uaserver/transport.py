@@ -169,9 +169,18 @@ class Processor(UaProcessor):
             self._count(is_broken=True)
             self._server.guard.note(error)
             code = StatusCodes.BadTcpInternalError
+        self._say(code)
+        return False
+
+    def end(self, code: int) -> None:
+        """Close the connection, and tell the client why."""
+        self._count(is_broken=True)
+        self._say(code)
+        self._transport.close()
+
+    def _say(self, code: int) -> None:
         message = make(ua.ErrorMessage, Error=status(code))
         self._transport.write(uatcp_to_binary(_ERROR, message))
-        return False
 
     def _count(self, *, is_broken: bool) -> None:
         """A connection that ends, once: what came before it was closed is still looked at."""
@@ -292,7 +301,9 @@ class Processor(UaProcessor):
 
     async def _make_room(self) -> None:
         try:
-            await make_room_for_session(self._source, self._server.sessions)
+            await make_room_for_session(
+                self._source, self._server.sessions, self._server.application.highest_rank
+            )
         except ServiceError:
             self._server.application.on_refused()
             tell("refused sessions", self._source, "all that it may have, or all there are, are in use")

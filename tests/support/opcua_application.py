@@ -20,6 +20,10 @@ class User:
     has_rights: bool = True
     is_anonymous: bool = False
 
+    @property
+    def rank(self) -> int:
+        return int(self.has_rights)
+
     def is_same(self, other: object) -> bool:
         return self == other
 
@@ -47,6 +51,10 @@ class Served(ServedApplication[User]):
         if name not in self.users:
             raise ServiceError(ua.StatusCodes.BadUserAccessDenied)
         return self.users[name]
+
+    @property
+    def highest_rank(self) -> int:
+        return max((user.rank for user in self.users.values()), default=0)
 
     def may(self, user: User, where: ua.NodeId) -> bool:
         return user.has_rights

@@ -54,6 +54,12 @@ class Accounts:
         self._checks.close()
 
     @property
+    def highest_role(self) -> Role:
+        """Highest role that anybody has."""
+        roles = [Role[user.role.upper()] for user in self._accounts.values()]
+        return max([*roles, self._anonymous or Role.OBSERVER])
+
+    @property
     def tokens(self) -> list[type]:
         """Identity tokens to offer. With neither users nor anonymous access, the list is empty and nobody
         gets in."""

@@ -33,8 +33,8 @@ class SessionUser:
         return self.identity.user == ANONYMOUS
 
     @property
-    def has_rights(self) -> bool:
-        return self.identity.role >= Role.OPERATOR
+    def rank(self) -> int:
+        return int(self.identity.role)
 
     def is_same(self, other: object) -> bool:
         return isinstance(other, SessionUser) and self.identity.is_same(other.identity)
@@ -64,6 +64,10 @@ class Backend(ServedApplication[SessionUser]):
     async def identify(self, login: LoginAttempt) -> SessionUser:
         identity = await self._users.identify(login)
         return SessionUser(replace(identity, connection=login.session))
+
+    @property
+    def highest_rank(self) -> int:
+        return int(self._users.highest_role)
 
     def may(self, user: SessionUser, where: ua.NodeId) -> bool:
         least = self._caller.least_role(where)

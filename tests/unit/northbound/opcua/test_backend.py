@@ -89,7 +89,7 @@ def test_a_user_is_the_same_over_any_session_and_nobody_is_none() -> None:
     assert not user().is_same(user("eva"))
     assert not user().is_same(NOBODY)
     assert (user("anonymous").is_anonymous, user().is_anonymous) == (True, False)
-    assert [user(role=role).has_rights for role in Role] == [False, True, True, True]
+    assert [user(role=role).rank for role in Role] == [0, 1, 2, 3]
 
 
 async def test_the_view_is_told_by_the_identity() -> None:

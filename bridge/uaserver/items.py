@@ -22,7 +22,6 @@ from bridge.uaserver.library import (
     get,
     make,
     node_id,
-    notification,
     status,
     text,
     ua,
@@ -181,9 +180,9 @@ class ValueItem:
         gone = lost if settings.discard_oldest else 0
         self._released = min(max(0, self._released - gone), len(kept))
 
-    def notification(self) -> ua.MonitoredItemNotification:
+    def take(self) -> ua.DataValue:
         """The next in the queue, which is taken off it."""
-        return notification(self.settings.client_handle, self.window.timed(self._pop()))
+        return self.window.timed(self._pop())
 
 
 def _overflown(value: ua.DataValue) -> ua.DataValue:

@@ -17,7 +17,16 @@ from typing import Final
 from asyncua.ua.ua_binary import struct_to_binary
 
 from bridge.uaserver.encoding import UNSENDABLE
-from bridge.uaserver.library import ObjectIds, StatusCodes, change, data_value, extension, node_id, status, ua
+from bridge.uaserver.library import (
+    ObjectIds,
+    StatusCodes,
+    data_value,
+    extension,
+    node_id,
+    notification,
+    status,
+    ua,
+)
 
 _CHANGES: Final = node_id(ObjectIds.DataChangeNotification_Encoding_DefaultBinary)
 _LENGTH: Final = struct.Struct("<i")
@@ -43,26 +52,27 @@ _ticks: Final = lru_cache(maxsize=64)(ua.datetime_to_win_epoch)
 _UNSENDABLE: Final = status(StatusCodes.BadEncodingError)
 
 
-def changes(told: Sequence[ua.MonitoredItemNotification]) -> ua.ExtensionObject:
-    """A DataChangeNotification with these changes, encoded. A value that cannot be encoded is told as
-    BadEncodingError."""
-    parts = [_LENGTH.pack(len(told))]
-    for one in told:
-        try:
-            parts.append(_encoded(one))
-        except UNSENDABLE:
-            bad = data_value(None, _UNSENDABLE, one.Value.SourceTimestamp, one.Value.ServerTimestamp)
-            parts.append(struct_to_binary(change(one, Value=bad)))
-    return extension(_CHANGES, b"".join((*parts, _NO_DIAGNOSTICS)))
+def changes(told: Sequence[bytes]) -> ua.ExtensionObject:
+    """A DataChangeNotification with these changes, each by ``change``."""
+    return extension(_CHANGES, b"".join((_LENGTH.pack(len(told)), *told, _NO_DIAGNOSTICS)))
 
 
-def _encoded(one: ua.MonitoredItemNotification) -> bytes:
-    value: ua.DataValue = one.Value
+def change(client_handle: int, value: ua.DataValue) -> bytes:
+    """A MonitoredItemNotification, encoded. A value that cannot be encoded is told as BadEncodingError."""
+    try:
+        return _packed(client_handle, value) or struct_to_binary(notification(client_handle, value))
+    except UNSENDABLE:
+        bad = data_value(None, _UNSENDABLE, value.SourceTimestamp, value.ServerTimestamp)
+        return struct_to_binary(notification(client_handle, bad))
+
+
+def _packed(client_handle: int, value: ua.DataValue) -> bytes:
+    """Empty for what is no single number."""
     held, code = value.Value, value.StatusCode
     if held is None or held.is_array or held.VariantType not in _FORMATS or value.SourcePicoseconds:
-        return struct_to_binary(one)
+        return b""
     mask, fields = _HAS_VALUE, list[int]()
-    if code is not None and code.value != StatusCodes.Good:
+    if code is not None and code.value:
         mask |= _HAS_STATUS
         fields.append(code.value)
     if value.SourceTimestamp is not None:
@@ -72,10 +82,10 @@ def _encoded(one: ua.MonitoredItemNotification) -> bytes:
         mask |= _HAS_SERVER
         fields.append(_ticks(value.ServerTimestamp))
     kind = held.VariantType
-    return _packed(mask, kind)(one.ClientHandle, mask, kind, held.Value, *fields)
+    return _packer(mask, kind)(client_handle, mask, kind, held.Value, *fields)
 
 
 @cache
-def _packed(mask: int, kind: ua.VariantType) -> Callable[..., bytes]:
+def _packer(mask: int, kind: ua.VariantType) -> Callable[..., bytes]:
     rest = "".join(field for bit, field in _FIELDS if mask & bit)
     return struct.Struct(f"<IBB{_FORMATS[kind]}{rest}").pack

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -134,10 +135,16 @@ def source_time(epoch_ns: int) -> datetime:
     return datetime.fromtimestamp(epoch_ns / 1e9, UTC)
 
 
+@lru_cache(maxsize=2)
+def _server_time(epoch_ms: int) -> datetime:
+    """A time that all have which are looked at together."""
+    return datetime.fromtimestamp(epoch_ms / 1000, UTC)
+
+
 def reading_value(
     reading: Reading, variant_type: ua.VariantType, epoch_ns: int, bit: int | None = None
 ) -> ua.DataValue:
-    """``reading`` for a client, or with ``bit`` that bit of it. The server's time is now."""
+    """``reading`` for a client, or with ``bit`` that bit of it. The server's time is now, in milliseconds."""
     quality = reading.quality
     code = QUALITY_STATUS[quality]
     if code.is_bad():
@@ -148,7 +155,7 @@ def reading_value(
         value = _BITS[int(reading.value) >> bit & 1]
     # A point that has never had a value has no source time either.
     stamp = None if quality is Quality.WAITING else source_time(epoch_ns)
-    return stamped(value, code, stamp, datetime.now(UTC))
+    return stamped(value, code, stamp, _server_time(int(time.time() * 1000)))
 
 
 def present_value(

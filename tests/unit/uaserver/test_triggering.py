@@ -230,9 +230,9 @@ def test_what_is_released_is_what_was_queued_then(
             number += 1
             item.change(ua.DataValue(ua.Variant(number, ua.VariantType.Int32)), float(number))
         while step == "l" and item.has_report:
-            told = item.notification().Value.Value.Value
+            told = item.take().Value.Value
             assert told <= released or size == 1 or not oldest
     item.release()
     left = len(item.queue)
-    assert sum(1 for _ in iter(lambda: item.has_report and item.notification(), False)) == left
+    assert sum(1 for _ in iter(lambda: item.has_report and item.take(), False)) == left
     assert not item.has_something

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from bridge.image.point import DataType, Point
+from bridge.image.point import DataType, Point, WriteKind
 from bridge.mapping.model import Parameter
 from bridge.parameter import Names, ParameterEntry
 
@@ -28,6 +28,7 @@ def _point(name: str, entry: ParameterEntry) -> Point:
         low=definition.low,
         high=definition.high,
         writable=definition.writable,
+        write=WriteKind.PARAMETER,
         description=f"{entry.name} {definition.title}",
         states=tuple(definition.states.items()) if _can_be_listed(definition) else (),
     )

@@ -197,6 +197,8 @@ class Session(InternalSession):
         if attribute == AttributeIds.Value:
             return value if self._is_readable(where) else _NOT_READABLE
         held = value.Value
+        if attribute == AttributeIds.UserRolePermissions:
+            return _granted(value, self.application.roles(self.identity))
         if attribute not in _BY_USER or held is None or not held.Value:
             return value
         return value if self.application.may(self.identity, where) else _BY_USER[attribute]
@@ -238,6 +240,14 @@ class Session(InternalSession):
         self.publishing.close(loop_time())
         self.subscriptions.end(self, delete=delete_subs)
         await super().close_session(delete_subs=False)
+
+
+def _granted(value: ua.DataValue, roles: Sequence[ua.NodeId]) -> ua.DataValue:
+    """The entries of RolePermissions that are for ``roles``."""
+    if value.Value is None or not value.Value.Value:
+        return value
+    entries = [one for one in value.Value.Value if get(one, "RoleId") in roles]
+    return data_value(variant(entries, ua.VariantType.ExtensionObject), value.StatusCode)
 
 
 class InnerServer(InternalServer):

@@ -59,6 +59,9 @@ class Served(ServedApplication[User]):
     def may(self, user: User, where: ua.NodeId) -> bool:
         return user.has_rights
 
+    def roles(self, user: User) -> Sequence[ua.NodeId]:
+        return [ua.NodeId(ua.ObjectIds.WellKnownRole_Operator)] if user.has_rights else []
+
     async def write(self, user: User, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
         self.written += [(user.name, one.Value.Value.Value) for one in writes]
         self.after_write()

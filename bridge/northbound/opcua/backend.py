@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from bridge.base import clock
@@ -10,12 +10,13 @@ from bridge.command.messages.freshness import Inflow
 from bridge.command.messages.request import Identity, Role
 from bridge.northbound.opcua.accounts import Accounts
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.permissions import ROLE_NODES
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.passwords import ANONYMOUS
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
-from bridge.uaserver.library import ua
+from bridge.uaserver.library import node_id, ua
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +53,20 @@ class ConnectionArrivals:
 
 
 class Backend(ServedApplication[SessionUser]):
-    """Users, writes and calls of the server's sessions. ``pulse`` is that of the event loop."""
+    """Users, writes and calls of the server's sessions. ``least_role`` is that of the tree, ``pulse`` that of
+    the event loop."""
 
-    def __init__(self, users: Accounts, writer: Writer, caller: Caller, view: View, pulse: Pulse) -> None:
+    def __init__(
+        self,
+        users: Accounts,
+        least_role: Callable[[ua.NodeId], Role | None],
+        writer: Writer,
+        caller: Caller,
+        view: View,
+        pulse: Pulse,
+    ) -> None:
         self._users = users
+        self._least_role = least_role
         self._writer = writer
         self._caller = caller
         self._view = view
@@ -70,10 +81,11 @@ class Backend(ServedApplication[SessionUser]):
         return int(self._users.highest_role)
 
     def may(self, user: SessionUser, where: ua.NodeId) -> bool:
-        least = self._caller.least_role(where)
-        if least is None:
-            least = self._writer.least_role(where)
+        least = self._least_role(where)
         return user.identity.role >= (Role.OPERATOR if least is None else least)
+
+    def roles(self, user: SessionUser) -> Sequence[ua.NodeId]:
+        return [node_id(where) for where in ROLE_NODES[user.identity.role]]
 
     async def write(self, user: SessionUser, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
         return await self._writer.write(user.identity, writes)

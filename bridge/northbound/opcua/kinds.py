@@ -12,6 +12,7 @@ from typing import Final
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeManagementService
 
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode
+from bridge.northbound.opcua.permissions import least_role, permission, role_permissions
 from bridge.northbound.opcua.structures import (
     PropertyNode,
     point_attributes,
@@ -37,6 +38,8 @@ Node = ObjectNode | MethodNode | VariableNode | PropertyNode
 
 SUBSCRIBE_TO_EVENTS: Final = 1
 _ANY: Final = node_id("any", 1)
+_NO_RESTRICTION: Final = AttributeValue(data_value(variant(0, ua.VariantType.UInt16)))
+"""A channel without security will do, where there is one at all (Part 3 §5.2.11)."""
 _TYPE_DEFINITION: Final = {
     VariableKind.PLAIN: ObjectIds.BaseDataVariableType,
     VariableKind.ANALOG: ObjectIds.AnalogUnitType,
@@ -98,6 +101,7 @@ class Kinds:
                 node_class, type_id = ua.NodeClass.Variable, ObjectIds.PropertyType
                 wanted = property_attributes(node.content)
         attributes = _attributes(node_class, wanted)
+        attributes |= _permissions(node)
         if isinstance(node, PropertyNode):
             held = attributes[AttributeIds.Value].value
             change(held, SourceTimestamp=self._built_at, ServerTimestamp=self._built_at)
@@ -105,6 +109,17 @@ class Kinds:
         if type_id != ObjectIds.Null:
             to_type = (reference_to(self._space, type_id, ObjectIds.HasTypeDefinition, forward=True),)
         return NodeKind(attributes, node_class, node_id(type_id), to_type)
+
+
+def _permissions(node: Node) -> dict[AttributeIds, AttributeValue]:
+    """Attributes of what each role may; a session shows a user its own."""
+    sends_events = isinstance(node, ObjectNode) and node.notifier
+    table = role_permissions(least_role(node), permission(node), sends_events=sends_events)
+    return {
+        AttributeIds.RolePermissions: table,
+        AttributeIds.UserRolePermissions: table,
+        AttributeIds.AccessRestrictions: _NO_RESTRICTION,
+    }
 
 
 def constant(value: object, kind: ua.VariantType) -> AttributeValue:
@@ -155,9 +170,9 @@ def _key(node: Node) -> Hashable:
         case ObjectNode():
             return node.folder, node.notifier
         case MethodNode():
-            return MethodNode
+            return MethodNode, least_role(node)
         case VariableNode():
-            return node.kind, value_type(node), node.writable
+            return node.kind, value_type(node), node.writable, least_role(node)
         case PropertyNode():
             return node.content
 

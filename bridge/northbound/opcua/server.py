@@ -158,6 +158,7 @@ class OpcUaServer:
         tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
         inner.application = Backend(
             users,
+            tree.least_role,
             Writer(self._view, inner.aspace, tree.writable),
             Caller(self._view, inner.aspace, tree.method),
             self._view,

@@ -12,10 +12,12 @@ from typing import Final, cast
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
+from bridge.command.messages.request import Role
 from bridge.image import Image
 from bridge.northbound.opcua.data_values import EpochNs
 from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node, constant, reference_to
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
+from bridge.northbound.opcua.permissions import least_role
 from bridge.northbound.opcua.point_values import AllWatched, PointValue
 from bridge.northbound.opcua.structures import PropertyNode, property_nodes
 from bridge.uaserver.address_space import Attributes, Nodes, Watchers
@@ -155,6 +157,11 @@ class Tree:
     def method(self, where: ua.NodeId) -> MethodNode | None:
         node = self._node(where)
         return node if isinstance(node, MethodNode) else None
+
+    def least_role(self, where: ua.NodeId) -> Role | None:
+        """The role that writing or calling this node needs; None where nobody may."""
+        node = self._node(where)
+        return least_role(node) if node else None
 
     def writable(self, where: ua.NodeId) -> VariableNode | None:
         """The variable, where it is one that clients may write."""

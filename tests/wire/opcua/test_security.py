@@ -256,6 +256,26 @@ class TestRoles:
             assert await told(client) == (3, True)
             assert await control_word(client) == Codes.Good
 
+    async def test_a_client_reads_which_role_may_what(self, open_: Served) -> None:
+        async def told(client: Client, attribute: int) -> dict[str, bool]:
+            """Roles in the attribute of a command point, and whether they may write."""
+            point = ua.NodeId("conveyor/fu1/command/control_word", await namespace(client))
+            value = (await client.get_node(point).read_attribute(attribute)).Value.Value
+            names = {ident: name.removeprefix("WellKnownRole_") for name, ident in vars(ua.ObjectIds).items()}
+            writes = ua.PermissionType.Write
+            return {names[one.RoleId.Identifier]: writes in one.Permissions for one in value}
+
+        may = {"Observer": False, "Operator": True, "Engineer": True, "ConfigureAdmin": True}
+        async with connected(open_[0]) as client:
+            roles = await client.get_node(ua.ObjectIds.Server_ServerCapabilities_RoleSet).get_children()
+            names = {(await one.read_browse_name()).Name for one in roles}
+            assert {"Anonymous", "AuthenticatedUser", "SecurityAdmin", *may} <= names
+            found = await told(client, ua.AttributeIds.RolePermissions)
+            assert found == may | {"SecurityAdmin": True}
+            assert await told(client, ua.AttributeIds.UserRolePermissions) == {"Observer": False}
+        async with logged_in(open_, None, "anna", PASSWORD) as client:
+            assert await told(client, ua.AttributeIds.UserRolePermissions) == {"Operator": True}
+
     async def test_a_password_in_clear_text_is_not_taken(self, open_: Served) -> None:
         client = Client(open_[0].endpoint_url, timeout=10)
         await client.connect_socket()

@@ -57,6 +57,8 @@ class ClientTrust:
         try:
             certificates = certificates_in(sent)
         except MALFORMED:
+            certificates = []
+        if not certificates:
             return Refusal(StatusCodes.BadSecurityChecksFailed, f"{CertificateFault.INVALID}: unreadable")
         purpose = Purpose(application_uri, needs_trust=self._needs_trust)
         verdict = judge(certificates, self._store.lists(), self._now(), purpose)

@@ -12,8 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.config import OpcUaTable, UserTable
+from bridge.trust import TrustStore
+from tests.support.certificates import CLIENT_URI, Case, cases, make
 from tests.support.opcua_raw import cut, sessions
 from tests.support.opcua_site import OPEN, serving
 from tests.support.passwords import cheap_hash
@@ -166,3 +169,32 @@ async def test_node_opcua_works_in_the_middle_of_a_crowd(tmp_path: Path) -> None
         for _, writer in crowd:
             writer.close()
     assert (seen["run"], seen["stop"]) == ("Good", "Good")
+
+
+@pytest.mark.landing
+async def test_node_opcua_is_told_what_is_wrong_with_its_certificate(tmp_path: Path) -> None:
+    hidden = "BadSecurityChecksFailed"
+    expected = {
+        "trusted itself": "Good",
+        "short key": hidden,
+        "run out": "BadCertificateTimeInvalid",
+        "not for signing": "BadCertificateUseNotAllowed",
+        "revoked": "BadCertificateRevoked",
+    }
+    shown, home = tmp_path / "shown", tmp_path / "state"
+    shown.mkdir()
+    store = TrustStore(home / "certificates")
+    store.prepare()
+    stranger = make()
+    shown_by = {name: cases()[name] for name in expected} | {"unknown": Case((stranger,), ())}
+    for name, case in shown_by.items():
+        (shown / f"{name}.der").write_bytes(case.sent[0].der)
+        (shown / f"{name}.pem").write_bytes(case.sent[0].pem_key)
+        for number, one in enumerate(case.trusted):
+            (store.trusted / f"{name} {number}.der").write_bytes(one.der)
+        for crl in case.crls if name == "revoked" else ():
+            (store.trusted / "revoked.crl").write_bytes(crl.public_bytes(Encoding.DER))
+    site = settings_for(encrypted=True).model_copy(update={"trust": "list"})
+    async with serving(site, home) as (server, _):
+        how = (server.endpoint_url, str(shown), CLIENT_URI, "anna", "swordfish")
+        assert await answers("certificates.mjs", tmp_path, *how) == expected | {"unknown": hidden}

@@ -15,6 +15,8 @@ from pathlib import Path
 from typing import Final
 
 from cryptography import x509
+from cryptography.hazmat.primitives.hashes import SHA1
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.base.errors import OperationFailed, Unavailable
 from bridge.base.quietlog import log_source
@@ -217,14 +219,24 @@ class TrustStore:
             raise OperationFailed(Text.of("trust.unwritable", file=str(file), why=str(error))) from error
         return path
 
+    def add(self, folder: Path, content: Content) -> Path:
+        """Put a certificate or a revocation list into ``trusted`` or ``issuers``. Raises
+        ``OperationFailed``."""
+        if isinstance(content, x509.Certificate):
+            return self._put(folder, content)
+        encoded = content.public_bytes(Encoding.DER)
+        return _write(folder / f"{content.fingerprint(SHA1()).hex()}.crl", encoded)
+
+    def replace(self, folder: Path, kind: type[Content], contents: Sequence[Content]) -> None:
+        """Have exactly these of one kind in ``folder``: first the new ones come, then the others go. Raises
+        ``OperationFailed``."""
+        kept = {self.add(folder, one) for one in contents}
+        for file, content in self.files(folder):
+            if isinstance(content, kind) and file not in kept:
+                file.unlink(missing_ok=True)
+
     def _put(self, folder: Path, certificate: x509.Certificate) -> Path:
-        path = folder / f"{thumbprint(certificate)}{_SUFFIX}"
-        try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            write_whole(path, der(certificate), _PUBLIC)
-        except OSError as error:
-            raise OperationFailed(Text.of("trust.unwritable", file=str(path), why=str(error))) from error
-        return path
+        return _write(folder / f"{thumbprint(certificate)}{_SUFFIX}", der(certificate))
 
     def find_rejected(self, prefix: str) -> Rejected:
         """Certificate in ``rejected`` whose thumbprint begins so. Raises ``OperationFailed`` for none and for
@@ -241,6 +253,16 @@ class TrustStore:
         if len(found) == 1:
             return found[0]
         raise _not_one(prefix, len(found), self.trusted)
+
+
+def _write(path: Path, content: bytes) -> Path:
+    """Raises ``OperationFailed``."""
+    try:
+        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        write_whole(path, content, _PUBLIC)
+    except OSError as error:
+        raise OperationFailed(Text.of("trust.unwritable", file=str(path), why=str(error))) from error
+    return path
 
 
 def _matches(certificate: x509.Certificate, prefix: str) -> bool:

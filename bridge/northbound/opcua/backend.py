@@ -11,19 +11,22 @@ from bridge.command.messages.request import Identity, Role
 from bridge.northbound.opcua.accounts import Accounts
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.permissions import ROLE_NODES
+from bridge.northbound.opcua.server_configuration import ServerConfiguration
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.passwords import ANONYMOUS
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
-from bridge.uaserver.library import node_id, ua
+from bridge.uaserver.library import get, node_id, ua
 
 
 @dataclass(frozen=True, slots=True)
 class SessionUser:
-    """User of a session; ``identity`` names the session as its connection."""
+    """User of a session; ``identity`` names the session as its connection. ``encrypted`` says whether its
+    channel is."""
 
     identity: Identity
+    encrypted: bool = False
 
     @property
     def name(self) -> str:
@@ -62,6 +65,7 @@ class Backend(ServedApplication[SessionUser]):
         least_role: Callable[[ua.NodeId], Role | None],
         writer: Writer,
         caller: Caller,
+        configuration: ServerConfiguration,
         view: View,
         pulse: Pulse,
     ) -> None:
@@ -69,18 +73,21 @@ class Backend(ServedApplication[SessionUser]):
         self._least_role = least_role
         self._writer = writer
         self._caller = caller
+        self._configuration = configuration
         self._view = view
         self._pulse = pulse
 
     async def identify(self, login: LoginAttempt) -> SessionUser:
         identity = await self._users.identify(login)
-        return SessionUser(replace(identity, connection=login.session))
+        return SessionUser(replace(identity, connection=login.session), login.encrypted)
 
     @property
     def highest_rank(self) -> int:
         return int(self._users.highest_role)
 
     def may(self, user: SessionUser, where: ua.NodeId) -> bool:
+        if self._configuration.has(where):
+            return user.encrypted and user.identity.role >= Role.ADMIN
         least = self._least_role(where)
         return user.identity.role >= (Role.OPERATOR if least is None else least)
 
@@ -93,7 +100,15 @@ class Backend(ServedApplication[SessionUser]):
     async def call(
         self, user: SessionUser, calls: Sequence[ua.CallMethodRequest]
     ) -> list[ua.CallMethodResult]:
-        return await self._caller.call(user.identity, calls)
+        if not any(self._configuration.has(get(one, "MethodId")) for one in calls):
+            return await self._caller.call(user.identity, calls)
+        return [await self._call(user, one) for one in calls]
+
+    async def _call(self, user: SessionUser, call: ua.CallMethodRequest) -> ua.CallMethodResult:
+        if self._configuration.has(get(call, "MethodId")):
+            return await self._configuration.call(user.identity, call, encrypted=user.encrypted)
+        (result,) = await self._caller.call(user.identity, [call])
+        return result
 
     def on_connection(self, user: SessionUser, *, is_there: bool, has_others: bool) -> None:
         self._view.on_connection(user.identity, is_there=is_there, has_others=has_others)

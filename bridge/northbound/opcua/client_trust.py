@@ -48,7 +48,7 @@ class ClientTrust:
     def __init__(
         self, store: TrustStore, *, needs_trust: bool, now: Callable[[], datetime] = utc_now
     ) -> None:
-        self._store = store
+        self.store = store
         self._needs_trust = needs_trust
         self._now = now
 
@@ -61,10 +61,10 @@ class ClientTrust:
         if not certificates:
             return Refusal(StatusCodes.BadSecurityChecksFailed, f"{CertificateFault.INVALID}: unreadable")
         purpose = Purpose(application_uri, needs_trust=self._needs_trust)
-        verdict = judge(certificates, self._store.lists(), self._now(), purpose)
+        verdict = judge(certificates, self.store.lists(), self._now(), purpose)
         if verdict.fault is None:
             return None
-        self._store.keep_rejected(certificates, source, clock.now())
+        self.store.keep_rejected(certificates, source, clock.now())
         code = (
             StatusCodes.BadSecurityChecksFailed if verdict.is_strangers else get(StatusCodes, verdict.fault)
         )

@@ -16,16 +16,20 @@ from bridge.base.errors import OperationFailed
 from bridge.command import EventKind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
+from bridge.northbound.opcua import server_configuration
 from bridge.northbound.opcua.accounts import Accounts, security_policies
 from bridge.northbound.opcua.backend import Backend
+from bridge.northbound.opcua.certificates import OwnCertificate
 from bridge.northbound.opcua.change_publisher import Publisher
 from bridge.northbound.opcua.client_trust import ClientTrust, client_store
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.own_files import own_folder
+from bridge.northbound.opcua.own_renewal import OwnRenewal
 from bridge.northbound.opcua.own_watch import OwnWatch
-from bridge.northbound.opcua.ownnames import names_of
+from bridge.northbound.opcua.ownnames import names_of, reached_by
+from bridge.northbound.opcua.server_configuration import ServerConfiguration
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.opcua.writes import Writer
@@ -156,14 +160,22 @@ class OpcUaServer:
         namespace = await server.register_namespace(NAMESPACE)
         image = self._view.image
         tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
+        renewal = self._renewal(own)
+
+        def take_up(own: OwnCertificate) -> None:
+            renewal.own = own
+            server.renew(own.certificate, own.private_key)
+
         inner.application = Backend(
             users,
             tree.least_role,
             Writer(self._view, inner.aspace, tree.writable),
             Caller(self._view, inner.aspace, tree.method),
+            ServerConfiguration(renewal, trusted.store, self._own_files, take_up),
             self._view,
             self._pulse,
         )
+        server_configuration.describe(inner.aspace)
         events = self._events(inner, tree)
         inner.subscriptions.prepare()
         self._server = server
@@ -171,11 +183,18 @@ class OpcUaServer:
         publisher = Publisher(image, tree.watched, events)
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
         watch = OwnWatch(self._settings, self._folder, own.application_uri)
-        self._renewals = asyncio.create_task(
-            watch.run(lambda own: server.renew(own.certificate, own.private_key)), name="opcua renewals"
-        )
+        self._renewals = asyncio.create_task(watch.run(take_up), name="opcua renewals")
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
+
+    @property
+    def _own_files(self) -> Path | None:
+        """Folder of a certificate that is ours to replace."""
+        return None if self._settings.certificate else self._folder
+
+    def _renewal(self, own: ServerIdentity) -> OwnRenewal:
+        names = names_of(self._settings.listen, reached_by(self._settings))
+        return OwnRenewal(OwnCertificate(own.certificate, own.private_key), own.application_uri, names)
 
     async def _describe(self, server: BoundServer, application_uri: str, users: Accounts) -> None:
         server.set_endpoint(self.endpoint_url)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import json
 import shutil
 import time
@@ -16,7 +17,7 @@ from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.config import OpcUaTable, UserTable
 from bridge.trust import TrustStore
-from tests.support.certificates import CLIENT_URI, Case, cases, make
+from tests.support.certificates import AUTHORITY, CLIENT_URI, Case, cases, make, signed
 from tests.support.opcua_raw import cut, sessions
 from tests.support.opcua_site import OPEN, serving
 from tests.support.passwords import cheap_hash
@@ -198,3 +199,26 @@ async def test_node_opcua_is_told_what_is_wrong_with_its_certificate(tmp_path: P
     async with serving(site, home) as (server, _):
         how = (server.endpoint_url, str(shown), CLIENT_URI, "anna", "swordfish")
         assert await answers("certificates.mjs", tmp_path, *how) == expected | {"unknown": hidden}
+
+
+@pytest.mark.landing
+async def test_node_opcua_renews_the_certificate_of_the_server(tmp_path: Path) -> None:
+    """By push, on a session that goes on."""
+    admin = UserTable(name="eva", role="admin", password_hash=cheap_hash("swordfish"))
+    site = settings_for(encrypted=True).model_copy(update={"user": [admin]})
+    root = make(AUTHORITY)
+    async with (
+        serving(site, tmp_path) as (server, _),
+        node("push.mjs", tmp_path, server.endpoint_url, "eva", "swordfish") as process,
+    ):
+        assert process.stdin and process.stdout
+        while not (said := lines(line := await process.stdout.readline())):
+            assert line, (await process.communicate())[1].decode()
+        (asked,) = said
+        made = signed(base64.b64decode(asked["request"]), root).public_bytes(Encoding.DER)
+        answer = b" ".join(map(base64.b64encode, (made, root.der)))
+        out, errors = await process.communicate(answer + b"\n")
+    assert process.returncode == 0, errors.decode()
+    (seen,) = lines(out)
+    assert base64.b64decode(seen.pop("shown")) == made
+    assert seen == {"updated": "Good", "required": True, "applied": "Good", "state": "Good"}

@@ -20,6 +20,9 @@ def user(name: str = "anna", role: Role = Role.OPERATOR, connection: str = "") -
     return SessionUser(Identity(Source.OPCUA, name, role, "10.0.0.1", connection=connection))
 
 
+PUSH = ua.NodeId(12740)
+
+
 class Told:
     """In place of the users, the writer, the caller and the view."""
 
@@ -34,7 +37,11 @@ class Told:
         self.calls.append((identity, writes))
         return []
 
-    call = write
+    async def call(self, identity: Identity, calls: object, **_: object) -> list[object]:
+        return await self.write(identity, calls)
+
+    def has(self, where: object) -> bool:
+        return where == PUSH
 
     def count(self, leaf: str) -> None:
         self.calls.append((leaf,))
@@ -44,14 +51,14 @@ class Told:
 
 
 def backend(told: Any, pulse: Any = None) -> Backend:
-    return Backend(told, lambda _: None, told, told, told, pulse)
+    return Backend(told, lambda _: None, told, told, told, told, pulse)
 
 
 @pytest.mark.parametrize("least", [*Role, None])
 def test_what_a_user_may_write_and_call_follows_from_the_role(least: Role | None) -> None:
     """What nobody may is for no observer either."""
     told: Any = Told()
-    made = Backend(told, lambda _: least, told, told, told, told)
+    made = Backend(told, lambda _: least, told, told, told, told, told)
     allowed = [role for role in Role if made.may(user(role=role), ua.NodeId("conveyor/fu1", 2))]
     assert allowed == [role for role in Role if role >= (Role.OPERATOR if least is None else least)]
 
@@ -94,3 +101,12 @@ def test_what_is_crowded_may_have_waited_for_ever() -> None:
     arrivals = backend(Told(), pulse).arrivals()
     assert arrivals.arrive(crowded=True) == float("-inf")
     assert isinstance(arrivals.arrive(crowded=False), float)
+
+
+async def test_the_methods_of_the_server_itself_are_for_admins_on_an_encrypted_channel() -> None:
+    told = Told()
+    made = backend(told)
+    for role in Role:
+        for encrypted in (False, True):
+            who = SessionUser(user(role=role).identity, encrypted)
+            assert made.may(who, PUSH) == (encrypted and role is Role.ADMIN)

@@ -343,6 +343,9 @@ class OpcUaTable(ListeningTable):
     endpoints: list[EndpointUrl] = Field(
         default_factory=list[str], description="further addresses by which it is reached, opc.tcp://host:port"
     )
+    acknowledge_resets: bool = Field(
+        False, description="true has whoever acknowledges the alarm of a drive reset its fault"
+    )
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 

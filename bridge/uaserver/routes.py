@@ -88,7 +88,7 @@ def _write(session: Session, params: Any) -> Any:
 
 
 def _call(session: Session, params: Any) -> Any:
-    return session.application.call(session.identity, get(params, "MethodsToCall"))
+    return session.call_methods(get(params, "MethodsToCall"))
 
 
 def _cancel(session: Session, params: Any) -> ua.CancelResult:

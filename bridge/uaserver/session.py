@@ -26,6 +26,8 @@ from bridge.base.sources import source_of
 from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
 from bridge.uaserver.browsing import Browser
 from bridge.uaserver.client_notices import tell
+from bridge.uaserver.condition_calls import METHODS
+from bridge.uaserver.conditions import Conditions
 from bridge.uaserver.connection_limits import MOST_CONNECTIONS
 from bridge.uaserver.encoding import Results
 from bridge.uaserver.library import (
@@ -209,6 +211,19 @@ class Session(InternalSession):
         held = access.value.Value if access and access.value else None
         return held is None or bool(held.Value & _READ)
 
+    async def call_methods(self, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
+        """One result for each of ``calls``, in their order: methods of conditions are this server's own, all
+        others the application's."""
+        conditions = self._server.conditions
+
+        async def call_one(one: ua.CallMethodRequest) -> ua.CallMethodResult:
+            if conditions is not None and get(one, "MethodId") in METHODS:
+                return await conditions.call(self, one)
+            (result,) = await self.application.call(self.identity, [one])
+            return result
+
+        return list(await asyncio.gather(*(call_one(one) for one in calls)))
+
     async def subscribe(self, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
         self.subscriptions.drop_left_behind()
         await make_room(self, self._server.sessions, self.subscriptions.subscriptions)
@@ -257,6 +272,8 @@ class InnerServer(InternalServer):
     """
 
     application: ServedApplication[Any]
+    conditions: Conditions | None = None
+    """Conditions of the application; None where it has none."""
 
     def __init__(self, *, no_security: bool) -> None:
         super().__init__()

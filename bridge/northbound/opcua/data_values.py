@@ -57,6 +57,7 @@ _REJECTION_CODE: Final = {
     StatusCodes.BadNotWritable: Code.READ_ONLY,
     StatusCodes.BadNotExecutable: Code.NOT_CONFIGURED,
     StatusCodes.BadOutOfRange: Code.OUT_OF_RANGE,
+    StatusCodes.BadUserAccessDenied: Code.NOT_ALLOWED,
 }
 """Outcomes for what the server itself refuses, by status code; every other code is ``NOT_VALID``."""
 _LONGEST: Final = 200

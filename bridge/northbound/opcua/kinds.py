@@ -100,7 +100,7 @@ class Kinds:
             case PropertyNode():
                 node_class, type_id = ua.NodeClass.Variable, ObjectIds.PropertyType
                 wanted = property_attributes(node.content)
-        attributes = _attributes(node_class, wanted)
+        attributes = node_attributes(node_class, wanted)
         attributes |= _permissions(node)
         if isinstance(node, PropertyNode):
             held = attributes[AttributeIds.Value].value
@@ -141,10 +141,11 @@ def _description(words: str) -> AttributeValue:
 
 
 def reference_to(
-    space: AddressSpace, target: int, reference: int, *, forward: bool
+    space: AddressSpace, target: int | ua.NodeId, reference: int, *, forward: bool
 ) -> ua.ReferenceDescription:
-    """A reference of this type to a node of the standard's, as asyncua describes it."""
-    where = node_id(target)
+    """A reference of this type to a node that asyncua holds, as asyncua describes it; a number is a node of
+    the standard's."""
+    where = node_id(target) if isinstance(target, int) else target
     fields = {
         name: get(space.read_attribute_value(where, attribute).Value, "Value")
         for name, attribute in (
@@ -177,7 +178,10 @@ def _key(node: Node) -> Hashable:
             return node.content
 
 
-def _attributes(node_class: ua.NodeClass, wanted: ua.NodeAttributes) -> dict[AttributeIds, AttributeValue]:
+def node_attributes(
+    node_class: ua.NodeClass, wanted: ua.NodeAttributes
+) -> dict[AttributeIds, AttributeValue]:
+    """Attributes of a node as asyncua makes them."""
     space = AddressSpace()
     item = make(ua.AddNodesItem, RequestedNewNodeId=_ANY, NodeClass=node_class, NodeAttributes=wanted)
     # Without its checks: there is no parent.

@@ -18,11 +18,14 @@ from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua import server_configuration
 from bridge.northbound.opcua.accounts import Accounts, security_policies
+from bridge.northbound.opcua.alarm_server import AlarmSite, of_certificate, serve_alarms
+from bridge.northbound.opcua.alarms import AlarmTask
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import OwnCertificate
 from bridge.northbound.opcua.change_publisher import Publisher
 from bridge.northbound.opcua.client_trust import ClientTrust, client_store
-from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
+from bridge.northbound.opcua.event_types import BASE_TYPE, DRIVE_EVENT_FIELDS, EventTypeMaker, type_name
+from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.own_files import own_folder
@@ -38,7 +41,7 @@ from bridge.northbound.view import View
 from bridge.uaserver import decoding
 from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
-from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
+from bridge.uaserver.library import ObjectIds, node_id, ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.own_addresses import OwnAddresses
 from bridge.uaserver.session import InnerServer
@@ -52,8 +55,8 @@ _log = logging.getLogger(__name__)
 class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
-    ``state_dir`` is the site's; certificates are in its folder ``certificates``. ``bound`` is a
-    listening socket where somebody else holds the port.
+    ``state_dir`` is the site's; certificates are in its folder ``certificates``, the state of the alarms is
+    in ``opcua``. ``bound`` is a listening socket where somebody else holds the port.
     """
 
     def __init__(
@@ -63,18 +66,22 @@ class OpcUaServer:
         state_dir: Path,
         site_name: str,
         bound: socket.socket | None = None,
+        alarm_site: AlarmSite | None = None,
     ) -> None:
         self._view = view
         self._settings = settings
         self._state_dir = state_dir
         self._folder = state_dir
         self._site_name = site_name
+        self._alarm_site = alarm_site or AlarmSite()
         self._users: Accounts | None = None
         self._server: BoundServer | None = None
         self._socket = bound
         self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
         self._renewals: asyncio.Task[None] | None = None
+        self._follower: asyncio.Task[None] | None = None
+        self._alarms: AlarmTask | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
         self.port = int(port)
@@ -115,11 +122,11 @@ class OpcUaServer:
     async def failed(self) -> None:
         """Wait for ever, or raise ``OperationFailed`` when no client can connect any more or changes are not
         published."""
-        if self._socket is None or self._publisher is None:
+        if self._socket is None or self._publisher is None or self._follower is None:
             return
         deaf = asyncio.create_task(until_deaf(self._socket, "opcua.listen"))
         try:
-            await asyncio.wait((deaf, self._publisher), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((deaf, self._publisher, self._follower), return_when=asyncio.FIRST_COMPLETED)
             if not deaf.done():
                 raise OperationFailed("OPC UA: clients are told of no change any more")
             await deaf
@@ -129,11 +136,13 @@ class OpcUaServer:
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
         self._pulse.stop()
-        tasks = [task for task in (self._publisher, self._renewals) if task]
-        self._publisher = self._renewals = None
+        tasks = [one for one in (self._publisher, self._renewals, self._follower) if one]
+        self._publisher = self._renewals = self._follower = None
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        if self._alarms:
+            await self._alarms.end()
         server, self._server = self._server, None
         if server:
             await server.stop()
@@ -160,11 +169,22 @@ class OpcUaServer:
         namespace = await server.register_namespace(NAMESPACE)
         image = self._view.image
         tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
+        resets = self._settings.acknowledge_resets
+        alarms = self._alarms = serve_alarms(
+            inner,
+            tree,
+            self._view,
+            self._alarm_site,
+            own.certificate,
+            self._state_dir / "opcua",
+            resets=resets,
+        )
         renewal = self._renewal(own)
 
         def take_up(own: OwnCertificate) -> None:
             renewal.own = own
             server.renew(own.certificate, own.private_key)
+            alarms.renewed(own.certificate.not_valid_after_utc, of_certificate(own.certificate))
 
         inner.application = Backend(
             users,
@@ -184,6 +204,7 @@ class OpcUaServer:
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
         watch = OwnWatch(self._settings, self._folder, own.application_uri)
         self._renewals = asyncio.create_task(watch.run(take_up), name="opcua renewals")
+        self._follower = asyncio.create_task(alarms.run(), name="opcua alarms")
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
 
@@ -211,11 +232,11 @@ class OpcUaServer:
         server.set_identity_tokens(users.tokens)
 
     def _events(self, inner: InnerServer, tree: Tree) -> EventSender:
-        base = _event_type(inner, node_id(BASE_TYPE, tree.namespace), node_id(ObjectIds.BaseEventType))
-        types = {
-            kind: _event_type(inner, node_id(type_name(kind), tree.namespace), base) for kind in EventKind
-        }
-        events = EventSender(self._view.epoch_ns, inner.subscriptions, tree.notifiers, types)
+        types = EventTypeMaker(inner, tree.namespace)
+        base = types.make(BASE_TYPE, node_id(ObjectIds.BaseEventType), DRIVE_EVENT_FIELDS)
+        types.generates(base)
+        made = {kind: types.make(type_name(kind), base) for kind in EventKind}
+        events = EventSender(self._view.epoch_ns, inner.subscriptions, tree.notifiers, made)
         self._view.on_event(events.on_event)
         return events
 
@@ -230,23 +251,6 @@ class OpcUaServer:
             )
         if settings.anonymous == "none" and not settings.user:
             _log.warning('OPC UA: nobody can log in: no [[opcua.user]] and anonymous = "none"')
-
-
-def _event_type(inner: InnerServer, where: ua.NodeId, parent: ua.NodeId) -> ua.NodeId:
-    """A new type below ``parent``. Raises UaError where there is one already."""
-    name = str(where.Identifier)
-    item = make(
-        ua.AddNodesItem,
-        RequestedNewNodeId=where,
-        BrowseName=ua.QualifiedName(name, where.NamespaceIndex),
-        NodeClass=ua.NodeClass.ObjectType,
-        ParentNodeId=parent,
-        ReferenceTypeId=node_id(ObjectIds.HasSubtype),
-        NodeAttributes=make(ua.ObjectTypeAttributes, DisplayName=text(name)),
-    )
-    (result,) = inner.node_mgt_service.add_nodes([item])
-    get(result, "StatusCode").check()
-    return where
 
 
 def built_at() -> datetime:

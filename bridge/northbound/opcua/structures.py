@@ -138,15 +138,15 @@ def value_type(node: VariableNode) -> ua.VariantType:
 
 def property_attributes(content: Property) -> ua.VariableAttributes:
     rank = _ONE_DIMENSION if content.value.is_array else _SCALAR
-    return _variable_attributes(content.data_type, READ, rank, Value=content.value)
+    return variable_attributes(content.data_type, READ, rank, Value=content.value)
 
 
 def point_attributes(kind: ua.VariantType, *, writable: bool) -> ua.VariableAttributes:
     access = READ_WRITE if writable else READ
-    return _variable_attributes(kind.value, access, _SCALAR, MinimumSamplingInterval=_SAMPLING_MS)
+    return variable_attributes(kind.value, access, _SCALAR, MinimumSamplingInterval=_SAMPLING_MS)
 
 
-def _variable_attributes(data_type: int, access: int, rank: int, **more: object) -> ua.VariableAttributes:
+def variable_attributes(data_type: int, access: int, rank: int, **more: object) -> ua.VariableAttributes:
     return make(
         ua.VariableAttributes,
         DataType=node_id(data_type),

@@ -8,7 +8,7 @@ references downwards are kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Final, cast
+from typing import Final, Protocol, cast
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
@@ -51,7 +51,7 @@ class _TreeNode:
     def references(self) -> list[ua.ReferenceDescription]:
         if self._below is None:
             self._below = [below.refer(below.reference) for below in self._tree.below(self)]
-        return [*self._upwards(), *self._below]
+        return [*self._upwards(), *self._below, *self._tree.beside.below(self.node.id)]
 
     @property
     def attributes(self) -> Attributes:
@@ -105,6 +105,22 @@ _OWN: Final[Mapping[int, Callable[[_TreeNode], AttributeValue]]] = {
 _OWN_OF_POINT: Final = {**_OWN, AttributeIds.Value: _TreeNode.value_attribute}
 
 
+class Beside(Protocol):
+    """Nodes that are not the tree's, and may stand below some of it."""
+
+    def find(self, name: str, /) -> NodeData | None: ...
+
+    def below(self, owner: str, /) -> Iterable[ua.ReferenceDescription]: ...
+
+
+class _Nothing:
+    def find(self, name: str, /) -> None:
+        return None
+
+    def below(self, owner: str, /) -> tuple[()]:
+        return ()
+
+
 class Tree:
     """The nodes of ``trees`` in ``space``. Raises ValueError where two have the same id.
 
@@ -129,6 +145,7 @@ class Tree:
         self.to_server = reference_to(space, ObjectIds.Server, ObjectIds.HasNotifier, forward=False)
         self.notifiers: dict[str, ua.NodeId] = {}
         self.watched: AllWatched = {}
+        self.beside: Beside = _Nothing()
         self.never_called: Watchers = {}
         """Watchers of attributes that never change: one empty table for all of them."""
         for tree in trees:
@@ -179,7 +196,8 @@ class Tree:
 
     def _find(self, where: ua.NodeId) -> NodeData | None:
         name = self._name(where)
-        return cast("NodeData | None", self._nodes.get(name) or self._property(name))
+        found = self._nodes.get(name) or self._property(name)
+        return cast("NodeData", found) if found else self.beside.find(name)
 
     def _property(self, name: str) -> _TreeNode | None:
         # Clients ask for one attribute of a node after the other.

@@ -18,6 +18,7 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from bridge.config import OpcUaTable, UserTable
 from bridge.trust import TrustStore
 from tests.support.certificates import AUTHORITY, CLIENT_URI, Case, cases, make, signed
+from tests.support.opcua_alarms import cut_bus, tell
 from tests.support.opcua_raw import cut, sessions
 from tests.support.opcua_site import OPEN, serving
 from tests.support.passwords import cheap_hash
@@ -222,3 +223,22 @@ async def test_node_opcua_renews_the_certificate_of_the_server(tmp_path: Path) -
     (seen,) = lines(out)
     assert base64.b64decode(seen.pop("shown")) == made
     assert seen == {"updated": "Good", "required": True, "applied": "Good", "state": "Good"}
+
+
+async def test_node_opcua_follows_an_alarm_and_handles_it(tmp_path: Path) -> None:
+    """By its own means for alarms, with a comment in German. It asks for no language."""
+    async with serving(settings_for(encrypted=False), tmp_path) as (server, view):
+        said: list[dict[str, Any]] = []
+        async with node("alarms.mjs", tmp_path, server.endpoint_url, "anna", "swordfish") as process:
+            assert process.stdout
+            async for line in process.stdout:
+                said.extend(lines(line))
+                if said and "monitoring" in said[-1]:
+                    tell(view, cut_bus("conveyor"))
+    _, raised, acked, shelved, done = said
+    assert raised.pop("message").startswith("No node answers.")
+    assert raised == {"severity": 800, "source": "can0", "retain": True}
+    comment = {"comment": "gesehen, Kabel wird getauscht", "locale": "de"}
+    assert acked == {"acked": "acknowledged", "user": "anna"} | comment
+    assert shelved == {"shelved": "timed shelved"}
+    assert done == {"calls": ["Good", "Good", "BadConditionBranchAlreadyAcked", "Good"]}

@@ -74,6 +74,12 @@ class ConditionOwner(Protocol):
         ...
 
 
+class EventSink(Protocol):
+    """Keeper of events for those who ask for them later."""
+
+    def keep(self, fields: Fields) -> None: ...
+
+
 class RefreshingOwner(Protocol):
     """Session that calls a method."""
 
@@ -108,6 +114,7 @@ class Conditions:
         self._epoch_ms = epoch_ms
         self._waiting: deque[tuple[Sequence[ua.NodeId], Fields]] = deque()
         self._lost = False
+        self.sink: EventSink | None = None
         self._changed: dict[ua.NodeId, None] = {}
         self._refreshing: set[int] = set()
         self._guard = Guard("OPC UA alarms")
@@ -161,7 +168,10 @@ class Conditions:
         if len(self._waiting) >= _MOST_WAITING:
             self._waiting.clear()
             self._lost = True
-        self._waiting.append((condition.place.emitters, self.fields(condition)))
+        fields = self.fields(condition)
+        self._waiting.append((condition.place.emitters, fields))
+        if self.sink:
+            self.sink.keep(fields)
 
     def fields(self, condition: Condition) -> Fields:
         """Fields of its latest event, with what it says by this time."""

@@ -20,6 +20,7 @@ from asyncua.ua.ua_binary import struct_from_binary
 
 from bridge.uaserver.browsing import Browser
 from bridge.uaserver.encoding import UNSENDABLE, Results
+from bridge.uaserver.historyread import MOST_NODES
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.uaserver.monitoring import MonitoredItems, loop_time
 from bridge.uaserver.publishing import MOST_BYTES, PublishRequest
@@ -128,6 +129,7 @@ ROUTES: Final[Mapping[ua.NodeId, Route]] = {
         ),
         Route("UnregisterNodes", lambda session, params: None, "NodesToUnregister", ""),
         Route("Read", Session.read_attributes, "NodesToRead"),
+        Route("HistoryRead", Session.read_history, "NodesToRead", most=MOST_NODES),
         Route("Write", _write, "NodesToWrite"),
         Route("Call", _call, "MethodsToCall", most=MOST_CALLS),
         Route("CreateSubscription", Session.subscribe, answer="Parameters"),

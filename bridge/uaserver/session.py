@@ -30,6 +30,7 @@ from bridge.uaserver.condition_calls import METHODS
 from bridge.uaserver.conditions import Conditions
 from bridge.uaserver.connection_limits import MOST_CONNECTIONS
 from bridge.uaserver.encoding import Results
+from bridge.uaserver.historyread import HistoryReader
 from bridge.uaserver.library import (
     AttributeIds,
     ServiceError,
@@ -56,12 +57,13 @@ _NAME_BYTES: Final = 4
 """Length of the name by which a session is told from others of its user, also from those before a restart."""
 _MOST_LOCALES: Final = 10
 _READ: Final = 1
-"""Bit of an access level."""
+_READ_HISTORY: Final = 4
+"""Bits of an access level."""
 _BY_USER: Final = {
-    AttributeIds.UserAccessLevel: data_value(variant(_READ, ua.VariantType.Byte)),
-    AttributeIds.UserExecutable: data_value(variant(False, ua.VariantType.Boolean)),
+    AttributeIds.UserAccessLevel: _READ | _READ_HISTORY,
+    AttributeIds.UserExecutable: False,
 }
-"""Attributes that depend on who looks, as they are for who may only read."""
+"""Attributes that depend on who looks, with what is left of them for who may only read."""
 _NOTHING: Final = variant(None, ua.VariantType.Null)
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
 
@@ -103,6 +105,7 @@ class Session(InternalSession):
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
         self.holder: Connection | None = None
+        self.history = HistoryReader(aspace, server.subscriptions.items.event_types)
         """The processor of the connection that it is activated on."""
         self.answer: Results | None = None
         """Answer that is being encoded for it."""
@@ -178,6 +181,11 @@ class Session(InternalSession):
             await results.add(self._read(one, times))
         return results
 
+    async def read_history(self, params: ua.HistoryReadParameters) -> Any:
+        results = self.answer = Results(self.most_bytes)
+        await self.history.read(params, self.application, results)
+        return results
+
     def _read(self, wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> ua.DataValue:
         try:
             looked_at = window(wanted, times)
@@ -203,7 +211,10 @@ class Session(InternalSession):
             return _granted(value, self.application.roles(self.identity))
         if attribute not in _BY_USER or held is None or not held.Value:
             return value
-        return value if self.application.may(self.identity, where) else _BY_USER[attribute]
+        if self.application.may(self.identity, where):
+            return value
+        left = variant(held.Value & _BY_USER[attribute], held.VariantType)
+        return data_value(left, value.StatusCode, value.SourceTimestamp, value.ServerTimestamp)
 
     def _is_readable(self, where: ua.NodeId) -> bool:
         node = self.aspace.get(where)

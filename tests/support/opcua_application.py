@@ -9,6 +9,7 @@ from asyncua import ua
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.uaserver.application import LoginAttempt, ServedApplication
+from bridge.uaserver.history import EventHistory, ValueHistory
 from bridge.uaserver.library import ServiceError
 
 Ids = ua.AttributeIds
@@ -69,6 +70,12 @@ class Served(ServedApplication[User]):
 
     async def call(self, user: User, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
         return [ua.CallMethodResult() for _ in calls]
+
+    def value_history(self, where: ua.NodeId) -> ValueHistory | None:
+        return None
+
+    def event_history(self, where: ua.NodeId) -> EventHistory | None:
+        return None
 
     def on_connection(self, user: User, *, is_there: bool, has_others: bool) -> None:
         self.told.append((user.name, is_there, has_others))

@@ -25,14 +25,15 @@ from bridge.northbound.opcua.event_types import (
     CERTIFICATE_ALARM_TYPE,
     EventTypeMaker,
 )
-from bridge.northbound.opcua.events import emitters_of, in_all_languages
+from bridge.northbound.opcua.events import in_all_languages
+from bridge.northbound.opcua.notifiers import Notifiers
 from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.trouble_reader import TroubleReader
 from bridge.northbound.trouble_words import PlantWords
 from bridge.northbound.view import View
 from bridge.text import Text
 from bridge.uaserver.condition_fields import ConditionWords, condition_place
-from bridge.uaserver.conditions import Condition, Conditions
+from bridge.uaserver.conditions import Condition, Conditions, EventSink
 from bridge.uaserver.library import ObjectIds, node_id, ua, variant
 from bridge.uaserver.session import InnerServer
 from bridge.uaserver.where import Fields
@@ -60,10 +61,12 @@ def serve_alarms(
     site: AlarmSite,
     certificate: x509.Certificate,
     folder: Path,
+    sink: EventSink | None,
     *,
     resets: bool,
 ) -> AlarmTask:
-    """Give the server its alarms, as they were left. Before the first client is let in."""
+    """Give the server its alarms, as they were left; ``sink`` keeps what they tell from then on. Before the
+    first client is let in."""
     rights = AlarmRights(view, resets=resets)
     words = ConditionWords(lambda state: in_all_languages(Text.word("alarm_state", state)))
     conditions = inner.conditions = Conditions(inner.subscriptions, rights, words, _now_ms)
@@ -83,6 +86,7 @@ def serve_alarms(
     followed = Alarms(reader, conditions, contents, alarms, expires, clock.now, _now_ms)
     file = AlarmFile(folder)
     followed.restore(file)
+    conditions.sink = sink
     return AlarmTask(followed, conditions, file)
 
 
@@ -111,7 +115,7 @@ def _alarm(
         kind,
         place.name,
         (tree.notifiers[place.owner], place.source_name),
-        emitters_of(tree.notifiers, place.owner),
+        Notifiers(tree.notifiers).emitters(place.owner),
         (class_id, in_all_languages(class_name)),
         of_certificate(certificate) if place.kind == CERTIFICATE else {},
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -9,14 +10,17 @@ from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
 from bridge.command.messages.request import Identity, Role
 from bridge.northbound.opcua.accounts import Accounts
+from bridge.northbound.opcua.file_transfer import READING, FileTransfer, file_method
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.permissions import ROLE_NODES
+from bridge.northbound.opcua.plant_history import PlantHistory
 from bridge.northbound.opcua.server_configuration import ServerConfiguration
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.passwords import ANONYMOUS
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
+from bridge.uaserver.history import EventHistory, ValueHistory
 from bridge.uaserver.library import get, node_id, ua
 
 
@@ -56,8 +60,8 @@ class ConnectionArrivals:
 
 
 class Backend(ServedApplication[SessionUser]):
-    """Users, writes and calls of the server's sessions. ``least_role`` is that of the tree, ``pulse`` that of
-    the event loop."""
+    """Users, writes and calls of the server's sessions, and what they read of the past. ``least_role`` is
+    that of the tree, ``pulse`` that of the event loop."""
 
     def __init__(
         self,
@@ -68,6 +72,7 @@ class Backend(ServedApplication[SessionUser]):
         configuration: ServerConfiguration,
         view: View,
         pulse: Pulse,
+        past: PlantHistory,
     ) -> None:
         self._users = users
         self._least_role = least_role
@@ -76,6 +81,8 @@ class Backend(ServedApplication[SessionUser]):
         self._configuration = configuration
         self._view = view
         self._pulse = pulse
+        self._past = past
+        self._transfer = FileTransfer(past.files)
 
     async def identify(self, login: LoginAttempt) -> SessionUser:
         identity = await self._users.identify(login)
@@ -86,6 +93,8 @@ class Backend(ServedApplication[SessionUser]):
         return int(self._users.highest_role)
 
     def may(self, user: SessionUser, where: ua.NodeId) -> bool:
+        if where in READING:
+            return True
         if self._configuration.has(where):
             return user.encrypted and user.identity.role >= Role.ADMIN
         least = self._least_role(where)
@@ -100,17 +109,27 @@ class Backend(ServedApplication[SessionUser]):
     async def call(
         self, user: SessionUser, calls: Sequence[ua.CallMethodRequest]
     ) -> list[ua.CallMethodResult]:
-        if not any(self._configuration.has(get(one, "MethodId")) for one in calls):
-            return await self._caller.call(user.identity, calls)
-        return [await self._call(user, one) for one in calls]
+        return list(await asyncio.gather(*(self._call(user, call) for call in calls)))
 
     async def _call(self, user: SessionUser, call: ua.CallMethodRequest) -> ua.CallMethodResult:
         if self._configuration.has(get(call, "MethodId")):
             return await self._configuration.call(user.identity, call, encrypted=user.encrypted)
+        method, file = file_method(call), self._past.file(get(call, "ObjectId"))
+        if method and file:
+            given: list[ua.Variant] = get(call, "InputArguments") or []
+            return await self._transfer.call(user.identity.connection, file, method, given)
         (result,) = await self._caller.call(user.identity, [call])
         return result
 
+    def value_history(self, where: ua.NodeId) -> ValueHistory | None:
+        return self._past.value_history(where)
+
+    def event_history(self, where: ua.NodeId) -> EventHistory | None:
+        return self._past.event_history(where)
+
     def on_connection(self, user: SessionUser, *, is_there: bool, has_others: bool) -> None:
+        if not is_there:
+            self._transfer.leave(user.identity.connection)
         self._view.on_connection(user.identity, is_there=is_there, has_others=has_others)
 
     def on_refused(self) -> None:

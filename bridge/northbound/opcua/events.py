@@ -15,10 +15,12 @@ from bridge.base.guard import Guard
 from bridge.base.ratelimit import RateLimit
 from bridge.command import Event, EventKind
 from bridge.northbound.opcua.data_values import source_time
+from bridge.northbound.opcua.event_keeper import EventKeeper
+from bridge.northbound.opcua.notifiers import Notifiers
 from bridge.text import LANGUAGES, Text, Words, as_json, render
 from bridge.uaserver.eventfilter import Occurrence
 from bridge.uaserver.languages import Spoken
-from bridge.uaserver.library import ObjectIds, node_id, ua, variant
+from bridge.uaserver.library import ua, variant
 from bridge.uaserver.subscriptions import Subscriptions
 from bridge.uaserver.where import own_name
 
@@ -52,12 +54,14 @@ class EventSender:
         self,
         epoch_ns: Callable[[float], int],
         subscriptions: Subscriptions,
-        objects: Mapping[str, ua.NodeId],
+        notifiers: Notifiers,
         types: Mapping[EventKind, ua.NodeId],
+        keeper: EventKeeper | None = None,
     ) -> None:
         self._epoch_ns = epoch_ns
         self._subscriptions = subscriptions
-        self._objects = objects
+        self._notifiers = notifiers
+        self._keeper = keeper
         self._types = types
         self._namespace = next(iter(types.values())).NamespaceIndex
         self._guard = Guard("OPC UA events")
@@ -74,7 +78,7 @@ class EventSender:
     async def send_waiting(self) -> None:
         while self._queue:
             event, held_back = self._queue.popleft()
-            if self._subscriptions.subscriptions:
+            if self._keeper or self._subscriptions.subscriptions:
                 await self._send(event, held_back)
 
     async def _send(self, event: Event, held_back: int) -> None:
@@ -82,7 +86,7 @@ class EventSender:
         fields = {
             "EventId": variant(uuid.uuid4().bytes, kinds.ByteString),
             "EventType": variant(self._types[event.kind], kinds.NodeId),
-            "SourceNode": variant(source_of(self._objects, event.source), kinds.NodeId),
+            "SourceNode": variant(self._notifiers.source(event.source), kinds.NodeId),
             "SourceName": variant(event.source, kinds.String),
             "Time": variant(source_time(self._epoch_ns(event.time)), kinds.DateTime),
             "ReceiveTime": variant(datetime.now(UTC), kinds.DateTime),
@@ -90,7 +94,9 @@ class EventSender:
             "Severity": variant(event.severity, kinds.UInt16),
             **self._own_fields(event),
         }
-        for emitter in emitters_of(self._objects, event.source):
+        if self._keeper:
+            self._keeper.keep(fields)
+        for emitter in self._notifiers.emitters(event.source):
             for subscription in list(self._subscriptions.subscriptions.values()):
                 if subscription.is_listening:
                     # Each client brings its own filter.
@@ -115,15 +121,3 @@ class EventSender:
         if event.kind is EventKind.EMERGENCY and isinstance(number, int):
             found["EmergencyCode"] = variant(number, kinds.UInt16)
         return {own_name(name, self._namespace): value for name, value in found.items()}
-
-
-def source_of(objects: Mapping[str, ua.NodeId], name: str) -> ua.NodeId:
-    """The object that an event is about: a drive, a node, a bus, or else the bridge itself."""
-    return objects.get(name) or objects.get(f"bus/{name}") or objects["bridge"]
-
-
-def emitters_of(objects: Mapping[str, ua.NodeId], name: str) -> list[ua.NodeId]:
-    """Objects that send the event: for one of a drive, the drive, its node and the server."""
-    above = objects.get(name.partition("/")[0]) if "/" in name else None
-    found = [node_id(ObjectIds.Server), source_of(objects, name)]
-    return [*found, above] if above else found

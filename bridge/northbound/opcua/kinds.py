@@ -11,7 +11,14 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeManagementService
 
-from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode
+from bridge.northbound.opcua.nodes import (
+    FileNode,
+    LiveProperty,
+    MethodNode,
+    ObjectNode,
+    VariableKind,
+    VariableNode,
+)
 from bridge.northbound.opcua.permissions import least_role, permission, role_permissions
 from bridge.northbound.opcua.structures import (
     PropertyNode,
@@ -34,9 +41,10 @@ from bridge.uaserver.library import (
     variant,
 )
 
-Node = ObjectNode | MethodNode | VariableNode | PropertyNode
+Node = ObjectNode | MethodNode | VariableNode | PropertyNode | FileNode | LiveProperty
 
 SUBSCRIBE_TO_EVENTS: Final = 1
+READ_EVENT_HISTORY: Final = 4
 _ANY: Final = node_id("any", 1)
 _NO_RESTRICTION: Final = AttributeValue(data_value(variant(0, ua.VariantType.UInt16)))
 """A channel without security will do, where there is one at all (Part 3 §5.2.11)."""
@@ -50,7 +58,8 @@ _TYPE_DEFINITION: Final = {
 
 @dataclass(frozen=True, slots=True)
 class NodeKind:
-    """One kind of node. ``to_type`` is the reference to the type ``type_id``; a method has none."""
+    """One kind of node. ``to_type`` are references to the type ``type_id``, which a method does
+    not have, and to other nodes of the standard's."""
 
     attributes: Mapping[AttributeIds, AttributeValue]
     node_class: ua.NodeClass
@@ -69,9 +78,12 @@ class Name:
 
 
 class Kinds:
-    """Shared parts of the nodes of a tree in ``space``. No client can write any of them."""
+    """Shared parts of the nodes of a tree in ``space``. No client can write any of them. ``keeps_events``:
+    past events are."""
 
-    def __init__(self, space: AddressSpace) -> None:
+    def __init__(self, space: AddressSpace, *, keeps_events: bool = False) -> None:
+        self.notifies = SUBSCRIBE_TO_EVENTS | (READ_EVENT_HISTORY if keeps_events else 0)
+        """EventNotifier of objects that tell events."""
         self._space = space
         self._known: dict[Hashable, NodeKind] = {}
         self._built_at = datetime.now(UTC)
@@ -90,16 +102,22 @@ class Kinds:
             case ObjectNode():
                 node_class = ua.NodeClass.Object
                 type_id = ObjectIds.FolderType if node.folder else ObjectIds.BaseObjectType
-                wanted = make(ua.ObjectAttributes, EventNotifier=SUBSCRIBE_TO_EVENTS if node.notifier else 0)
+                wanted = make(ua.ObjectAttributes, EventNotifier=self.notifies if node.notifier else 0)
             case MethodNode():
                 node_class, type_id = ua.NodeClass.Method, ObjectIds.Null
                 wanted = make(ua.MethodAttributes, Executable=True, UserExecutable=True)
             case VariableNode():
                 node_class, type_id = ua.NodeClass.Variable, _TYPE_DEFINITION[node.kind]
-                wanted = point_attributes(value_type(node), writable=node.writable)
+                wanted = point_attributes(value_type(node), writable=node.writable, kept=node.kept)
             case PropertyNode():
                 node_class, type_id = ua.NodeClass.Variable, ObjectIds.PropertyType
                 wanted = property_attributes(node.content)
+            case LiveProperty():
+                node_class, type_id = ua.NodeClass.Variable, ObjectIds.PropertyType
+                wanted = point_attributes(ua.VariantType[node.type.value])
+            case FileNode():
+                node_class, type_id = ua.NodeClass.Object, ObjectIds.FileType
+                wanted = make(ua.ObjectAttributes, EventNotifier=0)
         attributes = node_attributes(node_class, wanted)
         attributes |= _permissions(node)
         if isinstance(node, PropertyNode):
@@ -108,13 +126,19 @@ class Kinds:
         to_type = ()
         if type_id != ObjectIds.Null:
             to_type = (reference_to(self._space, type_id, ObjectIds.HasTypeDefinition, forward=True),)
+        if isinstance(node, VariableNode) and node.kept:
+            how = reference_to(
+                self._space, ObjectIds.HAConfiguration, ObjectIds.HasHistoricalConfiguration, forward=True
+            )
+            to_type = (*to_type, how)
         return NodeKind(attributes, node_class, node_id(type_id), to_type)
 
 
 def _permissions(node: Node) -> dict[AttributeIds, AttributeValue]:
     """Attributes of what each role may; a session shows a user its own."""
     sends_events = isinstance(node, ObjectNode) and node.notifier
-    table = role_permissions(least_role(node), permission(node), sends_events=sends_events)
+    is_kept = isinstance(node, VariableNode) and node.kept
+    table = role_permissions(least_role(node), permission(node), sends_events=sends_events, is_kept=is_kept)
     return {
         AttributeIds.RolePermissions: table,
         AttributeIds.UserRolePermissions: table,
@@ -173,9 +197,13 @@ def _key(node: Node) -> Hashable:
         case MethodNode():
             return MethodNode, least_role(node)
         case VariableNode():
-            return node.kind, value_type(node), node.writable, least_role(node)
+            return node.kind, value_type(node), node.writable, node.kept, least_role(node)
         case PropertyNode():
             return node.content
+        case LiveProperty():
+            return node.type
+        case FileNode():
+            return FileNode
 
 
 def node_attributes(

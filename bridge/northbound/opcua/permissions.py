@@ -19,7 +19,7 @@ from bridge.command.messages.request import (
     WriteParameter,
 )
 from bridge.image.point import WriteKind
-from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
+from bridge.northbound.opcua.nodes import FileNode, LiveProperty, MethodNode, ObjectNode, VariableNode
 from bridge.northbound.opcua.structures import PropertyNode
 from bridge.uaserver.library import ObjectIds, data_value, make, node_id, ua, variant
 
@@ -40,7 +40,7 @@ ROLE_NODES: Final = {
 
 _Permission = ua.PermissionType
 _SEES: Final = _Permission.Browse | _Permission.ReadRolePermissions | _Permission.Read
-_Described = ObjectNode | MethodNode | VariableNode | PropertyNode
+_Described = ObjectNode | MethodNode | VariableNode | PropertyNode | FileNode | LiveProperty
 
 
 def action_of(node: _Described) -> Action | None:
@@ -64,9 +64,13 @@ def permission(node: _Described) -> ua.PermissionType:
 
 
 @cache
-def role_permissions(least: Role | None, more: ua.PermissionType, *, sends_events: bool) -> AttributeValue:
-    """RolePermissions (Part 3 §5.2.9) of a node that needs ``least`` for ``more``."""
+def role_permissions(
+    least: Role | None, more: ua.PermissionType, *, sends_events: bool = False, is_kept: bool = False
+) -> AttributeValue:
+    """RolePermissions (Part 3 §5.2.9) of a node that needs ``least`` for ``more``; ``is_kept``: it has a
+    history, which everybody may read."""
     seen = _SEES | _Permission.ReceiveEvents if sends_events else _SEES
+    seen = seen | _Permission.ReadHistory if is_kept else seen
     table = [
         make(
             ua.RolePermissionType,

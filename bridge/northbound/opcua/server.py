@@ -24,17 +24,23 @@ from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import OwnCertificate
 from bridge.northbound.opcua.change_publisher import Publisher
 from bridge.northbound.opcua.client_trust import ClientTrust, client_store
+from bridge.northbound.opcua.event_keeper import EventKeeper
+from bridge.northbound.opcua.event_log import EventLog
+from bridge.northbound.opcua.event_records import EventCodec
 from bridge.northbound.opcua.event_types import BASE_TYPE, DRIVE_EVENT_FIELDS, EventTypeMaker, type_name
 from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.notifiers import Notifiers
 from bridge.northbound.opcua.own_files import own_folder
 from bridge.northbound.opcua.own_renewal import OwnRenewal
 from bridge.northbound.opcua.own_watch import OwnWatch
 from bridge.northbound.opcua.ownnames import names_of, reached_by
+from bridge.northbound.opcua.plant_history import PlantHistory
 from bridge.northbound.opcua.server_configuration import ServerConfiguration
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.tree import Tree
+from bridge.northbound.opcua.value_rings import ValueRings
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -48,6 +54,7 @@ from bridge.uaserver.session import InnerServer
 
 NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
+_MB: Final = 1_000_000
 
 _log = logging.getLogger(__name__)
 
@@ -82,6 +89,7 @@ class OpcUaServer:
         self._renewals: asyncio.Task[None] | None = None
         self._follower: asyncio.Task[None] | None = None
         self._alarms: AlarmTask | None = None
+        self._past: PlantHistory | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
         self.port = int(port)
@@ -149,6 +157,10 @@ class OpcUaServer:
         bound, self._socket = self._socket, None
         if bound:
             bound.close()
+        past, self._past = self._past, None
+        if past:
+            self._view.forget(past.on_event)
+            await past.close()
         if self._users:
             self._users.close()
 
@@ -168,7 +180,18 @@ class OpcUaServer:
         await self._describe(server, own.application_uri, users)
         namespace = await server.register_namespace(NAMESPACE)
         image = self._view.image
-        tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
+        kept = self._settings.history
+        rings = ValueRings(image, self._view.epoch_ns, kept)
+        trees = layout(image.points, rings.rings, kept.black_boxes)
+        how = inner.aspace, namespace, image, self._view.epoch_ns
+        tree = Tree(*how, trees, keeps_events=kept.event_hours > 0)
+        notifiers = Notifiers(tree.notifiers)
+        keeper = self._keeper(EventCodec(await server.get_namespace_array()), notifiers)
+        past = self._past = PlantHistory(
+            kept, image, self._view.epoch_ns, tree, rings, keeper, self._folder / "black_box"
+        )
+        await past.start()
+        self._view.on_event(past.on_event)
         resets = self._settings.acknowledge_resets
         alarms = self._alarms = serve_alarms(
             inner,
@@ -177,6 +200,7 @@ class OpcUaServer:
             self._alarm_site,
             own.certificate,
             self._state_dir / "opcua",
+            keeper,
             resets=resets,
         )
         renewal = self._renewal(own)
@@ -194,13 +218,14 @@ class OpcUaServer:
             ServerConfiguration(renewal, trusted.store, self._own_files, take_up),
             self._view,
             self._pulse,
+            past,
         )
         server_configuration.describe(inner.aspace)
-        events = self._events(inner, tree)
+        events = self._events(inner, tree.namespace, notifiers, keeper)
         inner.subscriptions.prepare()
         self._server = server
         await server.start()
-        publisher = Publisher(image, tree.watched, events)
+        publisher = Publisher(image, tree.watched, events, past)
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
         watch = OwnWatch(self._settings, self._folder, own.application_uri)
         self._renewals = asyncio.create_task(watch.run(take_up), name="opcua renewals")
@@ -231,12 +256,23 @@ class OpcUaServer:
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
 
-    def _events(self, inner: InnerServer, tree: Tree) -> EventSender:
-        types = EventTypeMaker(inner, tree.namespace)
+    def _keeper(self, codec: EventCodec, notifiers: Notifiers) -> EventKeeper | None:
+        """The keeper of past events; None where none are kept."""
+        kept = self._settings.history
+        if not kept.event_hours:
+            return None
+        most_bytes = kept.events_mb * _MB
+        log = EventLog(codec, notifiers, kept.event_hours, most_bytes)
+        return EventKeeper(log, self._folder, most_bytes)
+
+    def _events(
+        self, inner: InnerServer, namespace: int, notifiers: Notifiers, keeper: EventKeeper | None
+    ) -> EventSender:
+        types = EventTypeMaker(inner, namespace)
         base = types.make(BASE_TYPE, node_id(ObjectIds.BaseEventType), DRIVE_EVENT_FIELDS)
         types.generates(base)
         made = {kind: types.make(type_name(kind), base) for kind in EventKind}
-        events = EventSender(self._view.epoch_ns, inner.subscriptions, tree.notifiers, made)
+        events = EventSender(self._view.epoch_ns, inner.subscriptions, notifiers, made, keeper)
         self._view.on_event(events.on_event)
         return events
 

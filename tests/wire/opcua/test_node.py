@@ -15,7 +15,9 @@ from typing import Any
 import pytest
 from cryptography.hazmat.primitives.serialization import Encoding
 
+from bridge.command import Event, EventKind
 from bridge.config import OpcUaTable, UserTable
+from bridge.text import Text
 from bridge.trust import TrustStore
 from tests.support.certificates import AUTHORITY, CLIENT_URI, Case, cases, make, signed
 from tests.support.opcua_alarms import cut_bus, tell
@@ -99,13 +101,19 @@ async def test_node_opcua_browses_reads_writes_subscribes_and_calls(encrypted: b
 
 @pytest.mark.landing
 async def test_node_opcua_walks_through_the_services(tmp_path: Path) -> None:
-    async with serving(OPEN, tmp_path) as (server, _):
+    async with serving(OPEN, tmp_path) as (server, view):
+        happened = Event(time.monotonic(), EventKind.WATCHDOG, "conveyor/fu1", 900, Text.of("node.lost"))
+        view.plant.events.report(happened)
+        view.plant.deliver_outcomes()
         seen = await answers("services.mjs", tmp_path, server.endpoint_url)
     browsed = seen.pop("browsed")
     assert set(browsed[:-1]) == {3}
     assert sum(browsed) > 10
     assert seen == {
-        "history": "BadServiceUnsupported",
+        "history": "BadHistoryOperationUnsupported",
+        "kept": ["Good", True],
+        "at": True,
+        "past": [["conveyor/fu1", "node lost", 900]],
         "query": "BadServiceUnsupported",
         "part": 2,
         "none": "BadIndexRangeNoData",

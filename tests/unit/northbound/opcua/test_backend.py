@@ -24,7 +24,9 @@ PUSH = ua.NodeId(12740)
 
 
 class Told:
-    """In place of the users, the writer, the caller and the view."""
+    """In place of the users, the writer, the caller, the view and the past."""
+
+    files: Any = None
 
     def __init__(self) -> None:
         self.calls: list[tuple[object, ...]] = []
@@ -37,11 +39,13 @@ class Told:
         self.calls.append((identity, writes))
         return []
 
-    async def call(self, identity: Identity, calls: object, **_: object) -> list[object]:
-        return await self.write(identity, calls)
+    async def call(self, identity: Identity, calls: list[object], **_: object) -> list[object]:
+        return await self.write(identity, calls) or calls
 
     def has(self, where: object) -> bool:
         return where == PUSH
+
+    def file(self, where: ua.NodeId) -> None: ...
 
     def count(self, leaf: str) -> None:
         self.calls.append((leaf,))
@@ -51,14 +55,14 @@ class Told:
 
 
 def backend(told: Any, pulse: Any = None) -> Backend:
-    return Backend(told, lambda _: None, told, told, told, told, pulse)
+    return Backend(told, lambda _: None, told, told, told, told, pulse, told)
 
 
 @pytest.mark.parametrize("least", [*Role, None])
 def test_what_a_user_may_write_and_call_follows_from_the_role(least: Role | None) -> None:
     """What nobody may is for no observer either."""
     told: Any = Told()
-    made = Backend(told, lambda _: least, told, told, told, told, told)
+    made = Backend(told, lambda _: least, told, told, told, told, told, told)
     allowed = [role for role in Role if made.may(user(role=role), ua.NodeId("conveyor/fu1", 2))]
     assert allowed == [role for role in Role if role >= (Role.OPERATOR if least is None else least)]
 
@@ -83,13 +87,14 @@ async def test_the_view_is_told_by_the_identity() -> None:
     told = Told()
     made, who = backend(told), user()
     await made.write(who, [])
-    await made.call(who, [])
+    call = ua.CallMethodRequest()
+    assert await made.call(who, [call]) == [call]
     made.on_connection(who, is_there=True, has_others=False)
     made.on_refused()
     made.on_broken()
     assert told.calls == [
         (who.identity, []),
-        (who.identity, []),
+        (who.identity, [call]),
         (who.identity, True, False),
         ("opcua_refused_connections",),
         ("opcua_broken_connections",),

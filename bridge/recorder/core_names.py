@@ -30,6 +30,7 @@ _CORE: Final = (
 _SHELLS: Final = frozenset(
     (
         "bridge.base.clock",
+        "bridge.base.line_file",
         "bridge.base.memory_lock",
         "bridge.base.notify",
         "bridge.base.quietlog",

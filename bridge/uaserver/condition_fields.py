@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Final
@@ -50,47 +50,42 @@ class AlarmContent:
 
 @dataclass(frozen=True, slots=True)
 class ConditionPlace:
-    """Subject of a condition. ``emitters`` are the nodes whose events tell of it, ``fixed`` the fields
-    that never change."""
+    """Subject of a condition: ``source``, called ``source_name``. ``emitters`` are the nodes whose events
+    tell of it, ``common`` the fields that it has in common with all of its kind."""
 
     node: ua.NodeId
+    source: ua.NodeId
     source_name: str
     emitters: tuple[ua.NodeId, ...]
-    fixed: Fields
+    common: Fields
+
+    def fields(self) -> Fields:
+        """Fields that never change."""
+        source = variant(self.source, Kind.NodeId)
+        return {
+            **self.common,
+            CONDITION_ID: variant(self.node, Kind.NodeId),
+            "SourceNode": source,
+            "InputNode": source,
+            "SourceName": variant(self.source_name, Kind.String),
+        }
 
 
-def condition_place(
-    node: ua.NodeId,
-    kind: ua.NodeId,
-    name: str,
-    source: tuple[ua.NodeId, str],
-    emitters: Iterable[ua.NodeId],
-    condition_class: tuple[int, ua.LocalizedText],
-    more: Fields,
-) -> ConditionPlace:
-    """``kind`` is its event type, ``source`` the node that it is about with its name, ``condition_class`` the
-    type and name of its class (§5.9), ``more`` are fields of its type."""
-    source_node, source_name = source
-    class_id, class_name = condition_class
-    return ConditionPlace(
-        node,
-        source_name,
-        tuple(emitters),
-        {
-            CONDITION_ID: variant(node, Kind.NodeId),
-            "EventType": variant(kind, Kind.NodeId),
-            "SourceNode": variant(source_node, Kind.NodeId),
-            "SourceName": variant(source_name, Kind.String),
-            "InputNode": variant(source_node, Kind.NodeId),
-            "ConditionName": variant(name, Kind.String),
-            "ConditionClassId": variant(node_id(class_id), Kind.NodeId),
-            "ConditionClassName": variant(class_name, Kind.LocalizedText),
-            "BranchId": _NO_BRANCH,
-            "MaxTimeShelved": _MAX_TIME_SHELVED,
-            "Quality": _GOOD,
-            **more,
-        },
-    )
+def common_fields(
+    kind: ua.NodeId, name: str, class_id: int, class_name: ua.LocalizedText, more: Fields
+) -> Fields:
+    """Fields of all conditions of the event type ``kind`` that are called ``name``; ``class_id`` and
+    ``class_name`` are those of their condition class (§5.9), ``more`` are fields of their type."""
+    return {
+        "EventType": variant(kind, Kind.NodeId),
+        "ConditionName": variant(name, Kind.String),
+        "ConditionClassId": variant(node_id(class_id), Kind.NodeId),
+        "ConditionClassName": variant(class_name, Kind.LocalizedText),
+        "BranchId": _NO_BRANCH,
+        "MaxTimeShelved": _MAX_TIME_SHELVED,
+        "Quality": _GOOD,
+        **more,
+    }
 
 
 class ConditionWords:
@@ -128,7 +123,7 @@ def condition_fields(
     comment = state.comment
     acked, confirmed = ("acknowledged", "unacknowledged"), ("confirmed", "unconfirmed")
     return {
-        **place.fixed,
+        **place.fields(),
         "Message": variant(content.message, Kind.LocalizedText),
         "Severity": variant(state.severity, Kind.UInt16),
         "LastSeverity": variant(state.last_severity, Kind.UInt16),

@@ -9,9 +9,10 @@ from __future__ import annotations
 import asyncio
 import uuid
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import count
 from typing import Any, Final, Protocol
 
 from bridge.base.guard import Guard
@@ -119,17 +120,15 @@ class Conditions:
         self._refreshing: set[int] = set()
         self._guard = Guard("OPC UA alarms")
         self._latest: tuple[tuple[Condition, ConditionState, AlarmContent], Fields] | None = None
-        self._by_object: dict[ua.NodeId, Condition] = {}
         self.conditions: dict[ua.NodeId, Condition] = {}
         self.watched: dict[ua.NodeId, dict[str, Watchers]] = {}
+        self.condition_of: Callable[[ua.NodeId], ua.NodeId] = lambda where: where
+        """Condition whose methods an object has: it may be one below the condition."""
         self.on_change: Callable[[bool], None] = lambda is_by_user: None
         """Told of each change of a state; ``is_by_user``: somebody has called a method."""
 
-    def add(self, condition: Condition, objects: Iterable[ua.NodeId] = ()) -> None:
-        """``objects`` are those below it that have methods of it, too."""
+    def add(self, condition: Condition) -> None:
         self.conditions[condition.place.node] = condition
-        for where in (condition.place.node, *objects):
-            self._by_object[where] = condition
 
     # what happens to what they watch
 
@@ -231,7 +230,7 @@ class Conditions:
             return call_result(int(error.code), error.faults)
         except ServiceError as error:
             return call_result(int(error.code))
-        condition = self._by_object.get(where)
+        condition = self.conditions.get(self.condition_of(where))
         if condition is None:
             return call_result(StatusCodes.BadNodeIdUnknown)
         code = await self._carry_out(user, condition, method, taken)
@@ -307,7 +306,9 @@ class Conditions:
 
 async def _until_room(items: Sequence[EventItem], latest: float) -> None:
     """Wait until the client has fetched what fills its queues, not beyond ``latest``."""
-    while any(item.is_full for item in items) and asyncio.get_running_loop().time() < latest:
+    for _ in count():
+        if not any(item.is_full for item in items) or asyncio.get_running_loop().time() >= latest:
+            return
         await asyncio.sleep(_PAUSE_S)
 
 

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 from asyncua import ua
 
-from bridge.uaserver.condition_fields import AlarmContent, ConditionWords, condition_place
+from bridge.uaserver.condition_fields import AlarmContent, ConditionPlace, ConditionWords, common_fields
 from bridge.uaserver.conditions import Condition, Conditions
 from bridge.uaserver.eventfilter import EventFilter
 from bridge.uaserver.items import EventItem, ItemSettings
@@ -70,17 +70,11 @@ class ConditionBench:
 
     def add(self, name: str = "c") -> Condition:
         source = ua.NodeId(name, 2)
-        place = condition_place(
-            ua.NodeId(f"{name}/Alarm", 2),
-            ua.NodeId(Ids.AlarmConditionType),
-            "Alarm",
-            (source, name),
-            (SERVER, source),
-            (Ids.ProcessConditionClassType, text("process")),
-            {},
-        )
+        kind = ua.NodeId(Ids.AlarmConditionType)
+        common = common_fields(kind, "Alarm", Ids.ProcessConditionClassType, text("process"), {})
+        place = ConditionPlace(ua.NodeId(f"{name}/Alarm", 2), source, name, (SERVER, source), common)
         made = Condition(place)
-        self.conditions.add(made, [ua.NodeId(f"{name}/Alarm/ShelvingState", 2)])
+        self.conditions.add(made)
         return made
 
     def raise_(self, condition: Condition, said: str = "hot", severity: int = 700) -> None:

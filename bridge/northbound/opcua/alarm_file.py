@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from pathlib import Path
+from threading import Lock
 from typing import Final
 
 import msgspec
@@ -121,6 +122,7 @@ class AlarmFile:
 
     def __init__(self, folder: Path) -> None:
         self.path = folder / FILE
+        self._writing = Lock()
 
     def load(self) -> Mapping[str, KeptAlarm]:
         """Alarms by their ids; none where there is no file, or where it cannot be used, which is logged."""
@@ -143,6 +145,7 @@ class AlarmFile:
         return {}
 
     def save(self, alarms: Mapping[str, KeptAlarm]) -> None:
-        """Write it whole or not at all. Raises OSError."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(self.path, _encode(_Kept(_VERSION, dict(alarms))))
+        """Write it whole or not at all, in whatever thread. Raises OSError."""
+        with self._writing:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(self.path, _encode(_Kept(_VERSION, dict(alarms))))

@@ -237,6 +237,14 @@ class Alarm:
     type_id: ua.NodeId
 
 
+def condition_of(where: ua.NodeId) -> ua.NodeId:
+    """Alarm whose methods the object ``where`` has: itself, or its ShelvingState."""
+    name, suffix = where.Identifier, f"/{SHELVING}"
+    if not isinstance(name, str) or not name.endswith(suffix):
+        return where
+    return node_id(name.removesuffix(suffix), where.NamespaceIndex)
+
+
 class _Referable(Protocol):
     def refer(self, reference: ua.NodeId, *, forward: bool) -> ua.ReferenceDescription: ...
 

@@ -8,9 +8,9 @@ from typing import Final
 
 from bridge.command.messages.request import Action, Code, Request, Role, command_of
 from bridge.northbound.opcua.alarm_nodes import Alarm
-from bridge.northbound.opcua.backend import SessionUser
 from bridge.northbound.opcua.data_values import outcome_status, rejection
 from bridge.northbound.opcua.nodes import pascal_case
+from bridge.northbound.opcua.session_user import SessionUser
 from bridge.northbound.opcua.writes import ask
 from bridge.northbound.view import View
 from bridge.uaserver.library import StatusCodes, ua

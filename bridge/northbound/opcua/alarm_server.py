@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -14,8 +14,8 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from bridge.base import clock
 from bridge.northbound.opcua.alarm_contents import AlarmContents
 from bridge.northbound.opcua.alarm_file import AlarmFile
-from bridge.northbound.opcua.alarm_nodes import SHELVING, Alarm, AlarmNodes
-from bridge.northbound.opcua.alarm_places import CERTIFICATE, AlarmPlace, alarm_places
+from bridge.northbound.opcua.alarm_nodes import Alarm, AlarmNodes, condition_of
+from bridge.northbound.opcua.alarm_places import CERTIFICATE, alarm_places
 from bridge.northbound.opcua.alarm_rights import AlarmRights
 from bridge.northbound.opcua.alarms import EXPIRATION_LIMIT_MS, Alarms, AlarmTask
 from bridge.northbound.opcua.event_types import (
@@ -32,7 +32,7 @@ from bridge.northbound.trouble_reader import TroubleReader
 from bridge.northbound.trouble_words import PlantWords
 from bridge.northbound.view import View
 from bridge.text import Text
-from bridge.uaserver.condition_fields import ConditionWords, condition_place
+from bridge.uaserver.condition_fields import ConditionPlace, ConditionWords, common_fields
 from bridge.uaserver.conditions import Condition, Conditions, EventSink
 from bridge.uaserver.library import ObjectIds, node_id, ua, variant
 from bridge.uaserver.session import InnerServer
@@ -72,13 +72,11 @@ def serve_alarms(
     conditions = inner.conditions = Conditions(inner.subscriptions, rights, words, _now_ms)
     contents = AlarmContents(view.image, site.words, tree.namespace)
     types = _types(EventTypeMaker(inner, tree.namespace))
-    alarms = [
-        _alarm(place, types[place.kind], tree, contents, certificate)
-        for place in alarm_places(tree.notifiers, site.fronts)
-    ]
+    alarms = list(_alarms(types, tree, site, contents, certificate))
     nodes = AlarmNodes(inner.aspace, tree.namespace, tree.kinds, conditions, alarms)
     for alarm in alarms:
-        conditions.add(alarm.condition, [nodes.id_of(alarm, SHELVING)])
+        conditions.add(alarm.condition)
+    conditions.condition_of = condition_of
     tree.beside = nodes
     rights.alarms = {one.condition.place.node: one for one in alarms}
     reader = TroubleReader(view.image, _now_ms)
@@ -106,20 +104,29 @@ def _types(types: EventTypeMaker) -> Mapping[str, ua.NodeId]:
     }
 
 
-def _alarm(
-    place: AlarmPlace, kind: ua.NodeId, tree: Tree, contents: AlarmContents, certificate: x509.Certificate
-) -> Alarm:
-    class_id, class_name = _CLASSES["drive" if place.kind == "drive" else "other"]
-    described = condition_place(
-        node_id(place.id, tree.namespace),
-        kind,
-        place.name,
-        (tree.notifiers[place.owner], place.source_name),
-        Notifiers(tree.notifiers).emitters(place.owner),
-        (class_id, in_all_languages(class_name)),
-        of_certificate(certificate) if place.kind == CERTIFICATE else {},
-    )
-    return Alarm(place, Condition(described, content=contents.nothing), kind)
+def _alarms(
+    types: Mapping[str, ua.NodeId],
+    tree: Tree,
+    site: AlarmSite,
+    contents: AlarmContents,
+    certificate: x509.Certificate,
+) -> Iterator[Alarm]:
+    common: dict[tuple[str, str], Fields] = {}
+    notifiers = Notifiers(tree.notifiers)
+    for place in alarm_places(tree.notifiers, site.fronts):
+        kind, key = types[place.kind], (place.kind, place.name)
+        if key not in common:
+            class_id, name = _CLASSES["drive" if place.kind == "drive" else "other"]
+            more = of_certificate(certificate) if place.kind == CERTIFICATE else {}
+            common[key] = common_fields(kind, place.name, class_id, in_all_languages(name), more)
+        described = ConditionPlace(
+            node_id(place.id, tree.namespace),
+            tree.notifiers[place.owner],
+            place.source_name,
+            tuple(notifiers.emitters(place.owner)),
+            common[key],
+        )
+        yield Alarm(place, Condition(described, content=contents.nothing), kind)
 
 
 def of_certificate(certificate: x509.Certificate) -> Fields:

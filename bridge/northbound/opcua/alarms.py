@@ -18,6 +18,7 @@ import msgspec
 
 from bridge.base.guard import Guard
 from bridge.base.publishing_clock import next_publish
+from bridge.condition.told import MOST
 from bridge.northbound.opcua.alarm_contents import AlarmContents
 from bridge.northbound.opcua.alarm_file import AlarmFile, is_worth_keeping, kept_alarm, state_of
 from bridge.northbound.opcua.alarm_nodes import Alarm
@@ -151,7 +152,7 @@ class Alarms:
         """The server has another certificate; ``fields`` are those of its alarm."""
         self._expires, self._check_at = expires, self._clock()
         condition = self._certificate.condition
-        condition.place = replace(condition.place, fixed={**condition.place.fixed, **fields})
+        condition.place = replace(condition.place, common={**condition.place.common, **fields})
 
     def _check_certificate(self) -> None:
         condition = self._certificate.condition
@@ -172,8 +173,9 @@ class Alarms:
                 worst.setdefault(alarm.place.id, (alarm, told))
         for alarm, trouble in worst.values():
             self._raise(alarm, trouble)
-        # Of the rest nothing is known while the bus process does not answer.
-        for name in [] if is_dead else list(self._speaking):
+        # Of the rest nothing is known while the bus process does not answer, or tells only the worst.
+        is_whole = not is_dead and len(shown) < MOST
+        for name in list(self._speaking) if is_whole else ():
             if name not in worst:
                 self._clear(name)
 

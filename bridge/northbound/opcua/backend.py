@@ -4,48 +4,26 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
-from bridge.command.messages.request import Identity, Role
+from bridge.command.messages.request import Role
 from bridge.northbound.opcua.accounts import Accounts
+from bridge.northbound.opcua.alarm_rights import LEAST_ROLE
 from bridge.northbound.opcua.file_transfer import READING, FileTransfer, file_method
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.permissions import ROLE_NODES
 from bridge.northbound.opcua.plant_history import PlantHistory
 from bridge.northbound.opcua.server_configuration import ServerConfiguration
+from bridge.northbound.opcua.session_user import SessionUser
 from bridge.northbound.opcua.writes import Writer
-from bridge.northbound.passwords import ANONYMOUS
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
+from bridge.uaserver.condition_calls import METHODS
 from bridge.uaserver.history import EventHistory, ValueHistory
 from bridge.uaserver.library import get, node_id, ua
-
-
-@dataclass(frozen=True, slots=True)
-class SessionUser:
-    """User of a session; ``identity`` names the session as its connection. ``encrypted`` says whether its
-    channel is."""
-
-    identity: Identity
-    encrypted: bool = False
-
-    @property
-    def name(self) -> str:
-        return self.identity.user
-
-    @property
-    def is_anonymous(self) -> bool:
-        return self.identity.user == ANONYMOUS
-
-    @property
-    def rank(self) -> int:
-        return int(self.identity.role)
-
-    def is_same(self, other: object) -> bool:
-        return isinstance(other, SessionUser) and self.identity.is_same(other.identity)
 
 
 class ConnectionArrivals:
@@ -98,6 +76,8 @@ class Backend(ServedApplication[SessionUser]):
         if self._configuration.has(where):
             return user.encrypted and user.identity.role >= Role.ADMIN
         least = self._least_role(where)
+        if least is None and where in METHODS:
+            least = LEAST_ROLE.get(METHODS[where].name, Role.OBSERVER)
         return user.identity.role >= (Role.OPERATOR if least is None else least)
 
     def roles(self, user: SessionUser) -> Sequence[ua.NodeId]:

@@ -113,7 +113,8 @@ async def test_shelving_ends_with_its_time() -> None:
     one = bench.add()
     bench.raise_(one)
     shelve = ua.NodeId(Ids.AlarmConditionType_ShelvingState_TimedShelve)
-    below = ua.NodeId("c/Alarm/ShelvingState", 2)
+    below = ua.NodeId("shelving of c", 2)
+    bench.conditions.condition_of = {below: one.place.node}.__getitem__
     assert await bench.call(below, shelve, ua.Variant(5000.0)) == Codes.Good
     bench.now_ms += 4000
     left = bench.conditions.fields(one)["ShelvingState/UnshelveTime"].Value

@@ -24,7 +24,7 @@ from bridge.northbound.opcua import alarm_server
 from bridge.northbound.opcua.alarm_server import AlarmSite
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.text import Text, as_json
-from bridge.uaserver.condition_fields import AlarmContent, condition_place
+from bridge.uaserver.condition_fields import AlarmContent, ConditionPlace, common_fields
 from bridge.uaserver.conditions import Condition, Conditions
 from tests.support.opcua_alarms import (
     Follower,
@@ -324,21 +324,11 @@ def conditions_of(served: Served) -> Conditions:
 
 def thousand(conditions: Conditions) -> list[Condition]:
     """More alarms than a site has drives, told by the Server object."""
-    server = (ua.NodeId(Ids.Server),)
-    made = [
-        Condition(
-            condition_place(
-                ua.NodeId(f"many/{number}", 2),
-                ua.NodeId(Ids.AlarmConditionType),
-                "Alarm",
-                (server[0], f"many/{number}"),
-                server,
-                (Ids.ProcessConditionClassType, ua.LocalizedText("process", "en")),
-                {},
-            )
-        )
-        for number in range(1000)
-    ]
+    server = ua.NodeId(Ids.Server)
+    kind, process = ua.NodeId(Ids.AlarmConditionType), ua.LocalizedText("process", "en")
+    common = common_fields(kind, "Alarm", Ids.ProcessConditionClassType, process, {})
+    names = [f"many/{number}" for number in range(1000)]
+    made = [Condition(ConditionPlace(ua.NodeId(one, 2), server, one, (server,), common)) for one in names]
     for one in made:
         conditions.add(one)
     return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,7 +12,7 @@ import pytest
 from asyncua import ua
 
 from bridge.catalogue.codes import NODE_STATES
-from bridge.condition.told import troubles_json
+from bridge.condition.told import MOST, troubles_json
 from bridge.image import Quality
 from bridge.northbound.opcua.alarm_contents import AlarmContents
 from bridge.northbound.opcua.alarm_file import AlarmFile
@@ -20,7 +21,7 @@ from bridge.northbound.opcua.alarm_places import CERTIFICATE, alarm_places
 from bridge.northbound.opcua.alarms import Alarms
 from bridge.northbound.trouble_reader import TroubleReader
 from bridge.northbound.trouble_words import PlantWords
-from bridge.uaserver.condition_fields import ConditionWords, condition_place
+from bridge.uaserver.condition_fields import ConditionPlace, ConditionWords, common_fields
 from bridge.uaserver.condition_state import Act
 from bridge.uaserver.conditions import Condition, Conditions
 from bridge.uaserver.library import text
@@ -85,8 +86,8 @@ class Bench:
 
     def _condition(self, name: str, contents: AlarmContents) -> Condition:
         where = ua.NodeId(name, 2)
-        class_ = Ids.ProcessConditionClassType, text("process")
-        place = condition_place(where, where, "Alarm", (where, name), (where,), class_, {})
+        common = common_fields(where, "Alarm", Ids.ProcessConditionClassType, text("process"), {})
+        place = ConditionPlace(where, where, name, (where,), common)
         condition = Condition(place, content=contents.nothing)
         self.conditions.add(condition)
         return condition
@@ -256,3 +257,16 @@ def test_a_certificate_is_an_alarm_for_its_last_month(bench: Bench) -> None:
     bench.followed.look()
     assert bench.active == [certificate]
     assert "1979-12-30" in bench.says(certificate, "Message").words["de"]
+
+
+def test_no_alarm_is_over_because_there_is_more_to_tell(bench: Bench) -> None:
+    """The list of troubles ends with the hundredth."""
+    bench.plant.set("n3/node/state", LOST)
+    bench.later()
+    one = {"rank": "danger", "kind": "ignores_stop", "place": "n5/fu1", "since": 1, "facts": {}}
+    bench.plant.set("bridge/troubles", json.dumps([one] * MOST))
+    bench.followed.look()
+    assert bench.active == ["n3/Alarm", "n5/fu1/Alarm"]
+    bench.plant.set("bridge/troubles", json.dumps([one] * (MOST - 1)))
+    bench.followed.look()
+    assert bench.active == ["n5/fu1/Alarm"]

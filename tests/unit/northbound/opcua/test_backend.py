@@ -9,7 +9,8 @@ from asyncua import ua
 from cryptography.hazmat.primitives.asymmetric.rsa import generate_private_key
 
 from bridge.command.messages.request import Identity, Role, Source
-from bridge.northbound.opcua.backend import Backend, SessionUser
+from bridge.northbound.opcua.backend import Backend
+from bridge.northbound.opcua.session_user import SessionUser
 from bridge.northbound.pulse import Pulse
 from bridge.uaserver.application import NOBODY, LoginAttempt
 
@@ -115,3 +116,19 @@ async def test_the_methods_of_the_server_itself_are_for_admins_on_an_encrypted_c
         for encrypted in (False, True):
             who = SessionUser(user(role=role).identity, encrypted)
             assert made.may(who, PUSH) == (encrypted and role is Role.ADMIN)
+
+
+@pytest.mark.parametrize(
+    ("method", "least"),
+    [
+        (ua.ObjectIds.ConditionType_ConditionRefresh, Role.OBSERVER),
+        (ua.ObjectIds.AcknowledgeableConditionType_Acknowledge, Role.OPERATOR),
+        (ua.ObjectIds.AlarmConditionType_ShelvingState_TimedShelve, Role.OPERATOR),
+        (ua.ObjectIds.ConditionType_Disable, Role.ENGINEER),
+    ],
+)
+def test_methods_of_alarms_have_their_roles(method: int, least: Role) -> None:
+    told: Any = Told()
+    made = backend(told)
+    allowed = [role for role in Role if made.may(user(role=role), ua.NodeId(method))]
+    assert allowed == [role for role in Role if role >= least]

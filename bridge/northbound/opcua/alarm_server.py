@@ -117,7 +117,7 @@ def _alarms(
         kind, key = types[place.kind], (place.kind, place.name)
         if key not in common:
             class_id, name = _CLASSES["drive" if place.kind == "drive" else "other"]
-            more = of_certificate(certificate) if place.kind == CERTIFICATE else {}
+            more: Fields = of_certificate(certificate) if place.kind == CERTIFICATE else {}
             common[key] = common_fields(kind, place.name, class_id, in_all_languages(name), more)
         described = ConditionPlace(
             node_id(place.id, tree.namespace),

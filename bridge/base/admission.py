@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Final
+from typing import Final, TypeVar
 
 _SLOW_S: Final = 5.0
 
@@ -42,8 +42,9 @@ class Limits:
     """Connections that a server has at most: all, those ``of_address``, and those of one address that are
     ``waiting``, which are in no session. ``held_bytes`` is of messages and answers of all together.
 
-    ``kept``: places that only who has rights may keep. ``slow_s``: who has waited longer makes room first,
-    whatever it has said. ``all_yield``: where nobody waits, one in a session makes room."""
+    ``kept``: places, of all and of those of an address, that only who has ``top_rank`` may keep. ``slow_s``:
+    who has waited longer makes room first, whatever it has said. ``all_yield``: where nobody waits, one in a
+    session makes room."""
 
     connections: int
     of_address: int
@@ -51,6 +52,7 @@ class Limits:
     deadlines: Mapping[ConnectionStage, Deadline] = field(default_factory=dict[ConnectionStage, Deadline])
     held_bytes: int | None = None
     kept: int = 0
+    top_rank: int = 1
     slow_s: float = _SLOW_S
     all_yield: bool = False
 
@@ -66,11 +68,35 @@ class Visitor:
     close: Callable[[], None]
     held: Callable[[], int] = lambda: 0
     """Bytes of messages and answers that are kept for it."""
-    has_rights: Callable[[], bool] = lambda: False
-    """True if it may do more than read."""
+    rank: Callable[[], int] = lambda: 0
+    """Height of its user's role."""
+    user: Callable[[], str] = lambda: ""
+    """Name of its user; empty for one without a name."""
 
     def is_waiting(self) -> bool:
         return self.stage() is not ConnectionStage.SESSION
+
+    def rank_of(self) -> int:
+        return self.rank()
+
+    def share_of(self) -> str:
+        """Whom its place is counted for: its user, or without one its address."""
+        return self.user() or self.source
+
+
+Holder = TypeVar("Holder")
+
+
+def first_to_yield(
+    holders: Sequence[Holder], rank_of: Callable[[Holder], int], share_of: Callable[[Holder], str]
+) -> Holder:
+    """The one that makes room for others: of those of the lowest rank one of the user, or the address, that
+    has the most, and of these the last one in ``holders``."""
+    lowest = min(map(rank_of, holders))
+    of_rank = [one for one in holders if rank_of(one) == lowest]
+    crowds = Counter(map(share_of, of_rank))
+    largest = max(crowds.values())
+    return next(one for one in reversed(of_rank) if crowds[share_of(one)] == largest)
 
 
 class Admission:
@@ -152,15 +178,27 @@ class Admission:
             self._end(heaviest, "connections closed that had too much under way", "")
 
     def _keep_places(self) -> None:
-        """Close connections beyond the limit: clients without rights may try, but do not keep the places that
-        are for clients with rights."""
+        """Close connections beyond the limit, so that a place is free for who has a higher role: anybody may
+        try it, but only the highest role keeps it."""
         limits = self._limits
+        if not limits.kept:
+            return
         settled = [one for one in self._visitors if not one.is_waiting()]
-        beyond = len(settled) - (limits.connections - limits.kept)
-        without = [one for one in reversed(settled) if not one.has_rights()]
-        with_rights = len(settled) - len(without)
-        for visitor in without[: max(0, beyond - with_rights)]:
-            self._end(visitor, "connections closed whose place is kept for who has rights", "")
+        for source in {one.source for one in settled}:
+            same = [one for one in settled if one.source == source]
+            self._free(same, limits.of_address - limits.kept)
+        settled = [one for one in self._visitors if not one.is_waiting()]
+        self._free(settled, limits.connections - limits.kept)
+
+    def _free(self, settled: list[Visitor], most: int) -> None:
+        """Leave ``most`` of them, as far as there are some of a lower role than the highest."""
+        for _ in range(len(settled) - most):
+            lower = [one for one in settled if one.rank() < self._limits.top_rank]
+            if not lower:
+                return
+            yielding = first_to_yield(lower, Visitor.rank_of, Visitor.share_of)
+            settled.remove(yielding)
+            self._end(yielding, "connections closed whose place is kept for a higher role", "")
 
     def _make_room(self, newcomer: Visitor, candidates: Sequence[Visitor], now: float) -> bool:
         """End one of the candidates that wait, or where all yield one of all."""

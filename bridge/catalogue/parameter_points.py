@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.image.point import DataType, Point
+from bridge.image.point import DataType, Point, WriteKind
 from bridge.parameter import Names, ParameterEntry
 
 
@@ -22,6 +22,7 @@ def _point(name: str, entry: ParameterEntry) -> Point:
         low=definition.low,
         high=definition.high,
         writable=definition.writable,
+        write=WriteKind.PARAMETER,
         description=f"{entry.name} {definition.title}",
         states=tuple(definition.states.items()) if definition.value_type.is_integer else (),
     )

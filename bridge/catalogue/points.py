@@ -18,7 +18,7 @@ from bridge.catalogue.codes import (
 from bridge.catalogue.parameter_points import parameter_points
 from bridge.config import BusTable, DriveTable, NodeTable, Site
 from bridge.drive import DRIVE_STATES, LinearScale, ValueCodec, scales_of
-from bridge.image.point import DataType, Point
+from bridge.image.point import DataType, Point, WriteKind
 from bridge.mapping.device_signals import Signal
 from bridge.mapping.entry_types import said_of
 from bridge.mapping.model import Family, Poll, ProcessValue
@@ -181,6 +181,7 @@ def _supervision_points(name: str, timeout_writable: bool) -> list[Point]:
             Text.of("point.fieldbus_timeout"),
             unit="ms",
             writable=timeout_writable,
+            write=WriteKind.TIMEOUT,
         ),
         point(
             "telegram_downtime_s",

@@ -8,9 +8,10 @@ from typing import Final
 from bridge.catalogue.codes import Source
 from bridge.catalogue.site import Catalogue
 from bridge.catalogue.specs import MemberSpec
-from bridge.image.point import Point
+from bridge.image.point import Point, WriteKind
 
 _TAKES_LEASES: Final = (Source.OPCUA, Source.ZENOH)
+_ENGINEERS: Final = ("engineer", "admin")
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +25,11 @@ class Rights:
     def may_write(self, catalogue: Catalogue, point: Point) -> bool:
         """True where a write of this point is ever carried out."""
         owner, _, _ = point.name.rpartition("/")
-        name, _, group = owner.rpartition("/")
+        name = owner.rpartition("/")[0]
         one = catalogue.members.get(name)
         if not point.writable or one is None:
             return point.writable
-        if group == "parameter":
+        if point.write is WriteKind.PARAMETER:
             return self._may_set(one, point.name.removeprefix(f"{name}/parameter/"))
         return self.may_command(one)
 
@@ -55,6 +56,6 @@ def rights_of(catalogue: Catalogue, source: Source) -> Rights:
     site = catalogue.site
     if source is Source.OPCUA:
         users = site.opcua.user if site.opcua else []
-        return Rights(source, has_engineers=any(user.role == "engineer" for user in users))
+        return Rights(source, has_engineers=any(user.role in _ENGINEERS for user in users))
     table = site.modbus if source is Source.MODBUS else site.zenoh
     return Rights(source, sets_parameters=table is None or table.parameters == "write")

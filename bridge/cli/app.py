@@ -27,6 +27,7 @@ _COMMANDS: Final = {
     "eds": "eds_command.eds",
     "family": "family_command.app",
     "faults": "faults_command.faults",
+    "certificates": "certificates_command.app",
     "hash-password": "project_command.hash_password",
     "record": "record_command.record",
     "replay": "replay_command.replay",

@@ -41,6 +41,11 @@ _MOST_COUNTER: Final = 240
 _SHORTEST_REASON: Final = 10
 _LOCATOR: Final = re.compile(r"[a-z][a-z0-9-]*/.+")
 _HOST_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63})*")
+_ENDPOINT_URL: Final = re.compile(
+    r"opc\.tcp://([A-Za-z0-9_.-]+|\[[0-9A-Fa-f:.]+\])(:(?P<port>\d{1,5}))?(/[!-~]*)?"
+)
+_LOWEST_PORT: Final = 1
+_HIGHEST_PORT: Final = 65535
 _URI: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:[!-~]+")
 
 
@@ -145,6 +150,13 @@ def _uri(text: str) -> str:
     return text
 
 
+def _endpoint_url(text: str) -> str:
+    found = _ENDPOINT_URL.fullmatch(text)
+    if not found or not 1 <= int(found["port"] or _LOWEST_PORT) <= _HIGHEST_PORT:
+        raise Unfit(Text.of("site.endpoint_url"))
+    return text
+
+
 def _controller(text: str) -> str:
     if not _CONTROLLER.fullmatch(text) or text == "anonymous":
         raise Unfit(Text.of("site.controller"))
@@ -194,6 +206,7 @@ Gateway = Annotated[str, AfterValidator(_gateway)]
 Network = Annotated[str, AfterValidator(_network)]
 Locator = Annotated[str, AfterValidator(_locator)]
 HostName = Annotated[str, AfterValidator(_host_name)]
+EndpointUrl = Annotated[str, AfterValidator(_endpoint_url)]
 Uri = Annotated[str, AfterValidator(_uri)]
 ControllerName = Annotated[str, AfterValidator(_controller)]
 Timeout = Annotated[int, Field(ge=0, le=LONGEST_TIMEOUT_MS)]

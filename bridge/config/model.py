@@ -25,6 +25,7 @@ from bridge.config.field_types import (
     ControllerName,
     Downtime,
     Endpoint,
+    EndpointUrl,
     Full,
     Gateway,
     HostName,
@@ -322,8 +323,11 @@ class ModbusTable(ListeningTable):
 
 class UserTable(Table):
     name: str = Field(min_length=1, max_length=64)
-    role: Literal["observer", "operator", "engineer"] = Field(description="observer, operator or engineer")
-    password_hash: str = Field(description="the line that `drivebridge hash-password` prints")
+    role: Literal["observer", "operator", "engineer", "admin"] = Field(
+        description="observer, operator, engineer or admin"
+    )
+    password_hash: str | None = Field(None, description="the line that `drivebridge hash-password` prints")
+    certificate: str | None = None
 
 
 class OpcUaHistoryTable(Table):
@@ -349,9 +353,13 @@ class OpcUaTable(ListeningTable):
     )
     certificate: str | None = None
     private_key: str | None = None
+    trust: Literal["list", "anybody"] = "list"
     trusted_dir: str | None = None
     powertrain_draft: bool = Field(
         False, description="true serves a draft of OPC 40400-2, which is not published yet"
+    )
+    endpoints: list[EndpointUrl] = Field(
+        default_factory=list[str], description="further addresses by which it is reached, opc.tcp://host:port"
     )
     history: OpcUaHistoryTable = Field(default_factory=lambda: OpcUaHistoryTable.model_validate({}))
     acknowledge_resets: bool = Field(

@@ -35,13 +35,23 @@ class DataType(StrEnum):
         return 0.0 if self is DataType.FLOAT else 0
 
 
+class WriteKind(StrEnum):
+    """Kinds of requests that writes of points are."""
+
+    TELEGRAM = "telegram"
+    """With others of its drive."""
+    PARAMETER = "parameter"
+    TIMEOUT = "timeout"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Point:
     """Name and nature of one value; the value itself is in the image.
 
     ``name`` is the full name, ``<node>/<drive>/<group>/<leaf>`` for what belongs to a drive. ``low``
-    and ``high`` are in ``unit``. ``states`` are the codes of an enumeration with their text, ``bits``
-    the names of a word's bits from bit 0 on ("" where a bit has no meaning). ``added`` is the number of the
+    and ``high`` are in ``unit``. ``write`` is what a write of it is, where it is ``writable``. ``states`` are
+    the codes of an enumeration with their text, ``bits`` the names of a word's bits from bit 0 on ("" where a
+    bit has no meaning). ``added`` is the number of the
     addition by which the point came, 0 for the first points: registers, which are in the order of the points,
     put those of each addition behind all before, so that none of these moves.
     """
@@ -52,6 +62,7 @@ class Point:
     low: float | None = None
     high: float | None = None
     writable: bool = False
+    write: WriteKind = WriteKind.TELEGRAM
     description: Words = ""
     states: tuple[tuple[int, str], ...] = ()
     bits: tuple[str, ...] = ()

@@ -49,7 +49,8 @@ def _nobody() -> str:
 
 
 def check_users(users: Sequence[UserTable]) -> None:
-    """Raises ``FileFaults`` for names that are taken and lines that are no hash."""
+    """Raises ``FileFaults`` for names that are taken, lines that are no hash, and users without a
+    credential, or with two."""
     faults: list[Fault] = []
     seen: set[str] = set()
     for position, user in enumerate(users):
@@ -58,7 +59,10 @@ def check_users(users: Sequence[UserTable]) -> None:
             said = Text.of("site.user_name_taken", name=user.name)
             faults.append(Fault("site file", 0, f"{key}.name", said))
         seen.add(user.name)
-        if not is_password_hash(user.password_hash):
+        if bool(user.password_hash) is bool(user.certificate):
+            said, advice = Text.of("site.user_credential"), Text.of("site.user_credential_advice")
+            faults.append(Fault("site file", 0, key, said, advice))
+        elif user.password_hash and not is_password_hash(user.password_hash):
             said, advice = Text.of("site.password_hash"), Text.of("site.password_hash_advice")
             faults.append(Fault("site file", 0, f"{key}.password_hash", said, advice))
     if faults:

@@ -16,6 +16,7 @@ from asyncua.ua.ua_binary import uatcp_to_binary
 from bridge.base import clock
 from bridge.base.admission import Admission, ConnectionStage, Visitor
 from bridge.base.sources import source_of
+from bridge.uaserver.application import NOBODY, UserIdentity
 from bridge.uaserver.arrivals import Arrivals
 from bridge.uaserver.client_notices import tell
 from bridge.uaserver.connection_limits import limits as admission_limits
@@ -53,7 +54,13 @@ class _UaProtocol(OPCUAProtocol):
         assert isinstance(transport, asyncio.Transport)
         now = clock.now()
         visitor = Visitor(
-            self._source, now, self._stage, lambda: _end(transport), self._held, self._has_rights
+            self._source,
+            now,
+            self._stage,
+            lambda: _end(transport),
+            self._held,
+            lambda: self._user.rank,
+            lambda: "" if self._user.is_anonymous else self._user.name,
         )
         if not self._admission.admit(visitor, now):
             _end(transport, StatusCodes.BadTcpServerTooBusy)
@@ -73,10 +80,10 @@ class _UaProtocol(OPCUAProtocol):
     def _stage(self) -> ConnectionStage:
         return self.processor.stage if isinstance(self.processor, Processor) else ConnectionStage.CONNECTED
 
-    def _has_rights(self) -> bool:
-        """True for a user who may command."""
+    @property
+    def _user(self) -> UserIdentity:
         session = self.processor.session if isinstance(self.processor, Processor) else None
-        return isinstance(session, Session) and session.identity.has_rights
+        return session.identity if isinstance(session, Session) else NOBODY
 
     def _held(self) -> int:
         transport, processor = self.transport, self.processor
@@ -136,7 +143,7 @@ class TcpAcceptor(BinaryServer):
         self._socket = bound
         self._inner = server
         self._admission = Admission(
-            admission_limits(),
+            admission_limits(server.application.highest_rank),
             tell,
             lambda: server.application.on_refused(),
             lambda: server.application.on_broken(),

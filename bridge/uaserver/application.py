@@ -25,8 +25,8 @@ class UserIdentity(Protocol):
         ...
 
     @property
-    def has_rights(self) -> bool:
-        """May do more than read."""
+    def rank(self) -> int:
+        """Height of its role; 0 may only read. Where there is not room for all, the lowest one yields."""
         ...
 
     def is_same(self, other: Any) -> bool:
@@ -39,7 +39,7 @@ class Nobody:
 
     name = ""
     is_anonymous = True
-    has_rights = False
+    rank = -1
 
     def is_same(self, other: object) -> bool:
         return self is other
@@ -50,12 +50,17 @@ NOBODY = Nobody()
 
 @dataclass(frozen=True, slots=True)
 class LoginAttempt:
-    """Identity token of a session. ``nonce`` is the server's last one to this session, ``key`` the server's;
-    ``encrypted`` says whether the channel is. ``session`` is the session's name."""
+    """Identity token of a session, and the ``signature`` that came with it.
+
+    ``nonce`` is the server's last one to this session, ``key`` and ``certificate``, in DER, are those that
+    the server has shown to it; ``encrypted`` says whether the channel is. ``session`` is the session's name.
+    """
 
     token: object
+    signature: object
     nonce: bytes
     key: RSAPrivateKey
+    certificate: bytes
     address: str
     session: str
     encrypted: bool
@@ -71,8 +76,17 @@ class ServedApplication(Protocol[U]):
         """Raises ServiceError for who is not let in."""
         ...
 
+    @property
+    def highest_rank(self) -> int:
+        """Rank that no user exceeds."""
+        ...
+
     def may(self, user: U, where: ua.NodeId) -> bool:
         """Whether this user may write or call ``where``, in so far as roles decide."""
+        ...
+
+    def roles(self, user: U) -> Sequence[ua.NodeId]:
+        """Role objects of namespace 0 that this user has been granted."""
         ...
 
     async def write(self, user: U, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]: ...

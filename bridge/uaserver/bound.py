@@ -7,8 +7,12 @@ from typing import Final
 
 from asyncua.common.connection import TransportLimits
 from asyncua.server.server import Server as LibraryServer
+from cryptography import x509
+from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.uaserver.acceptor import TcpAcceptor
+from bridge.uaserver.library import change
 from bridge.uaserver.security import CheckedPolicy, Trust
 from bridge.uaserver.selfdescription import describe
 from bridge.uaserver.session import InnerServer
@@ -20,7 +24,7 @@ _MOST_CHUNKS: Final = 256
 class BoundServer(LibraryServer):
     """asyncua's server on a socket that is bound already, with checked channels."""
 
-    def __init__(self, inner: InnerServer, bound: socket.socket, trusted: Trust | None) -> None:
+    def __init__(self, inner: InnerServer, bound: socket.socket, trusted: Trust) -> None:
         super().__init__(iserver=inner)
         self._inner = inner
         self._bound = bound
@@ -35,3 +39,12 @@ class BoundServer(LibraryServer):
         self.bserver = TcpAcceptor(self._inner, self._bound, self.limits)
         self.bserver.set_policies(policies)
         await self.bserver.start()
+
+    def renew(self, certificate: x509.Certificate, private_key: RSAPrivateKey) -> None:
+        """Use another certificate of our own for channels that are opened from here on; those that are open
+        go on with theirs, also when they are renewed."""
+        self._inner.certificate, self._inner.private_key = certificate, private_key
+        for policy in self._policies:
+            change(policy, certificate=certificate, private_key=private_key)
+        for endpoint in self._inner.endpoints:
+            change(endpoint, ServerCertificate=certificate.public_bytes(Encoding.DER))

@@ -16,8 +16,8 @@ MOST_WAITING: Final = 25
 MOST_HELD: Final = 64 * 1024 * 1024
 """Bytes of messages and answers, of all connections together."""
 KEPT: Final = 1 + _SPARE
-"""Connections that only who may command can keep: sessions that read must not keep out the one who stops, who
-needs one of them. The spare connection has no session of its own."""
+"""Connections, of all and of an address, that only who has the highest role can keep: sessions that read must
+not keep out the one who stops, who needs one of them. The spare connection has no session of its own."""
 DEADLINE_S: Final = {
     ConnectionStage.CONNECTED: 5.0,
     ConnectionStage.GREETED: 10.0,
@@ -31,8 +31,8 @@ _MISSING: Final = {
 }
 
 
-def limits() -> Limits:
-    """Limits of one server."""
+def limits(top_rank: int = 1) -> Limits:
+    """Limits of one server, none of whose users has a higher rank than ``top_rank``."""
     return Limits(
         MOST_CONNECTIONS,
         MOST_OF_ADDRESS,
@@ -40,4 +40,5 @@ def limits() -> Limits:
         deadlines={stage: Deadline(DEADLINE_S[stage], missing) for stage, missing in _MISSING.items()},
         held_bytes=MOST_HELD,
         kept=KEPT,
+        top_rank=top_rank,
     )

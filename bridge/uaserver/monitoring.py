@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable, Hashable
+from collections.abc import Awaitable, Callable, Hashable
 from itertools import count
 from typing import Final, TypeVar
 
@@ -64,7 +64,7 @@ class MonitoredItems:
         find: Callable[[], Subscription],
         params: ua.CreateMonitoredItemsParameters,
         room: Callable[[], int],
-        make_room: Callable[[], bool],
+        make_room: Callable[[], Awaitable[bool]],
     ) -> list[ua.MonitoredItemCreateResult]:
         """``room`` tells how much there is now, ``make_room`` whether there is more, ``find`` the
         subscription; ServiceError where that has been deleted meanwhile."""
@@ -76,8 +76,8 @@ class MonitoredItems:
                 await asyncio.sleep(0)
                 found, left = find(), room()
             result = self._create(found, wanted, times, left)
-            while _is_too_many(result) and make_room():
-                left = room()
+            while _is_too_many(result) and await make_room():
+                found, left = find(), room()
                 result = self._create(found, wanted, times, left)
             left -= 1
             results.append(result)

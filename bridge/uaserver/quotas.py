@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 
+from bridge.base.admission import first_to_yield
 from bridge.base.sources import source_of
 from bridge.uaserver.library import ServiceError, StatusCodes
 from bridge.uaserver.subscription import Subscription, SubscriptionOwner
@@ -26,18 +27,27 @@ MOST_LISTENERS: Final = 1_000
 MOST_LISTENERS_OF_ADDRESS: Final = 500
 
 
-async def make_room_for_session(address: str, sessions: Sequence[SubscriptionOwner]) -> None:
-    """See that there can be one more session of this address: one without a connection, which a client that
-    was started anew has left behind, ends first. Raises ServiceError."""
+async def make_room_for_session(address: str, sessions: Sequence[SubscriptionOwner], top_rank: int) -> None:
+    """See that there can be one more session of this address, whoever will activate it. Raises ServiceError.
+
+    The lowest role yields, and of it a session without a connection, which a client that was started anew has
+    left behind. One with a connection yields where there is a higher role than its own: a place is kept free
+    for that.
+    """
     same = [one for one in sessions if source_of(one.address) == source_of(address)]
     if len(same) >= MOST_SESSIONS_OF_ADDRESS:
         sessions = same
     elif len(sessions) < MOST_SESSIONS:
         return
-    left = [one for one in sessions if one.holder is None]
-    if not left:
+    yielding = [one for one in sessions if one.holder is None or one.identity.rank < top_rank]
+    if not yielding:
         raise ServiceError(StatusCodes.BadTooManySessions)
-    await min(left, key=lambda one: one.left_at).close_session(delete_subs=False)
+    lowest = min(one.identity.rank for one in yielding)
+    left = [one for one in yielding if one.holder is None and one.identity.rank == lowest]
+    if left:
+        await min(left, key=lambda one: one.left_at).close_session(delete_subs=False)
+    else:
+        await first_to_yield(yielding, _rank_of, share_of).evict()
 
 
 async def make_room(
@@ -45,9 +55,16 @@ async def make_room(
     sessions: Sequence[SubscriptionOwner],
     subscriptions: Mapping[int, Subscription],
 ) -> None:
-    """See that ``session`` can have one more subscription: sessions without a connection, which a client that
-    was started anew has left behind, end first. Raises ServiceError."""
-    left = sorted((one for one in sessions if one.holder is None), key=lambda one: one.left_at)
+    """See that ``session`` can have one more subscription. Raises ServiceError.
+
+    Sessions without a connection, which a client that was started anew has left behind, end first, then those
+    of lower roles; none of a higher one.
+    """
+    rank = session.identity.rank
+    left = sorted(
+        (one for one in sessions if one.holder is None and one.identity.rank <= rank),
+        key=lambda one: (one.identity.rank, one.left_at),
+    )
     same = [one for one in sessions if source_of(one.address) == source_of(session.address)]
     while True:
         owners = [one.session_id for one in subscriptions.values()]
@@ -57,11 +74,32 @@ async def make_room(
         if of_address < MOST_OF_ADDRESS and len(owners) < MOST_SUBSCRIPTIONS:
             return
         ending = [one for one in left if of_address < MOST_OF_ADDRESS or one in same]
-        if not ending:
+        if ending:
+            left.remove(ending[0])
+            await ending[0].close_session()
+            continue
+        among = [one.owner for one in subscriptions.values()]
+        lower = lower_than(session, [one for one in among if of_address < MOST_OF_ADDRESS or one in same])
+        if lower is None:
             break
-        left.remove(ending[0])
-        await ending[0].close_session()
+        await lower.evict()
     raise ServiceError(StatusCodes.BadTooManySubscriptions)
+
+
+def lower_than(session: SubscriptionOwner, holders: Sequence[SubscriptionOwner]) -> SubscriptionOwner | None:
+    """The one of ``holders``, each as often as it holds something, that makes room for ``session``; None
+    where nobody has a lower role."""
+    lower = [one for one in holders if one.identity.rank < session.identity.rank and not one.is_gone]
+    return first_to_yield(lower, _rank_of, share_of) if lower else None
+
+
+def share_of(session: SubscriptionOwner) -> str:
+    """Whom it is counted for: its user, or without a name its address."""
+    return source_of(session.address) if session.identity.is_anonymous else session.identity.name
+
+
+def _rank_of(session: SubscriptionOwner) -> int:
+    return session.identity.rank
 
 
 def room_for_items(address: str, subscriptions: Iterable[Subscription]) -> int:

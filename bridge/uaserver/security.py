@@ -8,8 +8,9 @@ from typing import Any, Final, NoReturn, Protocol
 
 from asyncua.common.connection import SecureConnection
 from cryptography import x509
-from cryptography.hazmat.primitives.asymmetric.padding import MGF1, OAEP
-from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
+from cryptography.hazmat.primitives.asymmetric.padding import MGF1, OAEP, PSS, PKCS1v15
+from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey, RSAPublicKey
 from cryptography.hazmat.primitives.hashes import SHA1, SHA256
 
 from bridge.uaserver.client_notices import tell
@@ -26,11 +27,20 @@ _MOST_BLOCKS: Final = 8
 """The longest password that is read, encrypted, with room for the nonce."""
 
 
-class Trust(Protocol):
-    """Client certificates that are trusted."""
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Refusal of a certificate: the status code for the client, and ``why`` for the log."""
 
-    def refusal(self, certificate: x509.Certificate) -> str | None:
-        """Reason why this certificate is not trusted, or None if it is."""
+    code: int
+    why: str
+
+
+class Trust(Protocol):
+    """Judge of the certificates that clients show."""
+
+    def refusal(self, sent: bytes, source: str, application_uri: str | None = None) -> Refusal | None:
+        """None for a client that is trusted. ``sent`` is its certificate in DER, and any issuers behind it,
+        ``source`` its address; ``application_uri`` is what it says to be, where it has said so yet."""
         ...
 
 
@@ -43,7 +53,7 @@ class CheckedPolicy:
     """
 
     _policy: Any
-    _trusted: Trust | None
+    _trusted: Trust
     _source: str = ""
 
     def of(self, source: str) -> CheckedPolicy:
@@ -56,23 +66,18 @@ class CheckedPolicy:
     def create(self, peer_certificate: bytes | None) -> Any:
         """Raises ServiceError for a certificate that is missing, unreadable or not trusted."""
         if self._policy.mode is not ua.MessageSecurityMode.None_:
-            self._check(peer_certificate)
+            self.check(peer_certificate)
         return self._policy.create(peer_certificate)
 
-    def _check(self, content: bytes | None) -> None:
-        try:
-            certificate = first_certificate(content)
-        except (ValueError, IndexError):
-            certificate = None
-        if certificate is None:
+    def check(self, sent: bytes | None, application_uri: str | None = None) -> None:
+        """Raises ServiceError as ``create`` does; ``sent`` and ``application_uri`` are those of
+        ``Trust.refusal``."""
+        if not sent:
             raise ServiceError(StatusCodes.BadCertificateInvalid)
-        why = self._trusted.refusal(certificate) if self._trusted else None
-        if why:
-            name = certificate.subject.rfc4514_string()
-            whose = f"SHA-256 {certificate.fingerprint(SHA256()).hex()}, {name[:_LONGEST_NAME]}"
-            tell("refused certificates", self._source, f"{whose}: {why}")
-            # Part 4 §6.1.3: the client is not told more than this.
-            raise ServiceError(StatusCodes.BadSecurityChecksFailed)
+        refusal = self._trusted.refusal(sent, self._source, application_uri)
+        if refusal:
+            tell("refused certificates", self._source, refusal.why)
+            raise ServiceError(refusal.code)
 
 
 _NO_SECURITY: Final = "http://opcfoundation.org/UA/SecurityPolicy#None"
@@ -85,6 +90,17 @@ class SecureChannel(SecureConnection):
     """
 
     source: str = ""
+    _shown: bytes | None = None
+    """Certificate of the client, in DER, and any issuers behind it."""
+
+    def judge_again(self, application_uri: str | None = None) -> None:
+        """Raises ServiceError for a client that is not trusted any more, or is not the application that it
+        says to be."""
+        mode = self.security_policy.Mode
+        if mode is ua.MessageSecurityMode.None_:
+            return
+        policy = next(one for one in self._policies if one.matches(self.security_policy.URI, mode))
+        policy.check(self._shown, application_uri)
 
     def select_policy(
         self, uri: str, peer_certificate: bytes | None, mode: ua.MessageSecurityMode | None = None
@@ -100,6 +116,7 @@ class SecureChannel(SecureConnection):
             words = f"mode {mode.name} with {uri.rpartition('#')[2]}"
             self._refuse(words, StatusCodes.BadSecurityModeRejected)
         super().select_policy(uri, peer_certificate, mode)
+        self._shown = peer_certificate
 
     def _offers(self, uri: str, mode: ua.MessageSecurityMode | None = None) -> bool:
         return any(policy.matches(uri, mode) for policy in self._policies)
@@ -143,6 +160,37 @@ def read_password(token: object, nonce: bytes, key: RSAPrivateKey, *, encrypted:
         return content.decode()
     except UnicodeDecodeError:
         raise ServiceError(StatusCodes.BadIdentityTokenInvalid) from None
+
+
+_SIGNATURES: Final = {
+    "http://www.w3.org/2001/04/xmldsig-more#rsa-sha256": PKCS1v15(),
+    "http://opcfoundation.org/UA/security/rsa-pss-sha2-256": PSS(MGF1(SHA256()), PSS.DIGEST_LENGTH),
+}
+"""Algorithms by which a user may sign, all with SHA-256 (Part 7 §6.6)."""
+
+
+def read_user_certificate(token: object, signature: object, signed: bytes) -> x509.Certificate:
+    """Certificate of an X509IdentityToken whose key its sender has (Part 4 §7.40.2.3).
+
+    ``signed`` is the server's certificate and its last nonce to this session: a signature heard once cannot
+    be sent again. Raises ServiceError.
+    """
+    content: bytes = get(token, "CertificateData") or b""
+    try:
+        certificate = first_certificate(content)
+        key = certificate.public_key() if certificate else None
+    except (ValueError, IndexError, TypeError, UnsupportedAlgorithm):
+        key = certificate = None
+    if certificate is None or not isinstance(key, RSAPublicKey):
+        raise ServiceError(StatusCodes.BadIdentityTokenInvalid)
+    scheme = _SIGNATURES.get(get(signature, "Algorithm") or "") if signature else None
+    if scheme is None:
+        raise ServiceError(StatusCodes.BadUserSignatureInvalid)
+    try:
+        key.verify(get(signature, "Signature") or b"", signed, scheme, SHA256())
+    except (InvalidSignature, ValueError):
+        raise ServiceError(StatusCodes.BadUserSignatureInvalid) from None
+    return certificate
 
 
 def _decrypt(content: bytes, key: RSAPrivateKey, digest: SHA1 | SHA256) -> bytes:

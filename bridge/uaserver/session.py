@@ -10,17 +10,22 @@ import asyncio
 import math
 import secrets
 from collections.abc import Sequence
-from typing import Any, Final, cast
+from dataclasses import dataclass
+from typing import Any, Final, Protocol, cast
 
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.address_space import AddressSpace
 from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession, SessionState
 from asyncua.server.subscription_service import SubscriptionService
+from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.base.guard import Guard
+from bridge.base.sources import source_of
 from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
 from bridge.uaserver.browsing import Browser
+from bridge.uaserver.client_notices import tell
 from bridge.uaserver.condition_calls import METHODS
 from bridge.uaserver.conditions import Conditions
 from bridge.uaserver.connection_limits import MOST_CONNECTIONS
@@ -39,6 +44,7 @@ from bridge.uaserver.library import (
     variant,
 )
 from bridge.uaserver.monitoring import loop_time
+from bridge.uaserver.own_addresses import OwnAddresses
 from bridge.uaserver.publishing import PublishQueue
 from bridge.uaserver.quotas import make_room
 from bridge.uaserver.reading import checked_times, window
@@ -62,6 +68,22 @@ _NOTHING: Final = variant(None, ua.VariantType.Null)
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
 
 
+class Connection(Protocol):
+    """Connection that a session is activated on."""
+
+    def end(self, code: int) -> None:
+        """Close it, and tell the client why."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class ShownCertificate:
+    """Certificate of the server, in DER, with its key."""
+
+    certificate: bytes
+    key: RSAPrivateKey
+
+
 class Session(InternalSession):
     """One client. ``channel_certificate`` is that of the channel the session was made on."""
 
@@ -78,10 +100,12 @@ class Session(InternalSession):
         self.label = f"session {secrets.token_hex(_NAME_BYTES)}"
         self.identity: UserIdentity = NOBODY
         self.channel_certificate: bytes | None = None
+        self.shown = server.shown
+        """Certificate of the server when the session came to its connection: a client encrypts for it."""
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
+        self.holder: Connection | None = None
         self.history = HistoryReader(aspace, server.subscriptions.items.event_types)
-        self.holder: object | None = None
         """The processor of the connection that it is activated on."""
         self.answer: Results | None = None
         """Answer that is being encoded for it."""
@@ -183,6 +207,8 @@ class Session(InternalSession):
         if attribute == AttributeIds.Value:
             return value if self._is_readable(where) else _NOT_READABLE
         held = value.Value
+        if attribute == AttributeIds.UserRolePermissions:
+            return _granted(value, self.application.roles(self.identity))
         if attribute not in _BY_USER or held is None or not held.Value:
             return value
         if self.application.may(self.identity, where):
@@ -224,6 +250,14 @@ class Session(InternalSession):
                 return
             await asyncio.sleep(left_s)
 
+    async def evict(self) -> None:
+        """End it, with its subscriptions and its connection, for somebody with a higher role."""
+        holder = self.holder
+        tell("sessions that made room for a higher role", source_of(self.address), self.identity.name)
+        await self.close_session()
+        if holder:
+            holder.end(StatusCodes.BadTcpServerTooBusy)
+
     async def close_session(self, delete_subs: bool = True) -> None:
         # asyncua closes it again when its connection ends, and would have the subscriptions deleted then.
         if self.state is SessionState.Closed:
@@ -232,6 +266,14 @@ class Session(InternalSession):
         self.publishing.close(loop_time())
         self.subscriptions.end(self, delete=delete_subs)
         await super().close_session(delete_subs=False)
+
+
+def _granted(value: ua.DataValue, roles: Sequence[ua.NodeId]) -> ua.DataValue:
+    """The entries of RolePermissions that are for ``roles``."""
+    if value.Value is None or not value.Value.Value:
+        return value
+    entries = [one for one in value.Value.Value if get(one, "RoleId") in roles]
+    return data_value(variant(entries, ua.VariantType.ExtensionObject), value.StatusCode)
 
 
 class InnerServer(InternalServer):
@@ -250,6 +292,7 @@ class InnerServer(InternalServer):
         super().__init__()
         self.guard = Guard("OPC UA")
         self.no_security = no_security
+        self.addresses = OwnAddresses()
         # asyncua's own lets `admin` in with any password, as Admin. Logins are checked in the processor.
         self.user_manager = None  # pyright: ignore[reportAttributeAccessIssue]
         self.allow_remote_admin = False
@@ -264,6 +307,11 @@ class InnerServer(InternalServer):
     def create_session(self, name: str, user: User | None = None, external: bool = False) -> InternalSession:
         return Session(self, self.aspace, self.subscription_service, name)
 
+    def _mangle_endpoint_url(
+        self, ep_url: str, params_ep_url: str | None = None, sockname: tuple[str, int] | None = None
+    ) -> str:
+        return self.addresses.answer(ep_url, params_ep_url, str(sockname[0]) if sockname else "")
+
     async def get_endpoints(
         self, params: ua.GetEndpointsParameters | None = None, sockname: tuple[str, int] | None = None
     ) -> list[ua.EndpointDescription]:
@@ -271,6 +319,12 @@ class InnerServer(InternalServer):
         endpoints = await super().get_endpoints(params, sockname)
         profiles: list[str] = (get(params, "ProfileUris") if params else None) or []
         return [one for one in endpoints if not profiles or get(one, "TransportProfileUri") in profiles]
+
+    @property
+    def shown(self) -> ShownCertificate:
+        """Certificate that the server shows at present, and its key."""
+        certificate = self.certificate.public_bytes(Encoding.DER) if self.certificate else b""
+        return ShownCertificate(certificate, self.private_key)
 
     @property
     def sessions(self) -> list[Session]:

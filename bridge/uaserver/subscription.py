@@ -70,8 +70,10 @@ class SubscriptionOwner(Protocol):
     identity: UserIdentity
     channel_certificate: bytes | None
     publishing: PublishQueue
-    holder: object | None
     left_at: float
+
+    @property
+    def holder(self) -> object | None: ...
 
     @property
     def is_gone(self) -> bool:
@@ -87,6 +89,10 @@ class SubscriptionOwner(Protocol):
         ...
 
     async def close_session(self, delete_subs: bool = True) -> None: ...
+
+    async def evict(self) -> None:
+        """End it, with its subscriptions and its connection, for somebody with a higher role."""
+        ...
 
 
 class Subscription:

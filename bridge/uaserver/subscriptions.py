@@ -18,7 +18,7 @@ from bridge.base.sources import source_of
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.uaserver.monitoring import MonitoredItems, code_of, loop_time
 from bridge.uaserver.publishing import PublishRequest
-from bridge.uaserver.quotas import MOST_ITEMS, MOST_SUBSCRIPTIONS, room_for_items
+from bridge.uaserver.quotas import MOST_ITEMS, MOST_SUBSCRIPTIONS, lower_than, room_for_items
 from bridge.uaserver.subscription import Subscription, SubscriptionOwner, terms
 
 _T = TypeVar("_T")
@@ -160,16 +160,24 @@ class Subscriptions:
         def room() -> int:
             return room_for_items(owner.address, self.subscriptions.values())
 
-        def make_room() -> bool:
-            """Delete a subscription without a session before anything is refused: one of this address, or
-            where all together have too much, of any."""
-            left = list(self._left_behind())
+        async def make_room() -> bool:
+            """Delete a subscription without a session before anything is refused, else end a session of a
+            lower role: one of this address, or where all together have too much, of any."""
+            rank = owner.identity.rank
+            left = [found for found in self._left_behind() if found.owner.identity.rank <= rank]
             ending = [found for found in left if source_of(found.owner.address) == source]
             if not ending and self._is_full:
                 ending = left
             for oldest in ending[:1]:
                 self._close(oldest)
-            return bool(ending)
+            if ending:
+                return True
+            holders = [found.owner for found in self.subscriptions.values() for _ in found.items]
+            same = [one for one in holders if source_of(one.address) == source]
+            lower = lower_than(owner, same) or (lower_than(owner, holders) if self._is_full else None)
+            if lower:
+                await lower.evict()
+            return lower is not None
 
         source = source_of(owner.address)
         number: int = get(params, "SubscriptionId")

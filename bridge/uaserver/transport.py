@@ -88,7 +88,7 @@ class Processor(UaProcessor):
     def __init__(self, server: InnerServer, transport: asyncio.Transport, limits: TransportLimits) -> None:
         super().__init__(server, transport, limits)
         self._server = server
-        self._connection = SecureChannel(self._connection.security_policy, self._limits)
+        self._connection: SecureChannel = SecureChannel(self._connection.security_policy, self._limits)
         self._waiting: set[asyncio.Task[Any]] = set()
         self._source = source_of(str(self.name[0]) if isinstance(self.name, tuple) else str(self.name))
         self._connection.source = self._source
@@ -169,9 +169,18 @@ class Processor(UaProcessor):
             self._count(is_broken=True)
             self._server.guard.note(error)
             code = StatusCodes.BadTcpInternalError
+        self._say(code)
+        return False
+
+    def end(self, code: int) -> None:
+        """Close the connection, and tell the client why."""
+        self._count(is_broken=True)
+        self._say(code)
+        self._transport.close()
+
+    def _say(self, code: int) -> None:
         message = make(ua.ErrorMessage, Error=status(code))
         self._transport.write(uatcp_to_binary(_ERROR, message))
-        return False
 
     def _count(self, *, is_broken: bool) -> None:
         """A connection that ends, once: what came before it was closed is still looked at."""
@@ -257,6 +266,7 @@ class Processor(UaProcessor):
             params = struct_from_binary(ua.CreateSessionParameters, body.copy())
             certificate = self._channel_certificate()
             self._check_client_certificate(params, certificate)
+            self._connection.judge_again(get(get(params, "ClientDescription"), "ApplicationUri") or "")
             await self._make_room()
             answer = await super()._process_message(typeid, requesthdr, seqhdr, body)
             if isinstance(self.session, Session):
@@ -268,7 +278,7 @@ class Processor(UaProcessor):
             params = struct_from_binary(ua.ActivateSessionParameters, body.copy())
             # Nothing awaits between here and activate_session, so this login is for this call.
             try:
-                session.admitted = await self._login(session, get(params, "UserIdentityToken"))
+                session.admitted = await self._login(session, params)
             except ServiceError:
                 self._server.application.on_refused()
                 raise
@@ -283,15 +293,25 @@ class Processor(UaProcessor):
             self._hold(self.session)
         return answer
 
+    def open_secure_channel(self, algohdr: Any, seqhdr: Any, body: Any) -> None:
+        """Raises ServiceError, also for a renewal by a client that has lost its trust meanwhile."""
+        if self._connection.is_open():
+            self._connection.judge_again()
+        super().open_secure_channel(algohdr, seqhdr, body)
+
     async def _make_room(self) -> None:
         try:
-            await make_room_for_session(self._source, self._server.sessions)
+            await make_room_for_session(
+                self._source, self._server.sessions, self._server.application.highest_rank
+            )
         except ServiceError:
             self._server.application.on_refused()
             tell("refused sessions", self._source, "all that it may have, or all there are, are in use")
             raise
 
     def _hold(self, session: Session) -> None:
+        if session.holder is not self:
+            session.shown = self._server.shown
         session.holder, session.most_bytes = self, self._limits.max_message_size
 
     async def _session_watchdog_loop(self) -> None:
@@ -385,11 +405,20 @@ class Processor(UaProcessor):
             raise ServiceError(StatusCodes.BadSecurityChecksFailed)
         return session
 
-    async def _login(self, session: Session, token: Any) -> UserIdentity:
+    async def _login(self, session: Session, params: Any) -> UserIdentity:
         """Raises ServiceError, also for another user than that of a session which comes from another channel
         (Part 4 §5.6.3): whoever has its token and its certificate is not yet its user."""
-        key, nonce = self._server.private_key, session.nonce or b""
-        login = LoginAttempt(token, nonce, key, session.address, session.label, encrypted=self._is_secured())
+        own = session.shown if session.holder is self else self._server.shown
+        login = LoginAttempt(
+            get(params, "UserIdentityToken"),
+            get(params, "UserTokenSignature"),
+            session.nonce or b"",
+            own.key,
+            self._connection.security_policy.host_certificate or own.certificate,
+            session.address,
+            session.label,
+            encrypted=self._is_secured(),
+        )
         who: UserIdentity = await self._server.application.identify(login)
         if session.holder is not self and session.is_activated() and not who.is_same(session.identity):
             tell(

@@ -21,6 +21,10 @@ class User:
     has_rights: bool = True
     is_anonymous: bool = False
 
+    @property
+    def rank(self) -> int:
+        return int(self.has_rights)
+
     def is_same(self, other: object) -> bool:
         return self == other
 
@@ -49,8 +53,15 @@ class Served(ServedApplication[User]):
             raise ServiceError(ua.StatusCodes.BadUserAccessDenied)
         return self.users[name]
 
+    @property
+    def highest_rank(self) -> int:
+        return max((user.rank for user in self.users.values()), default=0)
+
     def may(self, user: User, where: ua.NodeId) -> bool:
         return user.has_rights
+
+    def roles(self, user: User) -> Sequence[ua.NodeId]:
+        return [ua.NodeId(ua.ObjectIds.WellKnownRole_Operator)] if user.has_rights else []
 
     async def write(self, user: User, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
         self.written += [(user.name, one.Value.Value.Value) for one in writes]

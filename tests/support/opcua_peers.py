@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from hashlib import sha1
+from pathlib import Path
 
 from asyncua import Client, ua
 from asyncua.crypto import security_policies
@@ -26,6 +28,7 @@ from tests.support.opcua_site import LocalView
 PASSWORD = "swordfish"
 POLICIES = [
     security_policies.SecurityPolicyBasic256Sha256,
+    security_policies.SecurityPolicyAes128Sha256RsaOaep,
     security_policies.SecurityPolicyAes256Sha256RsaPss,
 ]
 Served = tuple[OpcUaServer, LocalView]
@@ -37,9 +40,18 @@ class Peer:
 
     certificate: bytes
     key: bytes
+    uri: str = ""
+
+    def trusted_in(self, state_dir: Path) -> Path:
+        """Put its certificate where the service looks for those that it trusts; the file."""
+        file = state_dir / "certificates" / "trusted" / f"{sha1(self.certificate).hexdigest()}.der"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(self.certificate)
+        return file
 
     async def secure(self, client: Client, policy: type = POLICIES[0], **more: object) -> None:
         certificate, key = CertProperties(self.certificate, "der"), CertProperties(self.key, "pem")
+        client.application_uri = self.uri
         await client.set_security(policy, certificate, key, **more)
 
 
@@ -47,7 +59,7 @@ def make_peer(name: str) -> Peer:
     key = generate_private_key()
     names: list[x509.GeneralName] = [x509.UniformResourceIdentifier(f"urn:{name}"), x509.DNSName(name)]
     made = generate_self_signed_app_certificate(key, name, {}, names, [ExtendedKeyUsageOID.CLIENT_AUTH])
-    return Peer(made.public_bytes(Encoding.DER), dump_private_key_as_pem(key))
+    return Peer(made.public_bytes(Encoding.DER), dump_private_key_as_pem(key), f"urn:{name}")
 
 
 def make_users() -> list[UserTable]:

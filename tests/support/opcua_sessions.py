@@ -18,6 +18,10 @@ class User:
     has_rights: bool = True
 
     @property
+    def rank(self) -> int:
+        return int(self.has_rights)
+
+    @property
     def is_anonymous(self) -> bool:
         return self.name == "anonymous"
 

@@ -18,6 +18,13 @@ class Role(IntEnum):
     OBSERVER = 0
     OPERATOR = 1
     ENGINEER = 2
+    ADMIN = 3
+    """Also the certificates of the OPC UA server, and who is trusted."""
+
+    @classmethod
+    def named(cls, name: str) -> Role | None:
+        """Role that the site file calls so; None for "none"."""
+        return cls.__members__.get(name.upper())
 
 
 @dataclass(frozen=True, slots=True)

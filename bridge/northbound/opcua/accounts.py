@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
-
-from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 
 from bridge.base.sources import source_of
 from bridge.command.messages.request import Identity, Role, Source
 from bridge.config import OpcUaTable
 from bridge.northbound.logins import PasswordChecks
+from bridge.northbound.opcua.client_trust import utc_now
+from bridge.northbound.opcua.user_certificates import judge_user, user_certificates
 from bridge.northbound.passwords import ANONYMOUS, check_users
+from bridge.trust import TrustLists
+from bridge.trust.chain import named
+from bridge.trust.files import der
+from bridge.uaserver.application import LoginAttempt
 from bridge.uaserver.client_notices import tell
 from bridge.uaserver.library import ObjectIds, ServiceError, StatusCodes, get, node_id, ua
-from bridge.uaserver.security import read_password
+from bridge.uaserver.security import read_password, read_user_certificate
 
 _LONGEST_NAME: Final = 64
 _LONGEST_PASSWORD: Final = 1024
@@ -25,6 +30,7 @@ def security_policies(settings: OpcUaTable) -> list[ua.SecurityPolicyType]:
     would cross the network for everyone to read."""
     policies = [
         ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt,
+        ua.SecurityPolicyType.Aes128Sha256RsaOaep_SignAndEncrypt,
         ua.SecurityPolicyType.Aes256Sha256RsaPss_SignAndEncrypt,
     ]
     if settings.no_security:
@@ -32,38 +38,47 @@ def security_policies(settings: OpcUaTable) -> list[ua.SecurityPolicyType]:
     return policies
 
 
-_ROLES: Final = {"observer": Role.OBSERVER, "operator": Role.OPERATOR, "engineer": Role.ENGINEER}
-
-
 class Accounts:
-    """The users of the site file. Nobody is an administrator: the address space is the site's."""
+    """The users of the site file, with passwords or certificates; ``lists`` gives who is trusted at present,
+    for the issuers of these."""
 
-    def __init__(self, settings: OpcUaTable) -> None:
+    def __init__(self, settings: OpcUaTable, lists: Callable[[], TrustLists] = TrustLists) -> None:
         check_users(settings.user)
         self._accounts = {user.name: user for user in settings.user}
-        self._anonymous = _ROLES.get(settings.anonymous)
+        self._of_certificates = user_certificates(settings)
+        self._lists = lists
+        self._anonymous = Role.named(settings.anonymous)
         self._checks = PasswordChecks()
 
     def close(self) -> None:
         self._checks.close()
 
     @property
+    def highest_role(self) -> Role:
+        """Highest role that anybody has."""
+        roles = [Role[user.role.upper()] for user in self._accounts.values()]
+        return max([*roles, self._anonymous or Role.OBSERVER])
+
+    @property
     def tokens(self) -> list[type]:
         """Identity tokens to offer. With neither users nor anonymous access, the list is empty and nobody
         gets in."""
-        tokens: list[type] = [ua.UserNameIdentityToken] if self._accounts else []
+        has_passwords = any(user.password_hash for user in self._accounts.values())
+        tokens: list[type] = [ua.UserNameIdentityToken] if has_passwords else []
+        if self._of_certificates:
+            tokens.append(ua.X509IdentityToken)
         if self._anonymous is not None:
             tokens.append(ua.AnonymousIdentityToken)
         return tokens or [ua.UserNameIdentityToken]
 
-    async def identify(
-        self, token: object, nonce: bytes, key: RSAPrivateKey, address: str, *, encrypted: bool
-    ) -> Identity:
-        """Identity that an identity token stands for; ``nonce``, ``key`` and ``encrypted`` as for
-        ``read_password``. Raises ServiceError."""
+    async def identify(self, login: LoginAttempt) -> Identity:
+        """Identity that an identity token stands for. Raises ServiceError."""
+        token, address = login.token, login.address
         if isinstance(token, ua.UserNameIdentityToken):
-            password = read_password(token, nonce, key, encrypted=encrypted)
+            password = read_password(token, login.nonce, login.key, encrypted=login.encrypted)
             return await self.login(get(token, "UserName") or "", password, address)
+        if isinstance(token, ua.X509IdentityToken):
+            return self._by_certificate(login)
         is_null = isinstance(token, ua.ExtensionObject) and token.TypeId == node_id(ObjectIds.Null)
         if is_null or isinstance(token, ua.AnonymousIdentityToken):
             return self.anonymous(address)
@@ -76,6 +91,23 @@ class Accounts:
             raise ServiceError(StatusCodes.BadIdentityTokenRejected)
         return Identity(Source.OPCUA, ANONYMOUS, self._anonymous, address)
 
+    def _by_certificate(self, login: LoginAttempt) -> Identity:
+        source = source_of(login.address)
+        signed = login.certificate + login.nonce
+        try:
+            certificate = read_user_certificate(login.token, login.signature, signed)
+        except ServiceError:
+            tell("refused logins", source, "a user's certificate without its signature")
+            raise
+        account = self._of_certificates.get(der(certificate))
+        verdict = judge_user(certificate, self._lists(), utc_now()) if account else None
+        if account is None or verdict is None or verdict.fault:
+            tell(
+                "refused logins", source, f"{named(certificate)}: {verdict or 'no user has this certificate'}"
+            )
+            raise ServiceError(StatusCodes.BadIdentityTokenRejected)
+        return Identity(Source.OPCUA, account.name, Role[account.role.upper()], login.address)
+
     async def login(self, name: str, password: str, address: str) -> Identity:
         """Identity of the named user. Raises ServiceError where name and password do not belong together."""
         account = self._accounts.get(name)
@@ -86,4 +118,4 @@ class Accounts:
         if account is None or not is_right:
             tell("refused logins", source_of(address), f"user {name[:_LONGEST_NAME]!r}")
             raise ServiceError(StatusCodes.BadUserAccessDenied)
-        return Identity(Source.OPCUA, name, _ROLES[account.role], address)
+        return Identity(Source.OPCUA, name, Role[account.role.upper()], address)

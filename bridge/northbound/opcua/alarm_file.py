@@ -10,7 +10,7 @@ from typing import Final
 
 import msgspec
 
-from bridge.northbound.opcua.certificates import write_private
+from bridge.trust.files import write_whole
 from bridge.uaserver.condition_calls import LONGEST_COMMENT
 from bridge.uaserver.condition_state import (
     MAX_TIME_SHELVED_MS,
@@ -148,4 +148,4 @@ class AlarmFile:
         """Write it whole or not at all, in whatever thread. Raises OSError."""
         with self._writing:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            write_private(self.path, _encode(_Kept(_VERSION, dict(alarms))))
+            write_whole(self.path, _encode(_Kept(_VERSION, dict(alarms))))

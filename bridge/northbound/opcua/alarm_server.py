@@ -117,7 +117,7 @@ def _alarms(
         kind, key = types[place.kind], (place.kind, place.name)
         if key not in common:
             class_id, name = _CLASSES["drive" if place.kind == "drive" else "other"]
-            more: Fields = _of_certificate(certificate) if place.kind == CERTIFICATE else {}
+            more: Fields = of_certificate(certificate) if place.kind == CERTIFICATE else {}
             common[key] = common_fields(kind, place.name, class_id, in_all_languages(name), more)
         described = ConditionPlace(
             node_id(place.id, tree.namespace),
@@ -129,7 +129,7 @@ def _alarms(
         yield Alarm(place, Condition(described, content=contents.nothing), kind)
 
 
-def _of_certificate(certificate: x509.Certificate) -> Fields:
+def of_certificate(certificate: x509.Certificate) -> Fields:
     """Fields of CertificateExpirationAlarmType (§5.8.14.8)."""
     return {
         "NormalState": variant(ua.NodeId(), Kind.NodeId),

@@ -10,6 +10,7 @@ import asyncio
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime
 from typing import Any, Final
 
@@ -24,6 +25,7 @@ from bridge.northbound.opcua.alarm_nodes import Alarm
 from bridge.northbound.opcua.alarm_places import BRIDGE, CERTIFICATE, FRONT
 from bridge.northbound.trouble_reader import TroubleReader
 from bridge.uaserver.conditions import Conditions
+from bridge.uaserver.where import Fields
 
 _SETTLE_S: Final = 10.0
 """Least time after a start, of this front or the bus process, for which an alarm that was active before stays
@@ -146,6 +148,12 @@ class Alarms:
             self._follow(self._reader.shown)
         self._conditions.look()
 
+    def renewed(self, expires: datetime, fields: Fields) -> None:
+        """The server has another certificate; ``fields`` are those of its alarm."""
+        self._expires, self._check_at = expires, self._clock()
+        condition = self._certificate.condition
+        condition.place = replace(condition.place, common={**condition.place.common, **fields})
+
     def _check_certificate(self) -> None:
         condition = self._certificate.condition
         content = self._contents.expiry(self._expires)
@@ -229,6 +237,10 @@ class AlarmTask:
         self._save_at: float | None = None
         self._fault = ""
         conditions.on_change = self._on_change
+
+    def renewed(self, expires: datetime, fields: Fields) -> None:
+        """The server has another certificate: as ``Alarms.renewed``."""
+        self._alarms.renewed(expires, fields)
 
     async def run(self) -> None:
         loop = asyncio.get_running_loop()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from bridge.base import clock
@@ -13,7 +13,9 @@ from bridge.northbound.opcua.accounts import Accounts
 from bridge.northbound.opcua.alarm_rights import LEAST_ROLE
 from bridge.northbound.opcua.file_transfer import READING, FileTransfer, file_method
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.permissions import ROLE_NODES
 from bridge.northbound.opcua.plant_history import PlantHistory
+from bridge.northbound.opcua.server_configuration import ServerConfiguration
 from bridge.northbound.opcua.session_user import SessionUser
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
@@ -21,7 +23,7 @@ from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
 from bridge.uaserver.condition_calls import METHODS
 from bridge.uaserver.history import EventHistory, ValueHistory
-from bridge.uaserver.library import get, ua
+from bridge.uaserver.library import get, node_id, ua
 
 
 class ConnectionArrivals:
@@ -36,40 +38,50 @@ class ConnectionArrivals:
 
 
 class Backend(ServedApplication[SessionUser]):
-    """Users, writes and calls of the server's sessions, and what they read of the past. ``pulse`` is that of
-    the event loop."""
+    """Users, writes and calls of the server's sessions, and what they read of the past. ``least_role`` is
+    that of the tree, ``pulse`` that of the event loop."""
 
     def __init__(
         self,
         users: Accounts,
+        least_role: Callable[[ua.NodeId], Role | None],
         writer: Writer,
         caller: Caller,
+        configuration: ServerConfiguration,
         view: View,
         pulse: Pulse,
         past: PlantHistory,
     ) -> None:
         self._users = users
+        self._least_role = least_role
         self._writer = writer
         self._caller = caller
+        self._configuration = configuration
         self._view = view
         self._pulse = pulse
         self._past = past
         self._transfer = FileTransfer(past.files)
 
     async def identify(self, login: LoginAttempt) -> SessionUser:
-        how = login.token, login.nonce, login.key, login.address
-        identity = await self._users.identify(*how, encrypted=login.encrypted)
-        return SessionUser(replace(identity, connection=login.session))
+        identity = await self._users.identify(login)
+        return SessionUser(replace(identity, connection=login.session), login.encrypted)
+
+    @property
+    def highest_rank(self) -> int:
+        return int(self._users.highest_role)
 
     def may(self, user: SessionUser, where: ua.NodeId) -> bool:
         if where in READING:
             return True
-        least = self._caller.least_role(where)
-        if least is None:
-            least = self._writer.least_role(where)
+        if self._configuration.has(where):
+            return user.encrypted and user.identity.role >= Role.ADMIN
+        least = self._least_role(where)
         if least is None and where in METHODS:
             least = LEAST_ROLE.get(METHODS[where].name, Role.OBSERVER)
         return user.identity.role >= (Role.OPERATOR if least is None else least)
+
+    def roles(self, user: SessionUser) -> Sequence[ua.NodeId]:
+        return [node_id(where) for where in ROLE_NODES[user.identity.role]]
 
     async def write(self, user: SessionUser, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
         return await self._writer.write(user.identity, writes)
@@ -80,6 +92,8 @@ class Backend(ServedApplication[SessionUser]):
         return list(await asyncio.gather(*(self._call(user, call) for call in calls)))
 
     async def _call(self, user: SessionUser, call: ua.CallMethodRequest) -> ua.CallMethodResult:
+        if self._configuration.has(get(call, "MethodId")):
+            return await self._configuration.call(user.identity, call, encrypted=user.encrypted)
         method, file = file_method(call), self._past.file(get(call, "ObjectId"))
         if method and file:
             given: list[ua.Variant] = get(call, "InputArguments") or []

@@ -1,19 +1,15 @@
-"""The server's own certificate, and the client certificates it trusts."""
+"""The server's own certificate and its key, in files."""
 
 from __future__ import annotations
 
-import contextlib
 import logging
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
 from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
-from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.serialization import (
     Encoding,
     load_der_private_key,
@@ -23,6 +19,7 @@ from cryptography.hazmat.primitives.serialization import (
 from bridge.base.errors import Fault, FileFaults
 from bridge.northbound.opcua.selfsigned import KEY_BITS, new_key, self_signed
 from bridge.text import Text
+from bridge.trust.files import fingerprint, write_whole
 
 _log = logging.getLogger(__name__)
 
@@ -69,13 +66,13 @@ def new_own(certificate: Path, key: Path, application_uri: str, names: Sequence[
     Raises OSError, and ``FileFaults`` for a key that is none.
     """
     if not key.exists():
-        write_private(key, new_key()[1])
+        write_whole(key, new_key()[1])
     try:
         private_key = _read_key(key)
     except (ValueError, TypeError) as error:
         raise FileFaults([_fault(key, error, Text.of("certificate.new_key_advice"))]) from error
     made = self_signed(private_key, application_uri, names)
-    write_private(certificate, made.public_bytes(Encoding.DER))
+    write_whole(certificate, made.public_bytes(Encoding.DER))
     _log.info("made an OPC UA certificate: %s, SHA-256 %s", certificate, fingerprint(made))
     return OwnCertificate(made, private_key)
 
@@ -87,19 +84,6 @@ def uris_of(certificate: x509.Certificate) -> list[str]:
     except x509.ExtensionNotFound:
         return []
     return names.value.get_values_for_type(x509.UniformResourceIdentifier)
-
-
-def write_private(path: Path, content: bytes) -> None:
-    """Write the file whole or not at all; others can never read it, not even for a moment."""
-    new = path.with_name(f"{path.name}.new")
-    with contextlib.suppress(FileNotFoundError):
-        new.unlink()
-    handle = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    with os.fdopen(handle, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    new.replace(path)
 
 
 def read_certificate(path: Path) -> x509.Certificate:
@@ -118,10 +102,6 @@ def _read_key(path: Path) -> RSAPrivateKey:
     return key
 
 
-def fingerprint(certificate: x509.Certificate) -> str:
-    return certificate.fingerprint(SHA256()).hex()
-
-
 def reason(error: Exception) -> str:
     """The error as the end of a sentence, for the log."""
     if isinstance(error, OSError) and error.strerror:
@@ -135,46 +115,3 @@ def _fault(path: Path, error: Exception, advice: Text) -> Fault:
     else:
         said = Text.of("certificate.unusable", why=reason(error))
     return Fault(str(path), 0, "", said, advice)
-
-
-class TrustedCertificates:
-    """The client certificates in a folder; exactly these are trusted, nothing that they signed.
-
-    The folder is read again when an unknown certificate comes and the folder has changed, so trusting
-    a client takes a copied file and no restart.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._changed = 0
-        self._known: frozenset[bytes] = frozenset()
-        self._read()
-
-    def _read(self) -> None:
-        try:
-            self._changed = self._folder.stat().st_mtime_ns
-            files = sorted(path for path in self._folder.iterdir() if path.is_file())
-        except OSError as error:
-            said, advice = Text.plain(reason(error)), Text.of("certificate.trusted_dir_advice")
-            raise FileFaults([Fault(str(self._folder), 0, "", said, advice)]) from error
-        known: set[bytes] = set()
-        for path in files:
-            try:
-                known.add(read_certificate(path).public_bytes(Encoding.DER))
-            except (OSError, ValueError) as error:
-                _log.warning("%s is not a certificate and is left out: %s", path, reason(error))
-        self._known = frozenset(known)
-
-    def refusal(self, certificate: x509.Certificate) -> str | None:
-        """Reason why this certificate is not trusted, None if it is."""
-        content = certificate.public_bytes(Encoding.DER)
-        if content not in self._known:
-            with contextlib.suppress(OSError, FileFaults):
-                if self._folder.stat().st_mtime_ns != self._changed:
-                    self._read()
-        if content not in self._known:
-            return f"it is not in {self._folder}"
-        now = datetime.now(UTC)
-        if not certificate.not_valid_before_utc <= now < certificate.not_valid_after_utc:
-            return "it is not valid today"
-        return None

@@ -19,6 +19,7 @@ from bridge.northbound.opcua.nodes import (
     VariableKind,
     VariableNode,
 )
+from bridge.northbound.opcua.permissions import least_role, permission, role_permissions
 from bridge.northbound.opcua.structures import (
     PropertyNode,
     point_attributes,
@@ -44,6 +45,8 @@ Node = ObjectNode | MethodNode | VariableNode | PropertyNode | FileNode | LivePr
 SUBSCRIBE_TO_EVENTS: Final = 1
 READ_EVENT_HISTORY: Final = 4
 _ANY: Final = node_id("any", 1)
+_NO_RESTRICTION: Final = constant(0, ua.VariantType.UInt16)
+"""A channel without security will do, where there is one at all (Part 3 §5.2.11)."""
 _TYPE_DEFINITION: Final = {
     VariableKind.PLAIN: ObjectIds.BaseDataVariableType,
     VariableKind.ANALOG: ObjectIds.AnalogUnitType,
@@ -116,6 +119,7 @@ class Kinds:
                 node_class, type_id = ua.NodeClass.Object, ObjectIds.FileType
                 wanted = make(ua.ObjectAttributes, EventNotifier=0)
         attributes = node_attributes(node_class, wanted)
+        attributes |= _permissions(node)
         if isinstance(node, PropertyNode):
             held = attributes[AttributeIds.Value].value
             change(held, SourceTimestamp=self._built_at, ServerTimestamp=self._built_at)
@@ -128,6 +132,18 @@ class Kinds:
             how = reference_to(self._space, node_id(ObjectIds.HAConfiguration), kind, forward=True)
             to_type = (*to_type, how)
         return NodeKind(attributes, node_class, node_id(type_id), to_type)
+
+
+def _permissions(node: Node) -> dict[AttributeIds, AttributeValue]:
+    """Attributes of what each role may; a session shows a user its own."""
+    sends_events = isinstance(node, ObjectNode) and node.notifier
+    is_kept = isinstance(node, VariableNode) and node.kept
+    table = role_permissions(least_role(node), permission(node), sends_events=sends_events, is_kept=is_kept)
+    return {
+        AttributeIds.RolePermissions: table,
+        AttributeIds.UserRolePermissions: table,
+        AttributeIds.AccessRestrictions: _NO_RESTRICTION,
+    }
 
 
 def _name(name: str, namespace: int, is_ours: bool = False) -> Name:
@@ -150,9 +166,9 @@ def _key(node: Node) -> Hashable:
         case ObjectNode():
             return node.folder, node.notifier
         case MethodNode():
-            return MethodNode
+            return MethodNode, least_role(node)
         case VariableNode():
-            return node.kind, value_type(node), node.writable, node.kept
+            return node.kind, value_type(node), node.writable, node.kept, least_role(node)
         case PropertyNode():
             return node.content
         case LiveProperty():

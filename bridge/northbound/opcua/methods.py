@@ -9,13 +9,11 @@ from typing import Final
 from asyncua.server.address_space import AddressSpace
 
 from bridge.command.messages.request import (
-    LEAST_ROLE,
     PARAMETER_ACTIONS,
     Action,
     Code,
     Identity,
     Request,
-    Role,
     command_of,
 )
 from bridge.image import Value
@@ -55,11 +53,6 @@ class Caller:
         self._view = view
         self._space = space
         self._method = method
-
-    def least_role(self, method_id: ua.NodeId) -> Role | None:
-        """The role that calling this method needs; None where there is no such method."""
-        method = self._method(method_id)
-        return None if method is None else LEAST_ROLE[method.action]
 
     async def call(
         self, identity: Identity, calls: Sequence[ua.CallMethodRequest]

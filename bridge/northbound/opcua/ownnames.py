@@ -12,8 +12,11 @@ import socket
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
+from urllib.parse import urlsplit
 
 from cryptography import x509
+
+from bridge.config import OpcUaTable
 
 _IPV4: Final = Path("/proc/net/fib_trie")
 _IPV6: Final = Path("/proc/net/if_inet6")
@@ -27,6 +30,12 @@ def names_of(listen: str, configured: Sequence[str]) -> list[str]:
     on. ``listen`` is an address and a port; 0.0.0.0 and :: are all addresses of the machine."""
     own = (socket.gethostname(), *addresses_of(listen), *_LOOPBACK)
     return list(dict.fromkeys((*configured, *(name for name in own if name and name.isascii()))))
+
+
+def reached_by(settings: OpcUaTable) -> list[str]:
+    """Names and addresses of the site file by which clients reach the server, beside the machine's own."""
+    hosts = (urlsplit(url).hostname or "" for url in settings.endpoints)
+    return list(dict.fromkeys((*settings.names, *hosts)))
 
 
 def addresses_of(listen: str) -> list[str]:

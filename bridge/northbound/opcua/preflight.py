@@ -10,20 +10,22 @@ from pathlib import Path
 from bridge.base.errors import FileFaults
 from bridge.config import OpcUaTable
 from bridge.northbound.certificatefiles import check_validity, placed
-from bridge.northbound.opcua.certificates import TrustedCertificates
+from bridge.northbound.opcua.client_trust import client_store
+from bridge.northbound.opcua.own_files import own_folder
 from bridge.northbound.opcua.server_identity import server_identity
+from bridge.northbound.opcua.user_certificates import user_certificates
 from bridge.northbound.passwords import check_users
 from bridge.text import Text
 
 
 def check_opcua(settings: OpcUaTable, state_dir: Path, site: Path) -> None:
-    """Check the files. Raises ``FileFaults`` for users, certificate, key or ``trusted_dir`` that cannot be
-    used, and ``Unavailable`` where a certificate has to be made and ``state_dir`` does not take it."""
+    """Check the files. Raises ``FileFaults`` for users, certificates, key or ``trusted_dir`` that cannot be
+    used, and ``Unavailable`` where ``state_dir`` does not take what has to be made."""
     try:
         check_users(settings.user)
-        own = server_identity(settings, state_dir / "opcua")
-        if settings.trusted_dir:
-            TrustedCertificates(Path(settings.trusted_dir))
+        own = server_identity(settings, own_folder(state_dir))
+        client_store(settings, state_dir).prepare()
+        user_certificates(settings)
         if settings.certificate:
             advice = Text.of("certificate.renew_opcua_advice")
             check_validity(settings.certificate, own.certificate, advice)
@@ -32,5 +34,6 @@ def check_opcua(settings: OpcUaTable, state_dir: Path, site: Path) -> None:
             settings.certificate: "opcua.certificate",
             settings.private_key: "opcua.private_key",
             settings.trusted_dir: "opcua.trusted_dir",
+            **{user.certificate: f"opcua.user[{n}].certificate" for n, user in enumerate(settings.user)},
         }
         raise FileFaults([placed(fault, keys, site) for fault in error.faults]) from None

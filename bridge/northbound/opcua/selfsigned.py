@@ -24,9 +24,13 @@ _LONGEST_NAME: Final = 64
 """Most characters of a common name (RFC 5280, ub-common-name)."""
 
 
+def generate_key() -> RSAPrivateKey:
+    return generate_private_key(65537, KEY_BITS)
+
+
 def new_key() -> tuple[RSAPrivateKey, bytes]:
     """A key, and its file in PEM."""
-    key = generate_private_key(65537, KEY_BITS)
+    key = generate_key()
     return key, key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
 
 

@@ -16,13 +16,15 @@ from bridge.base import clock
 from bridge.base.errors import OperationFailed
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
+from bridge.northbound.opcua import server_configuration
 from bridge.northbound.opcua.accounts import Accounts, security_policies
-from bridge.northbound.opcua.alarm_server import AlarmSite, serve_alarms
+from bridge.northbound.opcua.alarm_server import AlarmSite, of_certificate, serve_alarms
 from bridge.northbound.opcua.alarms import AlarmTask
 from bridge.northbound.opcua.assets import read_models
 from bridge.northbound.opcua.backend import Backend
-from bridge.northbound.opcua.certificates import TrustedCertificates
+from bridge.northbound.opcua.certificates import OwnCertificate
 from bridge.northbound.opcua.change_publisher import Publisher
+from bridge.northbound.opcua.client_trust import ClientTrust, client_store
 from bridge.northbound.opcua.event_keeper import EventKeeper
 from bridge.northbound.opcua.event_log import EventLog
 from bridge.northbound.opcua.event_records import EventCodec
@@ -31,7 +33,12 @@ from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nameplates import Nameplate
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.notifiers import Notifiers
+from bridge.northbound.opcua.own_files import own_folder
+from bridge.northbound.opcua.own_renewal import OwnRenewal
+from bridge.northbound.opcua.own_watch import OwnWatch
+from bridge.northbound.opcua.ownnames import names_of, reached_by
 from bridge.northbound.opcua.plant_history import PlantHistory
+from bridge.northbound.opcua.server_configuration import ServerConfiguration
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.site_space import NAMESPACE, fill
 from bridge.northbound.opcua.value_rings import ValueRings
@@ -44,6 +51,7 @@ from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
 from bridge.uaserver.library import ua
 from bridge.uaserver.librarylog import quieten
+from bridge.uaserver.own_addresses import OwnAddresses
 from bridge.uaserver.session import InnerServer
 
 _PRODUCT: Final = "urn:drivebridge"
@@ -55,9 +63,9 @@ _log = logging.getLogger(__name__)
 class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
-    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``, where the state
-    of the alarms is kept, too. ``nameplates`` are those of the drives. ``bound`` is a listening socket where
-    somebody else holds the port.
+    ``state_dir`` is the site's; certificates are in its folder ``certificates``, the state of the alarms is
+    in ``opcua``. ``nameplates`` are those of the drives. ``bound`` is a listening socket where somebody else
+    holds the port.
     """
 
     def __init__(
@@ -72,7 +80,8 @@ class OpcUaServer:
     ) -> None:
         self._view = view
         self._settings = settings
-        self._folder = state_dir / "opcua"
+        self._state_dir = state_dir
+        self._folder = state_dir
         self._site_name = site_name
         self._nameplates = nameplates or {}
         self._alarm_site = alarm_site or AlarmSite()
@@ -81,6 +90,7 @@ class OpcUaServer:
         self._socket = bound
         self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
+        self._renewals: asyncio.Task[None] | None = None
         self._follower: asyncio.Task[None] | None = None
         self._alarms: AlarmTask | None = None
         self._past: PlantHistory | None = None
@@ -102,10 +112,12 @@ class OpcUaServer:
         Raises ``FileFaults`` for a user, certificate or key that cannot be used, and ``Unavailable``
         where the port cannot be opened or the folder not be written.
         """
-        self._users = Accounts(self._settings)
+        store = client_store(self._settings, self._state_dir)
+        store.prepare()
+        self._users = Accounts(self._settings, store.lists)
+        self._folder = own_folder(self._state_dir)
         own = await asyncio.to_thread(server_identity, self._settings, self._folder)
-        trusted_dir = self._settings.trusted_dir
-        trusted = TrustedCertificates(Path(trusted_dir)) if trusted_dir else None
+        trusted = ClientTrust(store, needs_trust=self._settings.trust == "list")
         bound = self._socket = self._socket or listen(self._settings.listen, "opcua.listen")
         bound.setblocking(False)
         # Connections inherit it: who fills their buffers is noticed.
@@ -136,8 +148,8 @@ class OpcUaServer:
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
         self._pulse.stop()
-        tasks = [one for one in (self._publisher, self._follower) if one]
-        self._publisher = self._follower = None
+        tasks = [one for one in (self._publisher, self._renewals, self._follower) if one]
+        self._publisher = self._renewals = self._follower = None
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -159,12 +171,15 @@ class OpcUaServer:
     # steps of start
 
     async def _serve(
-        self, bound: socket.socket, own: ServerIdentity, trusted: TrustedCertificates | None, users: Accounts
+        self, bound: socket.socket, own: ServerIdentity, trusted: ClientTrust, users: Accounts
     ) -> None:
         quieten()
         decoding.install()
         inner = InnerServer(no_security=self._settings.no_security)
         inner.locales = LANGUAGES
+        inner.addresses = OwnAddresses(
+            names_of(self._settings.listen, self._settings.names), self._settings.endpoints
+        )
         inner.certificate, inner.private_key = own.certificate, own.private_key
         server = BoundServer(inner, bound, trusted)
         await self._describe(server, own.application_uri, users)
@@ -195,17 +210,34 @@ class OpcUaServer:
         await past.start()
         self._view.on_event(past.on_event)
         resets = self._settings.acknowledge_resets
-        self._alarms = serve_alarms(
-            inner, tree, self._view, self._alarm_site, own.certificate, self._folder, keeper, resets=resets
+        alarms = self._alarms = serve_alarms(
+            inner,
+            tree,
+            self._view,
+            self._alarm_site,
+            own.certificate,
+            self._state_dir / "opcua",
+            keeper,
+            resets=resets,
         )
+        renewal = self._renewal(own)
+
+        def take_up(own: OwnCertificate) -> None:
+            renewal.own = own
+            server.renew(own.certificate, own.private_key)
+            alarms.renewed(own.certificate.not_valid_after_utc, of_certificate(own.certificate))
+
         inner.application = Backend(
             users,
+            tree.least_role,
             Writer(self._view, inner.aspace, tree.writable),
             Caller(self._view, inner.aspace, tree.method),
+            ServerConfiguration(renewal, trusted.store, self._own_files, take_up),
             self._view,
             self._pulse,
             past,
         )
+        server_configuration.describe(inner.aspace)
         events = EventSender(epoch_ns, inner.subscriptions, notifiers, site.event_types, keeper)
         self._view.on_event(events.on_event)
         inner.subscriptions.prepare()
@@ -213,9 +245,20 @@ class OpcUaServer:
         await server.start()
         publisher = Publisher(image, tree.watched, events, past)
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
-        self._follower = asyncio.create_task(self._alarms.run(), name="opcua alarms")
+        watch = OwnWatch(self._settings, self._folder, own.application_uri)
+        self._renewals = asyncio.create_task(watch.run(take_up), name="opcua renewals")
+        self._follower = asyncio.create_task(alarms.run(), name="opcua alarms")
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
+
+    @property
+    def _own_files(self) -> Path | None:
+        """Folder of a certificate that is ours to replace."""
+        return None if self._settings.certificate else self._folder
+
+    def _renewal(self, own: ServerIdentity) -> OwnRenewal:
+        names = names_of(self._settings.listen, reached_by(self._settings))
+        return OwnRenewal(OwnCertificate(own.certificate, own.private_key), own.application_uri, names)
 
     async def _describe(self, server: BoundServer, application_uri: str, users: Accounts) -> None:
         server.set_endpoint(self.endpoint_url)

@@ -8,7 +8,6 @@ import socket
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
 from urllib.parse import quote
 
 from cryptography import x509
@@ -22,17 +21,14 @@ from bridge.northbound.opcua.certificates import (
     new_own,
     reason,
     uris_of,
-    write_private,
 )
-from bridge.northbound.opcua.ownnames import addresses_of, missing_in, names_of
+from bridge.northbound.opcua.own_files import CERTIFICATE, KEY, URI, load_pair, put_pair
+from bridge.northbound.opcua.ownnames import addresses_of, missing_in, names_of, reached_by
+from bridge.northbound.opcua.selfsigned import generate_key, self_signed
 from bridge.text import Text
+from bridge.trust.files import write_whole
 
 _log = logging.getLogger(__name__)
-
-CERTIFICATE: Final = "own_certificate.der"
-KEY: Final = "own_key.pem"
-URI: Final = "application_uri"
-"""Files in the folder of the server."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,15 +68,26 @@ def _kept_or_new(settings: OpcUaTable, folder: Path) -> OwnCertificate:
     certificate, key = folder / CERTIFICATE, folder / KEY
     if certificate.exists():
         try:
-            return load_own(certificate, key)
+            return load_pair(folder)
         except FileFaults as error:
             advice = Text.of("certificate.take_away_advice", certificate=CERTIFICATE, key=KEY)
             raise FileFaults([replace(fault, advice=advice) for fault in error.faults]) from None
     uri = settings.application_uri or _kept_uri(folder) or _first_uri()
-    own = new_own(certificate, key, uri, names_of(settings.listen, settings.names))
+    own = new_own(certificate, key, uri, names_of(settings.listen, reached_by(settings)))
     if not settings.application_uri:
-        write_private(folder / URI, f"{uri}\n".encode())
+        write_whole(folder / URI, f"{uri}\n".encode())
     return own
+
+
+def renew(settings: OpcUaTable, folder: Path, *, new_key: bool) -> ServerIdentity:
+    """A new certificate for the same application, in place of the one in ``folder``; by default for the same
+    key. Clients have to trust it anew. Raises OSError and ``FileFaults``."""
+    former = load_pair(folder)
+    uri = _uri_of(former.certificate, str(folder / CERTIFICATE), settings, folder)
+    key = generate_key() if new_key else former.private_key
+    made = self_signed(key, uri, names_of(settings.listen, reached_by(settings)))
+    put_pair(folder, OwnCertificate(made, key))
+    return ServerIdentity(uri, made, key)
 
 
 def _first_uri() -> str:
@@ -120,7 +127,7 @@ def _look_at(certificate: x509.Certificate, file: str, settings: OpcUaTable) -> 
         )
     # Of a certificate that the site file names its owner knows by which addresses it is reached.
     addresses = [] if settings.certificate else addresses_of(settings.listen)
-    missing = missing_in(certificate, [*settings.names, *addresses])
+    missing = missing_in(certificate, [*reached_by(settings), *addresses])
     if missing:
         what = "does not name %s, and clients that compare names refuse it: %s"
         _log.warning(f"%s {what}", file, ", ".join(missing), renew)

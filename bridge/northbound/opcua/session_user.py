@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bridge.command.messages.request import Identity, Role
+from bridge.command.messages.request import Identity
 from bridge.northbound.passwords import ANONYMOUS
 
 
 @dataclass(frozen=True, slots=True)
 class SessionUser:
-    """User of a session; ``identity`` names the session as its connection."""
+    """User of a session; ``identity`` names the session as its connection.
+    ``encrypted`` says whether its channel is."""
 
     identity: Identity
+    encrypted: bool = False
 
     @property
     def name(self) -> str:
@@ -23,8 +25,8 @@ class SessionUser:
         return self.identity.user == ANONYMOUS
 
     @property
-    def has_rights(self) -> bool:
-        return self.identity.role >= Role.OPERATOR
+    def rank(self) -> int:
+        return int(self.identity.role)
 
     def is_same(self, other: object) -> bool:
         return isinstance(other, SessionUser) and self.identity.is_same(other.identity)

@@ -13,10 +13,12 @@ from typing import Final, Protocol, cast
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
+from bridge.command.messages.request import Role
 from bridge.image import Image
 from bridge.northbound.opcua.data_values import EpochNs, present_value
 from bridge.northbound.opcua.kinds import Kinds, Name, Node
 from bridge.northbound.opcua.nodes import FileNode, LiveProperty, MethodNode, ObjectNode, VariableNode
+from bridge.northbound.opcua.permissions import least_role
 from bridge.northbound.opcua.point_values import TEXT_OF_STATE, AllWatched, DerivedValue, PointValue
 from bridge.northbound.opcua.structures import VALUE_AS_TEXT, PropertyNode, property_nodes, value_type
 from bridge.northbound.opcua.words import state_named
@@ -217,6 +219,11 @@ class Tree:
     def method(self, where: ua.NodeId) -> MethodNode | None:
         node = self._node(where)
         return node if isinstance(node, MethodNode) else None
+
+    def least_role(self, where: ua.NodeId) -> Role | None:
+        """The role that writing or calling this node needs; None where nobody may."""
+        node = self._node(where)
+        return least_role(node) if node else None
 
     @property
     def drives(self) -> list[str]:

@@ -17,21 +17,21 @@ from asyncua.server.address_space import AddressSpace
 
 from bridge.base.quietlog import log_source
 from bridge.command.messages.request import (
-    LEAST_ROLE,
     Action,
     Code,
     Command,
     Identity,
     Outcome,
     Request,
-    Role,
     SetTimeout,
     Write,
     WriteParameter,
 )
 from bridge.image import Value
+from bridge.image.point import WriteKind
 from bridge.northbound.opcua.data_values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.opcua.nodes import VariableNode
+from bridge.northbound.opcua.permissions import COMMAND_OF
 from bridge.northbound.view import View
 from bridge.text import Text
 from bridge.uaserver.arrivals import received_at
@@ -42,10 +42,6 @@ _log = logging.getLogger(__name__)
 ANSWER_LIMIT_S: Final = 10.0
 """Longest wait for an outcome, seconds. No request takes longer (a start takes 3 s): after this the link to
 the bus counts as broken."""
-
-
-_ALONE: Final = {"parameter": WriteParameter, "supervision": SetTimeout}
-"""Groups whose points are written one by one, not in a telegram."""
 
 
 @dataclass(slots=True)
@@ -100,14 +96,6 @@ class Writer:
         self._space = space
         self._writable = writable
 
-    def least_role(self, node_id: ua.NodeId) -> Role | None:
-        """The role that writing this variable needs; None where nobody may."""
-        node = self._writable(node_id)
-        if node is None:
-            return None
-        group = node.point.name.rpartition("/")[0].rpartition("/")[2]
-        return LEAST_ROLE[_ALONE.get(group, Write).action]
-
     async def write(self, identity: Identity, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
         """One status code for each of ``writes``, in their order."""
         results = [GOOD] * len(writes)
@@ -123,10 +111,10 @@ class Writer:
             owner, _, leaf = node.point.name.rpartition("/")
             if node.bit is not None:
                 leaf = f"{leaf}.{node.bit}"
-            target, _, group = owner.rpartition("/")
+            target = owner.rpartition("/")[0]
             telegram = latest.get(target)
-            if group in _ALONE:
-                telegram = _Telegram(target, _ALONE[group])
+            if node.point.write is not WriteKind.TELEGRAM:
+                telegram = _Telegram(target, COMMAND_OF[node.point.write])
                 telegrams.append(telegram)
             # The same point twice is two telegrams: the edge between the two values may matter.
             elif telegram is None or leaf in telegram.values:

@@ -56,7 +56,7 @@ def admit(taken: Sequence[Seat], new: Seat) -> Seating:
     shares = Counter(one.who for one in taken)
     if shares[new.who] >= MOST_OF_USER:
         return Seating(is_in=False)
-    room = MOST_TABS if new.role is Role.ENGINEER else MOST_TABS - FOR_ENGINEERS
+    room = MOST_TABS if new.role >= Role.ENGINEER else MOST_TABS - FOR_ENGINEERS
     if len(taken) < room:
         return Seating(is_in=True)
     yielding = [

@@ -15,7 +15,8 @@ from starlette.routing import Route
 from bridge.base.guard import Guard
 from bridge.command import Role
 from bridge.northbound.page.sessions import PageSession
-from bridge.text import Text, Words, as_json, render
+from bridge.text import Said, Text, Words, as_json, render
+from bridge.trust.store import REJECTED
 
 MOST_LINES = 500
 """Most lines of the audit log in one answer."""
@@ -25,13 +26,20 @@ _encode = msgspec.json.Encoder().encode
 
 @dataclass(frozen=True, slots=True)
 class CertificateFacts:
-    """One certificate. ``of`` is its owner: ``opcua``, ``page`` or a client's file; ``until`` is in seconds
-    since 1970."""
+    """One certificate. ``of`` is its owner: ``opcua``, ``page``, a client's file, or the folder that holds
+    it; ``until`` is in seconds since 1970. ``wrong`` is why one was refused; who wants to trust it names its
+    ``thumbprint``."""
 
     of: str
     subject: str
     until: float
     fingerprint: str
+    thumbprint: str = ""
+    wrong: Said = ""
+
+    @property
+    def is_refused(self) -> bool:
+        return self.of == REJECTED
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +110,13 @@ class System:
         )
         faults += [one for one in certificates if isinstance(one, UnreadablePart)]
         readable = [one for one in certificates if isinstance(one, CertificateFacts)]
-        told: dict[str, Any] = {"versions": versions, "certificates": readable}
+        # Names that strangers have given themselves are for those who decide on them.
+        is_engineer = session.role >= Role.ENGINEER
+        shown = [_listed(one) for one in readable if is_engineer or not one.is_refused]
+        told: dict[str, Any] = {"versions": versions, "certificates": shown}
         told["faults"] = [_shown(one) for one in faults]
         told["clients"] = {protocol: len(addresses) for protocol, addresses in connections.items()}
-        if session.role >= Role.ENGINEER:
+        if is_engineer:
             told |= {"connections": connections, "tabs": self._tabs()}
         return _fresh(told)
 
@@ -141,6 +152,14 @@ class System:
         if session.role < Role.ENGINEER:
             return JSONResponse({"error": "engineer"}, 403)
         return None
+
+
+def _listed(one: CertificateFacts) -> dict[str, Any]:
+    facts = {"of": one.of, "subject": one.subject, "until": one.until, "fingerprint": one.fingerprint}
+    if not one.is_refused:
+        return facts
+    wrong = {"message": render(one.wrong), "text": as_json(one.wrong)}
+    return facts | {"thumbprint": one.thumbprint, "wrong": wrong}
 
 
 def _shown(part: UnreadablePart) -> dict[str, Any]:

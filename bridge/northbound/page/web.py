@@ -48,7 +48,6 @@ STATIC: Final = Path(__file__).parent / "static"
 _MOST_CHECKS: Final = 8
 """Most passwords that wait to be checked at a time."""
 _BODY_S: Final = 5.0
-_ROLES: Final = {"observer": Role.OBSERVER, "operator": Role.OPERATOR, "engineer": Role.ENGINEER}
 _encode = msgspec.json.Encoder().encode
 
 
@@ -117,7 +116,7 @@ class Page:
         self._fault_texts = sources.fault_texts
         self._site_name = site.site.name
         self._users = {user.name: user for user in settings.user} if settings else {}
-        self._anonymous = _ROLES.get(settings.anonymous) if settings else None
+        self._anonymous = Role.named(settings.anonymous) if settings else None
         self._sessions = PageSessions()
         self._throttle = Throttle()
         self._checks = PasswordChecks(most=_MOST_CHECKS)
@@ -183,7 +182,7 @@ class Page:
 
     def _credentials(self, users: Iterable[UserTable]) -> dict[str, str]:
         """Credential hash of each user, and under the empty name that of visitors."""
-        credentials = {user.name: credential_of(user.role, user.password_hash) for user in users}
+        credentials = {user.name: credential_of(user.role, user.password_hash or "") for user in users}
         if self._anonymous is not None:
             credentials[""] = credential_of(self._anonymous.name, "")
         return credentials
@@ -253,7 +252,7 @@ class Page:
             self._sessions.end(before)
             self._tabs.end(before)
         _log.info("page: %s logged in from %s", user.name, address)
-        return self._begin(request, user.name, _ROLES[user.role])
+        return self._begin(request, user.name, Role[user.role.upper()])
 
     def _throttled(self, pause_s: float) -> Response:
         response = self._json({"error": "throttled", "pause_s": round(pause_s, 1)}, 429)

@@ -7,6 +7,7 @@ import platform
 import re
 import socket
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final, cast
@@ -19,9 +20,13 @@ from bridge import __version__
 from bridge.base.errors import BridgeError, Fault, FileFaults
 from bridge.config import ListeningTable, Site
 from bridge.lint import Severity, lint
+from bridge.northbound.opcua.own_files import CERTIFICATES, own_pair
 from bridge.northbound.page.system import CertificateFacts, UnreadablePart
 from bridge.project import Project, load_project
 from bridge.text import Text, as_json
+from bridge.trust import TrustStore
+from bridge.trust.inventory import inventory
+from bridge.trust.store import OWN, REJECTED
 
 _LIBRARIES: Final = ("asyncua", "pymodbus", "eclipse-zenoh", "python-can", "canopen", "starlette", "uvicorn")
 _SECRETS: Final = (
@@ -181,12 +186,23 @@ def _address(text: str) -> str:
 def _certificates(site: Site) -> Iterator[CertificateFacts | UnreadablePart]:
     opcua, page = site.opcua, site.page
     if opcua:
-        own = Path(site.site.state_dir) / "opcua" / "own_certificate.der"
-        yield from _certificate("opcua", Path(opcua.certificate) if opcua.certificate else own)
+        own, _ = own_pair(opcua, Path(site.site.state_dir) / CERTIFICATES / OWN)
+        yield from _certificate("opcua", own)
+        yield from _kept(Path(site.site.state_dir) / CERTIFICATES)
         if opcua.trusted_dir:
             yield from _trusted(Path(opcua.trusted_dir))
     if page and page.certificate:
         yield from _certificate("page", Path(page.certificate))
+
+
+def _kept(folder: Path) -> Iterator[CertificateFacts]:
+    """Certificates of others in the folders of the site."""
+    for one in inventory(TrustStore(folder), datetime.now(UTC)):
+        if one.place != OWN:
+            print_ = bytes.fromhex(one.fingerprint).hex(":").upper()
+            wrong = one.said if one.place == REJECTED else ""
+            until = one.until.timestamp()
+            yield CertificateFacts(one.place, one.subject, until, print_, one.thumbprint, wrong)
 
 
 def _trusted(folder: Path) -> Iterator[CertificateFacts | UnreadablePart]:

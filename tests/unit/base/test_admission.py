@@ -45,14 +45,16 @@ class Client:
     def __init__(self, rig: Rig, source: str, stage: ConnectionStage) -> None:
         self.stage = stage
         self.held = 0
-        self.has_rights = False
+        self.rank = 0
+        self.user = ""
         self.visitor = Visitor(
             source,
             rig.now,
             lambda: self.stage,
             lambda: rig.closed.append(self),
             lambda: self.held,
-            lambda: self.has_rights,
+            lambda: self.rank,
+            lambda: self.user,
         )
         self.is_in = rig.admission.admit(self.visitor, rig.now)
 
@@ -169,24 +171,67 @@ def test_when_all_are_taken_only_who_waits_makes_room(rig: Rig) -> None:
     assert len(rig.admission) == MOST_CONNECTIONS
 
 
-def test_one_place_is_kept_for_who_has_rights(rig: Rig) -> None:
+def test_one_place_is_kept_for_the_highest_role(rig: Rig) -> None:
     readers = [rig.client(f"10.0.1.{number}", ConnectionStage.SESSION) for number in range(MOST_CONNECTIONS)]
     rig.admission.look(0.0)
     assert rig.closed == readers[: -KEPT - 1 : -1], "anybody may try the last place, none of them keeps it"
     operator = rig.client("10.0.2.1", ConnectionStage.CHANNEL)
     assert operator.is_in
-    operator.stage, operator.has_rights = ConnectionStage.SESSION, True
+    operator.stage, operator.rank = ConnectionStage.SESSION, 1
     rig.admission.look(1.0)
     assert operator not in rig.closed
     assert rig.client("10.0.2.2").is_in, "to come back to a session on"
 
 
-def test_where_somebody_has_rights_others_may_have_the_rest(rig: Rig) -> None:
-    rig.client("10.0.2.1", ConnectionStage.SESSION).has_rights = True
+def test_an_operator_is_locked_out_by_no_crowd_of_observers(rig: Rig) -> None:
+    """However many operators are there already."""
     for number in range(MOST_CONNECTIONS - KEPT):
         rig.client(f"10.0.1.{number}", ConnectionStage.SESSION)
+    for number in range(10):
+        operator = rig.client("10.0.2.1", ConnectionStage.CHANNEL)
+        assert operator.is_in
+        operator.stage, operator.rank = ConnectionStage.SESSION, 1
+        rig.admission.look(number)
+    assert len(rig.closed) == 10
+    assert {one.rank for one in rig.closed} == {0}
+
+
+def test_who_has_the_highest_role_keeps_its_place_and_the_lowest_yields_first() -> None:
+    rig = Rig(limits(top_rank=2))
+
+    def comes(source: str, rank: int) -> Client:
+        one = rig.client(source, ConnectionStage.SESSION)
+        one.rank = rank
+        return one
+
+    operators = [comes("10.0.1.1", 1) for _ in range(45)]
+    engineers = [comes(f"10.0.2.{number}", 2) for number in range(54)]
+    observer = comes("10.0.3.1", 0)
     rig.admission.look(0.0)
-    assert rig.closed == []
+    assert rig.closed == [observer]
+    engineers.append(comes("10.0.2.99", 2))
+    rig.admission.look(1.0)
+    assert rig.closed == [observer, operators[-1]]
+    assert not set(engineers) & set(rig.closed)
+
+
+@pytest.mark.parametrize("by_name", [False, True])
+def test_of_one_role_the_largest_crowd_yields_its_last(rig: Rig, by_name: bool) -> None:
+    """A crowd is one user from wherever, or one address without a name."""
+    many = [rig.client(f"10.1.{n if by_name else 0}.1", ConnectionStage.SESSION) for n in range(40)]
+    for one in many:
+        one.user = "panel" if by_name else ""
+    others = [rig.client(f"10.2.{number}.1", ConnectionStage.SESSION) for number in range(60)]
+    rig.admission.look(0.0)
+    assert rig.closed == many[-1:]
+    assert not set(others) & set(rig.closed)
+
+
+def test_of_one_address_too_a_place_is_kept_for_the_highest_role(rig: Rig) -> None:
+    readers = rig.crowd(MOST_OF_ADDRESS, "10.0.0.1", ConnectionStage.SESSION)
+    rig.admission.look(0.0)
+    assert rig.closed == readers[: -KEPT - 1 : -1]
+    assert rig.client("10.0.0.1", ConnectionStage.CHANNEL).is_in
 
 
 def test_where_all_yield_a_newcomer_always_gets_in_at_the_expense_of_the_largest_crowd() -> None:

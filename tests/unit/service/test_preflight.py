@@ -140,7 +140,7 @@ def test_a_certificate_that_fits_is_taken(
 
 def test_without_one_the_bridge_s_own_is_made_before_the_bus_is_opened(tmp_path: Path) -> None:
     check(tmp_path)
-    made = tmp_path / "state" / "opcua" / "own_certificate.der"
+    made = tmp_path / "state" / "certificates" / "own" / "own_certificate.der"
     uris = x509.load_der_x509_certificate(made.read_bytes()).extensions.get_extension_for_class(
         x509.SubjectAlternativeName
     )
@@ -182,7 +182,7 @@ def test_a_full_disk_is_told_and_stops_only_who_needs_it(
     [record] = caplog.records
     assert "audit log and EEPROM counts are not kept" in record.message
     # Without a certificate of its own yet, OPC UA cannot be served at all.
-    for file in (tmp_path / "state" / "opcua").iterdir():
+    for file in (tmp_path / "state" / "certificates" / "own").iterdir():
         file.unlink()
     monkeypatch.setattr(os, "open", full)
     error = told(tmp_path, "")

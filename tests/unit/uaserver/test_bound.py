@@ -11,10 +11,16 @@ from asyncua import Client, ua
 
 from bridge.uaserver import decoding
 from bridge.uaserver.bound import BoundServer
+from bridge.uaserver.security import Refusal
 from bridge.uaserver.session import InnerServer
 from tests.support.opcua_application import Served, User, add_variable
 
 WORD = ua.NodeId("word", 1)
+
+
+class AllTrusted:
+    def refusal(self, sent: bytes, source: str, application_uri: str | None = None) -> Refusal | None:
+        return None
 
 
 @asynccontextmanager
@@ -25,7 +31,7 @@ async def serving(application: Served) -> AsyncIterator[str]:
     url = f"opc.tcp://127.0.0.1:{bound.getsockname()[1]}"
     inner = InnerServer(no_security=True)
     inner.application = application
-    server = BoundServer(inner, bound, None)
+    server = BoundServer(inner, bound, AllTrusted())
     server.set_endpoint(url)
     await server.init()
     server.set_security_policy([ua.SecurityPolicyType.NoSecurity])

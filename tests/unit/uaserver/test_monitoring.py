@@ -32,7 +32,11 @@ class Rig:
 
     async def create(self, *wanted: ua.MonitoredItemCreateRequest, room: int = 100) -> list[Any]:
         params = ua.CreateMonitoredItemsParameters(1, ua.TimestampsToReturn.Both, list(wanted))
-        return await self.items.create(lambda: self.subscription, params, lambda: room, lambda: False)
+
+        async def no_more() -> bool:
+            return False
+
+        return await self.items.create(lambda: self.subscription, params, lambda: room, no_more)
 
     async def change(self, value: int) -> None:
         content = ua.DataValue(ua.Variant(value, ua.VariantType.UInt16))

@@ -1,4 +1,4 @@
-"""Passwords that come through a channel; no server."""
+"""Passwords and signatures that come through a channel; no server."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ import pytest
 from asyncua import ua
 from asyncua.common.utils import ServiceError
 from asyncua.crypto.security_policies import SecurityPolicyAes256Sha256RsaPss, encrypt_asymmetric
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.asymmetric.padding import MGF1, PSS, PKCS1v15
+from cryptography.hazmat.primitives.hashes import SHA256
 
 from bridge.northbound.opcua.certificates import OwnCertificate, new_own
-from bridge.uaserver.security import read_password
+from bridge.uaserver.security import read_password, read_user_certificate
+from tests.support.certificates import CLIENT, make, rsa_key
 
 URI = "urn:test:drivebridge"
 Policy = ua.SecurityPolicyType
@@ -65,3 +69,48 @@ class TestReadPassword:
         token = self.token(b"\x07" * size, "http://www.w3.org/2001/04/xmlenc#rsa-oaep")
         with pytest.raises(ServiceError):
             read_password(token, self.NONCE, own.private_key, encrypted=True)
+
+
+class TestReadUserCertificate:
+    SIGNED = b"certificate of the server" + bytes(range(32))
+    PKCS1 = "http://www.w3.org/2001/04/xmldsig-more#rsa-sha256"
+
+    def token(self, content: bytes) -> ua.X509IdentityToken:
+        return ua.X509IdentityToken(CertificateData=content)
+
+    def signature(self, content: bytes, algorithm: str | None = PKCS1) -> ua.SignatureData:
+        return ua.SignatureData(Algorithm=algorithm, Signature=content)
+
+    def signed(self, content: bytes = SIGNED) -> bytes:
+        return rsa_key(1).sign(content, PKCS1v15(), SHA256())
+
+    def test_the_owner_of_the_key_is_the_user(self) -> None:
+        made = make()
+        pss = rsa_key(1).sign(self.SIGNED, PSS(MGF1(SHA256()), 32), SHA256())
+        other = self.signature(pss, "http://opcfoundation.org/UA/security/rsa-pss-sha2-256")
+        for signature in (self.signature(self.signed()), other):
+            assert read_user_certificate(self.token(made.der), signature, self.SIGNED) == made.certificate
+
+    @pytest.mark.parametrize("content", [b"", b"nonsense", None])
+    def test_what_is_no_certificate_of_rsa_is_invalid(self, content: bytes | None) -> None:
+        elliptic = make(CLIENT.but(key=ec.generate_private_key(ec.SECP256R1())))
+        token = self.token(elliptic.der if content is None else content)
+        with pytest.raises(ServiceError) as refused:
+            read_user_certificate(token, self.signature(self.signed()), self.SIGNED)
+        assert refused.value.code == ua.StatusCodes.BadIdentityTokenInvalid
+
+    @pytest.mark.parametrize("kind", ["none", "empty", "heard before", "forged", "weak", "of another kind"])
+    def test_without_its_signature_nobody_is_the_user(self, kind: str) -> None:
+        signature = {
+            "none": None,
+            "empty": ua.SignatureData(),
+            "heard before": self.signature(self.signed(b"another nonce")),
+            "forged": self.signature(rsa_key(2).sign(self.SIGNED, PKCS1v15(), SHA256())),
+            "weak": self.signature(self.signed(), "http://www.w3.org/2000/09/xmldsig#rsa-sha1"),
+            "of another kind": self.signature(
+                self.signed(), "http://opcfoundation.org/UA/security/rsa-pss-sha2-256"
+            ),
+        }[kind]
+        with pytest.raises(ServiceError) as refused:
+            read_user_certificate(self.token(make().der), signature, self.SIGNED)
+        assert refused.value.code == ua.StatusCodes.BadUserSignatureInvalid

@@ -34,11 +34,12 @@ OVERRIDDEN = {
         "_session_watchdog_loop",
         "_should_close_session_on_transport_loss",
         "close",
+        "open_secure_channel",
         "process",
         "process_message",
         "send_response",
     },
-    "InnerServer": {"create_session", "get_endpoints", "stop"},
+    "InnerServer": {"_mangle_endpoint_url", "create_session", "get_endpoints", "stop"},
     "Session": {"_timeout_loop", "activate_session", "close_session", "create_session"},
     "_UaProtocol": {"_process_one_msg", "connection_lost", "connection_made", "data_received"},
 }

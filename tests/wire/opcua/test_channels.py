@@ -61,10 +61,12 @@ async def test_what_is_not_offered_is_refused_by_its_name(
     assert [line for line in log.lines if "refused channels" in line and what in line], log.lines
 
 
-async def test_signing_alone_is_not_offered(server: OpcUaServer) -> None:
+async def test_signing_alone_is_not_offered(server: OpcUaServer, tmp_path: Path) -> None:
+    scada = make_peer("scada")
+    scada.trusted_in(tmp_path)
     client = Client(server.endpoint_url, timeout=5)
     (endpoint, *_) = await client.connect_and_get_server_endpoints()
-    await make_peer("scada").secure(
+    await scada.secure(
         client,
         server_certificate=CertProperties(endpoint.ServerCertificate, "der"),
         mode=ua.MessageSecurityMode.Sign,

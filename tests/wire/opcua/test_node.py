@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import json
 import shutil
 import time
@@ -12,10 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.command import Event, EventKind
 from bridge.config import OpcUaTable, UserTable
 from bridge.text import Text
+from bridge.trust import TrustStore
+from tests.support.certificates import AUTHORITY, CLIENT_URI, Case, cases, make, signed
 from tests.support.opcua_alarms import cut_bus, tell
 from tests.support.opcua_raw import cut, sessions
 from tests.support.opcua_site import OPEN, serving
@@ -69,6 +73,8 @@ def settings_for(*, encrypted: bool) -> OpcUaTable:
     return OpcUaTable(
         listen="127.0.0.1:0",
         no_security=not encrypted,
+        # It makes its certificate itself; whom the list lets in is for test_certificates.py.
+        trust="anybody",
         anonymous="none" if encrypted else "operator",
         user=[user],
     )
@@ -173,6 +179,58 @@ async def test_node_opcua_works_in_the_middle_of_a_crowd(tmp_path: Path) -> None
         for _, writer in crowd:
             writer.close()
     assert (seen["run"], seen["stop"]) == ("Good", "Good")
+
+
+@pytest.mark.landing
+async def test_node_opcua_is_told_what_is_wrong_with_its_certificate(tmp_path: Path) -> None:
+    hidden = "BadSecurityChecksFailed"
+    expected = {
+        "trusted itself": "Good",
+        "short key": hidden,
+        "run out": "BadCertificateTimeInvalid",
+        "not for signing": "BadCertificateUseNotAllowed",
+        "revoked": "BadCertificateRevoked",
+    }
+    shown, home = tmp_path / "shown", tmp_path / "state"
+    shown.mkdir()
+    store = TrustStore(home / "certificates")
+    store.prepare()
+    stranger = make()
+    shown_by = {name: cases()[name] for name in expected} | {"unknown": Case((stranger,), ())}
+    for name, case in shown_by.items():
+        (shown / f"{name}.der").write_bytes(case.sent[0].der)
+        (shown / f"{name}.pem").write_bytes(case.sent[0].pem_key)
+        for number, one in enumerate(case.trusted):
+            (store.trusted / f"{name} {number}.der").write_bytes(one.der)
+        for crl in case.crls if name == "revoked" else ():
+            (store.trusted / "revoked.crl").write_bytes(crl.public_bytes(Encoding.DER))
+    site = settings_for(encrypted=True).model_copy(update={"trust": "list"})
+    async with serving(site, home) as (server, _):
+        how = (server.endpoint_url, str(shown), CLIENT_URI, "anna", "swordfish")
+        assert await answers("certificates.mjs", tmp_path, *how) == expected | {"unknown": hidden}
+
+
+@pytest.mark.landing
+async def test_node_opcua_renews_the_certificate_of_the_server(tmp_path: Path) -> None:
+    """By push, on a session that goes on."""
+    admin = UserTable(name="eva", role="admin", password_hash=cheap_hash("swordfish"))
+    site = settings_for(encrypted=True).model_copy(update={"user": [admin]})
+    root = make(AUTHORITY)
+    async with (
+        serving(site, tmp_path) as (server, _),
+        node("push.mjs", tmp_path, server.endpoint_url, "eva", "swordfish") as process,
+    ):
+        assert process.stdin and process.stdout
+        while not (said := lines(line := await process.stdout.readline())):
+            assert line, (await process.communicate())[1].decode()
+        (asked,) = said
+        made = signed(base64.b64decode(asked["request"]), root).public_bytes(Encoding.DER)
+        answer = b" ".join(map(base64.b64encode, (made, root.der)))
+        out, errors = await process.communicate(answer + b"\n")
+    assert process.returncode == 0, errors.decode()
+    (seen,) = lines(out)
+    assert base64.b64decode(seen.pop("shown")) == made
+    assert seen == {"updated": "Good", "required": True, "applied": "Good", "state": "Good"}
 
 
 async def test_node_opcua_follows_an_alarm_and_handles_it(tmp_path: Path) -> None:

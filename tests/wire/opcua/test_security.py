@@ -48,10 +48,14 @@ def users() -> list[UserTable]:
 
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def strict(users: list[UserTable], tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Served]:
+async def strict(
+    users: list[UserTable], scada: Peer, stranger: Peer, tmp_path_factory: pytest.TempPathFactory
+) -> AsyncIterator[Served]:
     """As a site file that says nothing else: no open endpoint, nobody without a name."""
-    settings = OpcUaTable(listen="127.0.0.1:0", user=users)
-    async with serving(settings, tmp_path_factory.mktemp("strict")) as found:
+    settings, folder = OpcUaTable(listen="127.0.0.1:0", user=users), tmp_path_factory.mktemp("strict")
+    for peer in (scada, stranger):
+        peer.trusted_in(folder)
+    async with serving(settings, folder) as found:
         yield found
 
 
@@ -149,6 +153,7 @@ class TestEncrypted:
             await client.send_hello()
             await client.open_secure_channel()
             claimed = ua.CreateSessionParameters()
+            claimed.ClientDescription.ApplicationUri = stranger.uri
             claimed.ClientNonce, claimed.ClientCertificate = bytes(32), scada.certificate
             with pytest.raises(ua.uaerrors.BadSecurityChecksFailed):
                 await client.uaclient.create_session(claimed)
@@ -182,10 +187,7 @@ class TestTrust:
         self, users: list[UserTable], tmp_path: Path
     ) -> None:
         """Their names are the client's own: a new one each time must not be a new line each time."""
-        trusted = tmp_path / "trusted"
-        trusted.mkdir()
-        settings = OpcUaTable(listen="127.0.0.1:0", user=users, trusted_dir=str(trusted))
-        async with serving(settings, tmp_path) as served:
+        async with serving(OpcUaTable(listen="127.0.0.1:0", user=users), tmp_path) as served:
             with quiet_log() as log:
                 for number in range(3):
                     with pytest.raises((ua.UaError, ConnectionError)):
@@ -193,14 +195,16 @@ class TestTrust:
                             pass
         told = [line for line in log.lines if "refused certificates" in line]
         assert len(told) == 1, told
-        assert "refused certificates from 127.0.0.1: SHA-256 " in told[0]
+        assert "refused certificates from 127.0.0.1: " in told[0]
         assert "made-up-0" in told[0]
+        assert "BadCertificateUntrusted: it is not trusted. drivebridge certificates trust SITE " in told[0]
 
     @pytest.mark.landing
     async def test_the_server_s_identity_stays_over_a_restart_under_another_host_name(
         self, users: list[UserTable], scada: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         """A container has another name each time: no client has to trust it anew."""
+        scada.trusted_in(tmp_path)
         settings = OpcUaTable(listen="127.0.0.1:0", user=users)
         seen: list[tuple[bytes, str, str]] = []
         for name in ("hall-3", "9f31c2aa0b17"):
@@ -251,6 +255,26 @@ class TestRoles:
         async with logged_in(open_, None, "anna", PASSWORD) as client:
             assert await told(client) == (3, True)
             assert await control_word(client) == Codes.Good
+
+    async def test_a_client_reads_which_role_may_what(self, open_: Served) -> None:
+        async def told(client: Client, attribute: int) -> dict[str, bool]:
+            """Roles in the attribute of a command point, and whether they may write."""
+            point = ua.NodeId("conveyor/fu1/command/control_word", await namespace(client))
+            value = (await client.get_node(point).read_attribute(attribute)).Value.Value
+            names = {ident: name.removeprefix("WellKnownRole_") for name, ident in vars(ua.ObjectIds).items()}
+            writes = ua.PermissionType.Write
+            return {names[one.RoleId.Identifier]: writes in one.Permissions for one in value}
+
+        may = {"Observer": False, "Operator": True, "Engineer": True, "ConfigureAdmin": True}
+        async with connected(open_[0]) as client:
+            roles = await client.get_node(ua.ObjectIds.Server_ServerCapabilities_RoleSet).get_children()
+            names = {(await one.read_browse_name()).Name for one in roles}
+            assert {"Anonymous", "AuthenticatedUser", "SecurityAdmin", *may} <= names
+            found = await told(client, ua.AttributeIds.RolePermissions)
+            assert found == may | {"SecurityAdmin": True}
+            assert await told(client, ua.AttributeIds.UserRolePermissions) == {"Observer": False}
+        async with logged_in(open_, None, "anna", PASSWORD) as client:
+            assert await told(client, ua.AttributeIds.UserRolePermissions) == {"Operator": True}
 
     async def test_a_password_in_clear_text_is_not_taken(self, open_: Served) -> None:
         client = Client(open_[0].endpoint_url, timeout=10)

@@ -25,6 +25,10 @@ KINDS = set(ua.AttributeIds) - {
     # Depend on who asks.
     ua.AttributeIds.UserAccessLevel,
     ua.AttributeIds.UserExecutable,
+    ua.AttributeIds.UserRolePermissions,
+    # Not made by asyncua: test_security.py.
+    ua.AttributeIds.RolePermissions,
+    ua.AttributeIds.AccessRestrictions,
 }
 
 

@@ -8,13 +8,9 @@ import pytest
 from asyncua import ua
 from cryptography.hazmat.primitives.asymmetric.rsa import generate_private_key
 
-from bridge.command.messages.request import Action, Identity, Role, Source
-from bridge.image import DataType, Point
+from bridge.command.messages.request import Identity, Role, Source
 from bridge.northbound.opcua.backend import Backend
-from bridge.northbound.opcua.methods import Caller
-from bridge.northbound.opcua.nodes import MethodNode, VariableKind, VariableNode
 from bridge.northbound.opcua.session_user import SessionUser
-from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.uaserver.application import NOBODY, LoginAttempt
 
@@ -25,6 +21,9 @@ def user(name: str = "anna", role: Role = Role.OPERATOR, connection: str = "") -
     return SessionUser(Identity(Source.OPCUA, name, role, "10.0.0.1", connection=connection))
 
 
+PUSH = ua.NodeId(12740)
+
+
 class Told:
     """In place of the users, the writer, the caller, the view and the past."""
 
@@ -33,16 +32,19 @@ class Told:
     def __init__(self) -> None:
         self.calls: list[tuple[object, ...]] = []
 
-    async def identify(self, *how: object, encrypted: bool) -> Identity:
-        self.calls.append((*how, encrypted))
+    async def identify(self, login: LoginAttempt) -> Identity:
+        self.calls.append((login,))
         return user().identity
 
     async def write(self, identity: Identity, writes: object) -> list[object]:
         self.calls.append((identity, writes))
         return []
 
-    async def call(self, identity: Identity, calls: list[object]) -> list[object]:
+    async def call(self, identity: Identity, calls: list[object], **_: object) -> list[object]:
         return await self.write(identity, calls) or calls
+
+    def has(self, where: object) -> bool:
+        return where == PUSH
 
     def file(self, where: ua.NodeId) -> None: ...
 
@@ -54,40 +56,24 @@ class Told:
 
 
 def backend(told: Any, pulse: Any = None) -> Backend:
-    return Backend(told, told, told, told, pulse, told)
+    return Backend(told, lambda _: None, told, told, told, told, pulse, told)
 
 
-@pytest.mark.parametrize(
-    ("where", "least"),
-    [
-        ("conveyor/fu1/command/control_word", Role.OPERATOR),
-        ("conveyor/fu1/Start", Role.OPERATOR),
-        ("conveyor/fu1/parameter/p102", Role.ENGINEER),
-        ("conveyor/fu1/WriteParameter", Role.ENGINEER),
-        ("conveyor/fu1/SaveParameters", Role.ENGINEER),
-        ("conveyor/fu1/ReadParameter", Role.OBSERVER),
-        ("conveyor/fu1/status/status_word", Role.OPERATOR),
-    ],
-)
-def test_what_a_user_may_write_and_call_follows_from_the_role(where: str, least: Role) -> None:
+@pytest.mark.parametrize("least", [*Role, None])
+def test_what_a_user_may_write_and_call_follows_from_the_role(least: Role | None) -> None:
+    """What nobody may is for no observer either."""
     told: Any = Told()
-    method = where.rpartition("/")[2]
-    actions = {"".join(part.title() for part in action.split("_")): action for action in Action}
-    found = MethodNode(where, method, actions[method], "", "") if method in actions else None
-    point = Point(name=where, data_type=DataType.FLOAT, writable="/status/" not in where)
-    variable = VariableNode(where, "", VariableKind.PLAIN, point, 0) if found is None else None
-    writer = Writer(told, told, lambda _: variable if variable and variable.writable else None)
-    made = Backend(told, writer, Caller(told, told, lambda _: found), told, told, told)
-    allowed = [role for role in Role if made.may(user(role=role), ua.NodeId(where, 2))]
-    assert allowed == [role for role in Role if role >= least]
+    made = Backend(told, lambda _: least, told, told, told, told, told, told)
+    allowed = [role for role in Role if made.may(user(role=role), ua.NodeId("conveyor/fu1", 2))]
+    assert allowed == [role for role in Role if role >= (Role.OPERATOR if least is None else least)]
 
 
 async def test_a_login_becomes_a_user_whose_connection_is_the_session() -> None:
     told = Told()
-    login = LoginAttempt("token", b"nonce", KEY, "10.0.0.1", "session 1f3a", encrypted=True)
+    login = LoginAttempt("token", None, b"nonce", KEY, b"own", "10.0.0.1", "session 1f3a", encrypted=True)
     found = await backend(told).identify(login)
     assert found.identity == user(connection="session 1f3a").identity
-    assert told.calls == [("token", b"nonce", KEY, "10.0.0.1", True)]
+    assert told.calls == [(login,)]
 
 
 def test_a_user_is_the_same_over_any_session_and_nobody_is_none() -> None:
@@ -95,7 +81,7 @@ def test_a_user_is_the_same_over_any_session_and_nobody_is_none() -> None:
     assert not user().is_same(user("eva"))
     assert not user().is_same(NOBODY)
     assert (user("anonymous").is_anonymous, user().is_anonymous) == (True, False)
-    assert [user(role=role).has_rights for role in Role] == [False, True, True]
+    assert [user(role=role).rank for role in Role] == [0, 1, 2, 3]
 
 
 async def test_the_view_is_told_by_the_identity() -> None:
@@ -123,6 +109,15 @@ def test_what_is_crowded_may_have_waited_for_ever() -> None:
     assert isinstance(arrivals.arrive(crowded=False), float)
 
 
+async def test_the_methods_of_the_server_itself_are_for_admins_on_an_encrypted_channel() -> None:
+    told = Told()
+    made = backend(told)
+    for role in Role:
+        for encrypted in (False, True):
+            who = SessionUser(user(role=role).identity, encrypted)
+            assert made.may(who, PUSH) == (encrypted and role is Role.ADMIN)
+
+
 @pytest.mark.parametrize(
     ("method", "least"),
     [
@@ -134,7 +129,6 @@ def test_what_is_crowded_may_have_waited_for_ever() -> None:
 )
 def test_methods_of_alarms_have_their_roles(method: int, least: Role) -> None:
     told: Any = Told()
-    nobodys = Caller(told, told, lambda _: None), Writer(told, told, lambda _: None)
-    made = Backend(told, nobodys[1], nobodys[0], told, told, told)
+    made = backend(told)
     allowed = [role for role in Role if made.may(user(role=role), ua.NodeId(method))]
     assert allowed == [role for role in Role if role >= least]

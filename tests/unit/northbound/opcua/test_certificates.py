@@ -1,8 +1,7 @@
-"""The server's own certificate, and those that it trusts; no server."""
+"""The server's own certificate; no server."""
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,7 @@ from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey, generat
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 from bridge.base.errors import FileFaults
-from bridge.northbound.opcua.certificates import OwnCertificate, TrustedCertificates, load_own, new_own
+from bridge.northbound.opcua.certificates import OwnCertificate, load_own, new_own
 
 URI = "urn:test:drivebridge"
 
@@ -49,20 +48,3 @@ class TestOwnCertificate:
 
 def key_content(key: RSAPrivateKey, encoding: Encoding) -> bytes:
     return key.private_bytes(encoding, PrivateFormat.PKCS8, NoEncryption())
-
-
-class TestTrust:
-    def test_only_what_is_in_the_folder_is_trusted(
-        self, own: OwnCertificate, tmp_path: Path, caplog: pytest.LogCaptureFixture
-    ) -> None:
-        (tmp_path / "readme.txt").write_text("put certificates here")
-        with caplog.at_level(logging.WARNING):
-            trusted = TrustedCertificates(tmp_path)
-        assert "readme.txt" in caplog.text
-        assert trusted.refusal(own.certificate) is not None
-        (tmp_path / "client.pem").write_bytes(own.certificate.public_bytes(Encoding.PEM))
-        assert trusted.refusal(own.certificate) is None
-
-    def test_a_missing_folder_is_a_fault_of_the_site_file(self, tmp_path: Path) -> None:
-        with pytest.raises(FileFaults, match="trusted_dir"):
-            TrustedCertificates(tmp_path / "nowhere")

@@ -22,7 +22,10 @@ from bridge.northbound.passwords import hash_password
 from bridge.project import load_project
 from bridge.service.page import system_facts as page_system
 from bridge.service.page.system_facts import SystemOf, without_secrets
+from bridge.trust import TrustStore
+from bridge.trust.files import thumbprint
 from tests.support import sites
+from tests.support.certificates import CLIENT, make
 
 HASH = "$argon2id$v=19$m=8,t=1,p=1$c2FsdHNhbHRzYWx0$C2zIbrBy8FoEh1bQ+nS6cg"
 _QUOTES = ('"{}"', "'{}'", '"""{}"""', "'''\n{}'''", '"""\\\n  {}"""')
@@ -148,6 +151,22 @@ def test_each_certificate_is_told_whatever_the_others_are(tmp_path: Path) -> Non
     assert told["d-good.der"].subject == "CN=box"
     unread = {name for name, one in told.items() if isinstance(one, UnreadablePart) and one.text}
     assert unread == {"a-malformed.der", "b.txt", "c-folder"}
+
+
+def test_who_was_refused_is_told_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    facts = system(tmp_path, '[opcua]\nlisten = "127.0.0.1:4840"\n')
+    store = TrustStore(tmp_path / "state" / "certificates")
+    store.prepare()
+    stranger, known = make(), make(CLIENT.but(subject="known"))
+    store.keep_rejected([stranger.certificate], "10.0.0.1", 0.0)
+    store.trust(known.certificate)
+    told = {one.of: one for one in facts.certificates() if isinstance(one, CertificateFacts)}
+    assert told["trusted"].subject == "CN=known"
+    refused = told["rejected"]
+    assert (refused.subject, refused.thumbprint) == ("CN=client", thumbprint(stranger.certificate))
+    assert str(refused.wrong) == "it is not trusted"
+    assert [one.is_refused for one in told.values()] == [False, True]
 
 
 def test_a_folder_that_may_not_be_read_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

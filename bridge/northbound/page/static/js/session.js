@@ -11,7 +11,7 @@ export const siteName = signal("");
 export const hasVisitors = signal(false);
 
 const RETRY_MS = 1000;
-const ROLES = ["observer", "operator", "engineer"];
+const ROLES = ["observer", "operator", "engineer", "admin"];
 
 /** True if this tab's user has at least this role. */
 export function may(role) {

@@ -1,7 +1,7 @@
 // Certificates and how long they are valid.
 
 import { classes, html } from "../ui.js";
-import { language, many, maybe, t } from "../texts.js";
+import { language, many, maybe, t, worded } from "../texts.js";
 
 const DAY_MS = 86_400_000;
 const SOON_DAYS = 30;
@@ -13,10 +13,15 @@ export function Certificates({ certificates }) {
       ${certificates.length > 0 && html`<div class="scroll" tabindex="0" role="group" aria-label=${t("system.certificates")}><table class="rows">
         <thead><tr>${["of", "subject", "until", "fingerprint"].map((name) => html`<th scope="col">${t(`system.${name}`)}</th>`)}</tr></thead>
         <tbody>${certificates.map((one) => html`<tr>
-          <td>${maybe(`certificate.${one.of}`) || one.of}</td><td>${one.subject}</td><td><${Until} until=${one.until * 1000} /></td><td class="fingerprint"><code>${one.fingerprint}</code></td></tr>`)}</tbody>
+          <td>${maybe(`certificate.${one.of}`) || one.of}</td><td>${one.subject}${one.wrong && html`<${Refused} one=${one} />`}</td><td><${Until} until=${one.until * 1000} /></td><td class="fingerprint"><code>${one.fingerprint}</code></td></tr>`)}</tbody>
       </table></div>`}
     </section>
   `;
+}
+
+// Trusting is for whoever may write on the box: a session of the page is none of those.
+function Refused({ one }) {
+  return html`<br /><strong class="is-warning">${worded(one.wrong.text, one.wrong.message)}</strong><br /><code>drivebridge certificates trust SITE ${one.thumbprint}</code>`;
 }
 
 function Until({ until }) {

@@ -50,8 +50,8 @@ def test_parameters_are_set_by_engineers_and_by_who_is_let(role: Role, is_let: b
 
 
 def test_roles_go_from_reading_to_setting() -> None:
-    assert Role.OBSERVER < Role.OPERATOR < Role.ENGINEER
-    assert len(Role) == 3
+    assert Role.OBSERVER < Role.OPERATOR < Role.ENGINEER < Role.ADMIN
+    assert len(Role) == 4
 
 
 def test_a_start_without_a_direction_leaves_that_to_the_drive() -> None:

@@ -335,6 +335,8 @@ class OpcUaTable(ListeningTable):
     certificate: str | None = None
     private_key: str | None = None
     trusted_dir: str | None = None
+    shutdown_notice_s: float = Field(2.0, ge=0, le=5, description="0…5 s")
+    return_after_s: float | None = Field(None, ge=0, le=86_400, description="0…86400 s")
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 

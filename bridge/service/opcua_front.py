@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 from collections.abc import Coroutine
 from contextlib import AsyncExitStack
@@ -11,6 +12,7 @@ from bridge.config import load_site
 from bridge.northbound.listening import ListeningSocket
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.view import View
+from bridge.service.front_process import on_end
 from bridge.service.mirrored import required, serve_mirrored
 
 
@@ -27,6 +29,14 @@ def run_opcua(path: Path, signs: int | None, listening: int | None) -> Coroutine
         server = OpcUaServer(mirror, settings, Path(site.site.state_dir), site.site.name, bound)
         await server.start()
         stack.push_async_callback(server.close)
+        on_end(server.announce_end)
+
+        async def give_notice(why: type[BaseException] | None, *_: object) -> None:
+            # Not where the front has failed and is started again.
+            if why is not None and issubclass(why, asyncio.CancelledError):
+                await server.end()
+
+        stack.push_async_exit(give_notice)
         gc.collect()
         gc.freeze()
         gc.enable()

@@ -35,6 +35,7 @@ from bridge.uaserver.quotas import (
     MOST_SUBSCRIPTIONS,
 )
 from bridge.uaserver.routes import MOST_CALLS
+from bridge.uaserver.serverstatus import HEALTHY, UNKNOWN_TIME
 from bridge.uaserver.where import MOST_OPERANDS
 
 _Type = ua.VariantType
@@ -45,6 +46,8 @@ _AT_ONCE: Final = f"{_CAN}OperationLimits_"
 VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_STATUS}SecondsTillShutdown": variant(0, _Type.UInt32),
     f"{_STATUS}ShutdownReason": variant(ua.LocalizedText(), _Type.LocalizedText),
+    "Server_ServiceLevel": variant(HEALTHY, _Type.Byte),
+    "Server_EstimatedReturnTime": variant(UNKNOWN_TIME, _Type.DateTime),
     "Server_Auditing": variant(False, _Type.Boolean),
     f"{_CAN}LocaleIdArray": variant(["en"], _Type.String),
     f"{_CAN}MaxBrowseContinuationPoints": variant(MOST_CONTINUATION_POINTS, _Type.UInt16),

@@ -39,6 +39,7 @@ from bridge.uaserver.monitoring import loop_time
 from bridge.uaserver.publishing import PublishQueue
 from bridge.uaserver.quotas import make_room
 from bridge.uaserver.reading import checked_times, window
+from bridge.uaserver.serverstatus import ServerStatus
 from bridge.uaserver.subscriptions import Subscriptions
 
 _LONGEST_SESSION_MS: Final = 120_000.0
@@ -221,6 +222,7 @@ class InnerServer(InternalServer):
         # Who is let in, and how long one may wait, is decided before asyncua is asked.
         self.max_connections = 10 * MOST_CONNECTIONS
         self.max_pending_activation_seconds = 0
+        self.status = ServerStatus(self.aspace)
         self.subscriptions = Subscriptions(self.aspace)
         # asyncua only looks through it for the subscriptions of a session.
         self.subscription_service = cast("SubscriptionService", self.subscriptions)

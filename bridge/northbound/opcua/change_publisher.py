@@ -11,6 +11,7 @@ from bridge.base.publishing_clock import next_publish
 from bridge.image import Image
 from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.point_values import AllWatched
+from bridge.northbound.opcua.service_level import ServiceLevel
 
 _TAKE: Final = 500
 _BEFORE_YIELD: Final = 20
@@ -19,16 +20,19 @@ _BEFORE_YIELD: Final = 20
 class Publisher:
     """Follows the image for the variables in ``watched``."""
 
-    def __init__(self, image: Image, watched: AllWatched, events: EventSender) -> None:
+    def __init__(self, image: Image, watched: AllWatched, events: EventSender, level: ServiceLevel) -> None:
         self._image = image
         self._watched = watched
         self._events = events
+        self._level = level
         self._guard = Guard("OPC UA publisher")
 
     async def run(self) -> None:
         feed = self._image.feed()
         try:
             while True:
+                with self._guard:
+                    await self._level.look()
                 with self._guard:
                     await self._events.send_waiting()
                 # What changes meanwhile waits for the next look, or a busy image would never let go.

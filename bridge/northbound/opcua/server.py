@@ -24,13 +24,16 @@ from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
+from bridge.northbound.opcua.service_level import ServiceLevel
 from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
+from bridge.text import LANGUAGES, Text, render
 from bridge.uaserver import decoding
 from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
+from bridge.uaserver.languages import Spoken
 from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.session import InnerServer
@@ -65,6 +68,8 @@ class OpcUaServer:
         self._socket = bound
         self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
+        self._inner: InnerServer | None = None
+        self._ending: asyncio.Task[None] | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
         self.port = int(port)
@@ -114,9 +119,33 @@ class OpcUaServer:
         finally:
             deaf.cancel()
 
+    def announce_end(self) -> None:
+        """Tell clients, at once, that the server is going to end; nothing else is changed by that."""
+        if self._inner and self._ending is None:
+            self._ending = asyncio.create_task(self._tell_end(self._inner), name="opcua end")
+
+    async def end(self) -> None:
+        """Give clients the time to go that the site gives them, from the announcement on. Ends at once where
+        there are none."""
+        self.announce_end()
+        if self._ending:
+            await asyncio.gather(self._ending, return_exceptions=True)
+
+    async def _tell_end(self, inner: InnerServer) -> None:
+        settings = self._settings
+        reason = Spoken({one: render(Text.of("opcua.ends"), one) for one in LANGUAGES})
+        await inner.status.announce_end(
+            settings.shutdown_notice_s,
+            reason,
+            lambda: any(one.holder is not None for one in inner.sessions),
+            settings.return_after_s,
+        )
+
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
         self._pulse.stop()
+        if self._ending:
+            self._ending.cancel()
         task, self._publisher = self._publisher, None
         if task:
             task.cancel()
@@ -153,9 +182,9 @@ class OpcUaServer:
         )
         events = self._events(inner, tree)
         inner.subscriptions.prepare()
-        self._server = server
+        self._server, self._inner = server, inner
         await server.start()
-        publisher = Publisher(image, tree.watched, events)
+        publisher = Publisher(image, tree.watched, events, ServiceLevel(image, inner.status))
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()

@@ -38,9 +38,7 @@ class Rig:
     def request(
         self, expires_at: float = math.inf, open_: bool = True, now: float = 0.0, handle: int = 0
     ) -> PublishRequest:
-        made = PublishRequest(
-            expires_at, lambda: open_, self.got.append, self.refused.append, handle=handle
-        )
+        made = PublishRequest(expires_at, lambda: open_, self.got.append, self.refused.append, handle=handle)
         self.queue.put(made, 1, now)
         return made
 

@@ -38,6 +38,10 @@ class Events:
     async def send_waiting(self) -> None: ...
 
 
+class Level:
+    async def look(self) -> None: ...
+
+
 async def test_many_that_watch_one_point_are_told_in_turns_and_of_the_newest_value() -> None:
     turn, number = 0, 1
     told: list[tuple[int, int, int]] = []
@@ -59,9 +63,10 @@ async def test_many_that_watch_one_point_are_told_in_turns_and_of_the_newest_val
     variable = WatchedVariable(watchers, lambda: ua.DataValue(ua.Variant(number, ua.VariantType.UInt16)))
     image: Any = Image()
     events: Any = Events()
+    level: Any = Level()
     running = [
         asyncio.create_task(count_turns()),
-        asyncio.create_task(Publisher(image, {0: {-1: variable}}, events).run()),
+        asyncio.create_task(Publisher(image, {0: {-1: variable}}, events, level).run()),
     ]
     await until(lambda: len(told) >= WATCHERS - 1, "the last one to be told")
     for task in running:

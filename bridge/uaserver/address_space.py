@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from asyncua.server.address_space import AttributeValue, NodeData
+from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.uaserver.library import AttributeIds, ua
 
@@ -19,6 +19,16 @@ def is_empty(held: AttributeValue) -> bool:
     if held.value_callback is not None or (value and value.StatusCode and value.StatusCode.is_bad()):
         return False
     return value is None or value.Value is None or value.Value.Value is None
+
+
+def find_too(space: AddressSpace, find: Callable[[ua.NodeId], NodeData | None]) -> None:
+    """Have the nodes of ``space``, and behind them those that ``find`` makes."""
+    held = space._nodes  # pyright: ignore[reportPrivateUsage]
+    if isinstance(held, Nodes):
+        held.also(find)
+    else:
+        # asyncua puts a mapping of its own there, too, for nodes that it loads when they are asked for.
+        space._nodes = Nodes(held, find)  # pyright: ignore[reportPrivateUsage]
 
 
 class Attributes(Mapping[AttributeIds, AttributeValue]):
@@ -58,7 +68,14 @@ class Nodes(dict[ua.NodeId, NodeData]):
         self, held: Mapping[ua.NodeId, NodeData], find: Callable[[ua.NodeId], NodeData | None]
     ) -> None:
         super().__init__(held)
-        self._find = find
+        self._finders = [find]
+
+    def also(self, find: Callable[[ua.NodeId], NodeData | None]) -> None:
+        """Have those that another ``find`` makes behind these."""
+        self._finders.append(find)
+
+    def _find(self, where: ua.NodeId) -> NodeData | None:
+        return next((found for find in self._finders if (found := find(where)) is not None), None)
 
     def __missing__(self, where: ua.NodeId) -> NodeData:
         found = self._find(where)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 from typing import Final
 
@@ -25,6 +26,7 @@ class BoundServer(LibraryServer):
         self._inner = inner
         self._bound = bound
         self._trusted = trusted
+        self._diagnosing: asyncio.Task[None] | None = None
         self.limits = TransportLimits(_CHUNK, _CHUNK, _MOST_CHUNKS, _CHUNK * _MOST_CHUNKS)
 
     async def start(self) -> None:
@@ -32,6 +34,15 @@ class BoundServer(LibraryServer):
         policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
         await self._inner.start()
         describe(self._inner.aspace)
+        self._inner.diagnostics.install()
+        self._diagnosing = asyncio.create_task(self._inner.diagnostics.run(), name="opcua diagnostics")
         self.bserver = TcpAcceptor(self._inner, self._bound, self.limits)
         self.bserver.set_policies(policies)
         await self.bserver.start()
+
+    async def stop(self) -> None:
+        task, self._diagnosing = self._diagnosing, None
+        if task:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+        await super().stop()

@@ -24,7 +24,7 @@ from typing import Any, Final
 from asyncua.common.utils import Buffer, NotEnoughData
 from asyncua.ua import ua_binary
 
-from bridge.uaserver.library import StatusCodes, UaError, UaStatusCodeError, ua
+from bridge.uaserver.library import InvalidSignature, StatusCodes, UaError, UaStatusCodeError, ua
 
 MOST_ELEMENTS: Final = 30_000
 """Limit for the elements of all arrays in one message that are decoded one by one, while nobody else has a
@@ -32,6 +32,20 @@ turn; a thousand take about 10 ms. Ten thousand operations with arrays of two fi
 MOST_BEFORE_SESSION: Final = 1_000
 """Limit for the messages that open a session, which name a few."""
 
+MALFORMED: Final = (
+    UaError,
+    InvalidSignature,
+    ValueError,
+    TypeError,
+    LookupError,
+    AttributeError,
+    ArithmeticError,
+    RecursionError,
+    struct.error,
+)
+"""Exceptions of asyncua's decoders for bytes that are not OPC UA."""
+
+_TIME_AND_HANDLE: Final = struct.Struct("<qI")
 _MOST_DIMENSIONS: Final = 10
 _LENGTH: Final = struct.Struct("<i")
 _DECODERS: Final = frozenset((ua_binary.struct_from_binary.__code__, ua_binary.nodeid_from_binary.__code__))
@@ -143,3 +157,10 @@ def _checked_shape(reshape: Callable[[Any, list[int]], Any]) -> Callable[[Any, l
         return reshape(flat, dimensions)
 
     return checked
+
+
+def request_handle(header: Buffer) -> int:
+    """Handle of a RequestHeader of which nothing else need be sound. Raises for one that ends before it."""
+    ua_binary.nodeid_from_binary(header)
+    _, handle = _TIME_AND_HANDLE.unpack(header.read(_TIME_AND_HANDLE.size))
+    return int(handle)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections import Counter
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from itertools import count
 from typing import Final, TypeVar
 
@@ -235,7 +236,9 @@ class MonitoredItems:
         if isinstance(item, EventItem):
             self._event_items.change(item.share, -item.filter.weight)
         else:
-            self._space.delete_datachange_callback(item.handle)
+            # A node of the diagnostics goes with its session.
+            with suppress(KeyError):
+                self._space.delete_datachange_callback(item.handle)
             self._watching[item.share] -= 1
             if not self._watching[item.share]:
                 del self._watching[item.share]

@@ -63,7 +63,7 @@ VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_CAN}MaxSelectClauseParameters": variant(MOST_FIELDS, _Type.UInt32),
     f"{_CAN}MaxWhereClauseParameters": variant(MOST_OPERANDS, _Type.UInt32),
     f"{_AT_ONCE}MaxNodesPerMethodCall": variant(MOST_CALLS, _Type.UInt32),
-    "Server_ServerDiagnostics_EnabledFlag": variant(False, _Type.Boolean),
+    "Server_ServerDiagnostics_EnabledFlag": variant(True, _Type.Boolean),
     "Server_ServerRedundancy_RedundancySupport": variant(ua.RedundancySupport.None_, _Type.Int32),
 }
 """Values by the names of the nodes."""

@@ -118,6 +118,10 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
 }
 """Services by service set, in the order of Part 4 §5."""
 
+NAMES: Final[Mapping[ua.NodeId, str]] = {
+    request_type(service.name): service.name for services in SERVICES.values() for service in services
+}
+
 REFUSED: Final[Mapping[ua.NodeId, int]] = {
     request_type(service.name): service.refused
     for services in SERVICES.values()

@@ -22,6 +22,9 @@ from bridge.base.guard import Guard
 from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
 from bridge.uaserver.browsing import Browser
 from bridge.uaserver.connection_limits import MOST_CONNECTIONS
+from bridge.uaserver.counts import RequestCounts, ServerCounts
+from bridge.uaserver.diagnosticnodes import DiagnosticNodes
+from bridge.uaserver.diagnostics import SessionFacts
 from bridge.uaserver.encoding import Results
 from bridge.uaserver.library import (
     AttributeIds,
@@ -40,6 +43,7 @@ from bridge.uaserver.publishing import PublishQueue
 from bridge.uaserver.quotas import make_room
 from bridge.uaserver.reading import checked_times, window
 from bridge.uaserver.serverstatus import ServerStatus
+from bridge.uaserver.subscription import Subscription
 from bridge.uaserver.subscriptions import Subscriptions
 
 _LONGEST_SESSION_MS: Final = 120_000.0
@@ -53,6 +57,7 @@ _READ: Final = 1
 _OBSERVER_ACCESS: Final = data_value(variant(_READ, ua.VariantType.Byte))
 _OBSERVER_EXECUTABLE: Final = data_value(variant(False, ua.VariantType.Boolean))
 _NOTHING: Final = variant(None, ua.VariantType.Null)
+_NOT_FOR_HIM: Final = data_value(_NOTHING, status(StatusCodes.BadUserAccessDenied))
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
 
 
@@ -82,6 +87,8 @@ class Session(InternalSession):
         """Largest answer that its client accepts on that connection, in bytes."""
         self.left_at = 0.0
         """Monotonic time at which it lost its last connection."""
+        self.counts = RequestCounts()
+        self.facts = SessionFacts()
         self.locales: Sequence[str] = ()
         """LocaleIds of its client, the preferred one first."""
         self.admitted: UserIdentity | None = None
@@ -101,6 +108,8 @@ class Session(InternalSession):
         if math.isnan(get(params, "RequestedSessionTimeout")):
             # asyncua's `min` and `max` let it pass, and the session would never end.
             change(params, RequestedSessionTimeout=0.0)
+        self.facts = SessionFacts.of(params)
+        self._server.counts.sessions += 1
         return await super().create_session(params, sockname)
 
     def activate_session(
@@ -113,6 +122,8 @@ class Session(InternalSession):
         if not admitted.is_same(self.identity):
             self._tell(is_there=False)  # for the user before
         self.identity = admitted
+        mechanism = type(get(params, "UserIdentityToken")).__name__.removesuffix("IdentityToken")
+        self.facts.note_user(admitted.name, mechanism)
         # Part 4 §5.6.3: who names none later on keeps those that he has named.
         self.locales = (get(params, "LocaleIds") or self.locales)[:_MOST_LOCALES]
         self._tell(is_there=True)
@@ -162,6 +173,9 @@ class Session(InternalSession):
         """``value`` as this user may see it."""
         attribute = get(wanted, "AttributeId")
         if attribute == AttributeIds.Value:
+            may_see_all = self.application.may_diagnose(self.identity)
+            if self._server.diagnostics.is_hidden(get(wanted, "NodeId"), self, may_see_all=may_see_all):
+                return _NOT_FOR_HIM
             node = self.aspace.get(get(wanted, "NodeId"))
             access = node.attributes.get(AttributeIds.AccessLevel) if node else None
             held = access.value.Value if access and access.value else None
@@ -189,6 +203,7 @@ class Session(InternalSession):
         while self.state is not SessionState.Closed:
             left_s = (self.session_timeout or 0.0) + self._last_activity - loop_time()
             if left_s <= 0:
+                self._server.counts.sessions_timed_out += 1
                 await self.close_session(delete_subs=False)
                 return
             await asyncio.sleep(left_s)
@@ -226,6 +241,15 @@ class InnerServer(InternalServer):
         self.subscriptions = Subscriptions(self.aspace)
         # asyncua only looks through it for the subscriptions of a session.
         self.subscription_service = cast("SubscriptionService", self.subscriptions)
+        self.diagnostics = DiagnosticNodes(self.aspace, self)
+
+    @property
+    def counts(self) -> ServerCounts:
+        return self.subscriptions.counts
+
+    @property
+    def diagnosed_subscriptions(self) -> dict[int, Subscription]:
+        return self.subscriptions.subscriptions
 
     def create_session(self, name: str, user: User | None = None, external: bool = False) -> InternalSession:
         return Session(self, self.aspace, self.subscription_service, name)

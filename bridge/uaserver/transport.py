@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import struct
 from collections import deque
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from typing import Any, Final
 
 from asyncua.common.connection import TransportLimits
@@ -39,7 +39,6 @@ from bridge.uaserver.library import (
     InvalidSignature,
     ServiceError,
     StatusCodes,
-    UaError,
     UaStatusCodeError,
     first_certificate,
     get,
@@ -50,14 +49,13 @@ from bridge.uaserver.library import (
 from bridge.uaserver.quotas import make_room_for_session
 from bridge.uaserver.routes import ROUTES, Route, ServiceRequest
 from bridge.uaserver.security import SecureChannel
-from bridge.uaserver.services import REFUSED, request_type
+from bridge.uaserver.services import NAMES, REFUSED, request_type
 from bridge.uaserver.session import InnerServer, Session
 from bridge.uaserver.states import REFUSALS, Need, RequestSession, need_of
 
 _SLOW: Final = (request_type("Write"), request_type("Call"))
 """Services that may take seconds."""
 
-_TIME_AND_HANDLE: Final = struct.Struct("<qI")
 _ERROR: Final[Any] = ua.MessageType.Error
 _MOST_WAITING: Final = 32
 _LEAST_BUFFER: Final = 8192
@@ -67,19 +65,6 @@ MOST_BEFORE_SESSION: Final = 256 * 1024
 _MOST_UNDER_WAY: Final = 16 * 1024 * 1024
 """Bytes of messages that may wait for their turn, and of answers for a client to read them."""
 _MALFORMED_KIND: Final = "malformed messages"
-
-_MALFORMED: Final = (
-    UaError,
-    InvalidSignature,
-    ValueError,
-    TypeError,
-    LookupError,
-    AttributeError,
-    ArithmeticError,
-    RecursionError,
-    struct.error,
-)
-"""Exceptions of asyncua's decoders for bytes that are not OPC UA."""
 
 
 class Processor(UaProcessor):
@@ -158,7 +143,7 @@ class Processor(UaProcessor):
             code = int(error.code)
             is_too_large = code == StatusCodes.BadRequestTooLarge
             self._count(is_broken=is_too_large)
-        except _MALFORMED as error:
+        except decoding.MALFORMED as error:
             self._count(is_broken=True)
             tell(_MALFORMED_KIND, self._source, f"connection closed: {error!r}")
             code = StatusCodes.BadSecurityChecksFailed
@@ -190,8 +175,8 @@ class Processor(UaProcessor):
         header = body.copy()
         try:
             requesthdr = struct_from_binary(ua.RequestHeader, body)
-        except _MALFORMED as error:
-            self._refuse(_request_handle(header), seqhdr, self._fault(error))
+        except decoding.MALFORMED as error:
+            self._refuse(decoding.request_handle(header), seqhdr, self._fault(error))
             return True
         if typeid not in _SLOW:
             try:
@@ -211,13 +196,26 @@ class Processor(UaProcessor):
     async def _serve(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
         """Carry out a request. Whatever is wrong with it is its answer, and ends nothing."""
         try:
-            return bool(await self._process_message(typeid, requesthdr, seqhdr, body))
+            goes_on = bool(await self._process_message(typeid, requesthdr, seqhdr, body))
+            self._note(typeid, StatusCodes.Good)
+            return goes_on
         except (ServiceError, UaStatusCodeError) as error:
             code = int(error.code)
         except Exception as error:  # noqa: BLE001 - asyncua logs a traceback for each
             code = self._fault(error)
+        self._note(typeid, code)
         self._refuse(requesthdr.RequestHandle, seqhdr, code)
         return True
+
+    def _note(self, typeid: ua.NodeId, code: int) -> None:
+        """Count a request for the diagnostics."""
+        if code:
+            is_of_session = need_of(typeid) in (Need.CREATE, Need.ACTIVATE)
+            self._server.counts.refuse(code, of_session=is_of_session)
+        session = self.session
+        if isinstance(session, Session) and session.holder is self and typeid in NAMES:
+            session.counts.note(NAMES[typeid], code)
+            session.facts.seen_at = datetime.now(UTC)
 
     def _refuse(self, handle: int, seqhdr: Any, code: int) -> None:
         fault = ua.ServiceFault()
@@ -293,6 +291,8 @@ class Processor(UaProcessor):
 
     def _hold(self, session: Session) -> None:
         session.holder, session.most_bytes = self, self._limits.max_message_size
+        policy = self._connection.security_policy
+        session.facts.mode, session.facts.policy_uri = policy.Mode, policy.URI
 
     async def _session_watchdog_loop(self) -> None:
         """Not needed: a session watches its own time-out, or ends with the connection it was made on.
@@ -397,10 +397,3 @@ class Processor(UaProcessor):
             )
             raise ServiceError(StatusCodes.BadIdentityChangeNotSupported)
         return who
-
-
-def _request_handle(header: Buffer) -> int:
-    """Handle of a RequestHeader of which nothing else need be sound. Raises for one that ends before it."""
-    nodeid_from_binary(header)
-    _, handle = _TIME_AND_HANDLE.unpack(header.read(_TIME_AND_HANDLE.size))
-    return int(handle)

@@ -72,6 +72,9 @@ class Backend(ServedApplication[SessionUser]):
             least = self._writer.least_role(where)
         return user.identity.role >= (Role.OPERATOR if least is None else least)
 
+    def may_diagnose(self, user: SessionUser) -> bool:
+        return user.identity.role >= Role.ENGINEER
+
     async def write(self, user: SessionUser, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
         return await self._writer.write(user.identity, writes)
 

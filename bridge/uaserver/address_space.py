@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, Protocol
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.uaserver.library import AttributeIds, ua
 
-Callbacks = dict[int, Callable[..., Any]]
-"""Callbacks for a change, by handle."""
+
+class Watcher(Protocol):
+    """Callback for a change, which asyncua awaits. ``told`` does the same at once."""
+
+    def told(self, value: ua.DataValue, now: float) -> None: ...
+
+    async def __call__(self, handle: int, value: ua.DataValue) -> None: ...
+
+
+Watchers = dict[int, Watcher]
+"""Watchers of one attribute, by handle."""
 
 
 def is_empty(held: AttributeValue) -> bool:

@@ -18,7 +18,7 @@ from typing import Any, Final
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.base.guard import Guard
-from bridge.uaserver.address_space import Callbacks, find_too
+from bridge.uaserver.address_space import Watchers, find_too
 from bridge.uaserver.diagnostics import (
     security_diagnostics,
     session_diagnostics,
@@ -44,6 +44,7 @@ from bridge.uaserver.library import AttributeIds, ObjectIds, data_value, get, no
 _LOOK_EVERY_S: Final = 1.0
 _SUMMARY: Final = ObjectIds.Server_ServerDiagnostics_ServerDiagnosticsSummary
 _SESSIONS: Final = ObjectIds.Server_ServerDiagnostics_SessionsDiagnosticsSummary
+_ALL: Final = (ALL_SESSIONS, ALL_SECURITY, ALL_SUBSCRIPTIONS)
 _COMPONENT: Final = node_id(ObjectIds.HasComponent)
 _Type = ua.VariantType
 
@@ -74,17 +75,20 @@ class DiagnosticNodes:
         self._sources = sources
         self._shapes = Shapes(space, sources)
         self._guard = Guard("OPC UA diagnostics")
-        self._watched: dict[ua.NodeId, Callbacks] = {}
+        self._watched: dict[ua.NodeId, Watchers] = {}
+
+    @staticmethod
+    def is_about_someone(where: ua.NodeId) -> bool:
+        """Whether its value is about a session or a subscription: those of ``is_hidden``."""
+        return where.Identifier in _ALL if where.NamespaceIndex == 0 else bool(path_of(where))
 
     def is_hidden(self, where: ua.NodeId, session: Session, *, may_see_all: bool) -> bool:
-        """Whether the value of ``where`` is not for this session."""
+        """Whether a value that is about someone is not for this session."""
         is_encrypted = session.channel_certificate is not None
         if where.NamespaceIndex == 0:
-            is_for_all = where.Identifier not in (ALL_SESSIONS, ALL_SECURITY, ALL_SUBSCRIPTIONS)
-            needs_secrecy = where.Identifier == ALL_SECURITY
-            return not is_for_all and (not may_see_all or (needs_secrecy and not is_encrypted))
+            return not may_see_all or (where.Identifier == ALL_SECURITY and not is_encrypted)
         owner, _, rest = path_of(where).partition("/")
-        if not owner or owner == session.label:
+        if owner == session.label:
             return False
         if owner == SUBSCRIPTION:
             found = self._shapes.subscription(rest.partition("/")[0])
@@ -189,17 +193,17 @@ class DiagnosticNodes:
         """Tell who watches one of them what it has now, until cancelled."""
         while True:
             await asyncio.sleep(_LOOK_EVERY_S)
-            for where, callbacks in list(self._watched.items()):
-                if callbacks:
+            for where, watchers in list(self._watched.items()):
+                if watchers:
                     with self._guard:
-                        await self._tell(where, callbacks)
-                if where.NamespaceIndex and (not callbacks or where not in self._space):
+                        await self._tell(where, watchers)
+                if where.NamespaceIndex and (not watchers or where not in self._space):
                     del self._watched[where]
 
-    async def _tell(self, where: ua.NodeId, callbacks: Callbacks) -> None:
+    async def _tell(self, where: ua.NodeId, watchers: Watchers) -> None:
         value = self._space.read_attribute_value(where, AttributeIds.Value)
-        for handle, tell in list(callbacks.items()):
-            await tell(handle, value)
+        for handle, watcher in list(watchers.items()):
+            await watcher(handle, value)
             await asyncio.sleep(0)
 
 

@@ -15,7 +15,10 @@ from typing import Any, Final
 
 from asyncua.ua.ua_binary import struct_to_binary
 
-from bridge.uaserver.library import ServiceError, StatusCodes, ua
+from bridge.uaserver.library import ServiceError, StatusCodes, UaError, ua
+
+UNSENDABLE: Final = (UaError, ValueError, TypeError, AttributeError, struct.error)
+"""Exceptions of asyncua's encoder for a value that is not of its type."""
 
 _TURN_BYTES: Final = 16 * 1024
 """Bytes that are encoded before others have their turn; a few milliseconds."""

@@ -185,11 +185,9 @@ class ValueItem:
         gone = lost if settings.discard_oldest else 0
         self._released = min(max(0, self._released - gone), len(kept))
 
-    def notification(self) -> ua.MonitoredItemNotification:
+    def take(self) -> ua.DataValue:
         """The next in the queue, which is taken off it."""
-        value = self.window.timed(self._pop())
-        handle = self.settings.client_handle
-        return make(ua.MonitoredItemNotification, ClientHandle=handle, Value=value)
+        return self.window.timed(self._pop())
 
 
 def _overflown(value: ua.DataValue) -> ua.DataValue:

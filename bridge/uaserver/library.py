@@ -7,6 +7,7 @@ asyncua's generated classes ask for ``UInt32`` and ``DateTime`` where they take 
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import datetime
 from typing import Any, Final, TypeVar
 
 from asyncua import ua as ua
@@ -29,12 +30,39 @@ variant: Callable[..., ua.Variant] = ua.Variant
 data_value: Callable[..., ua.DataValue] = ua.DataValue
 """(value, status, source time, server time)"""
 
+notification: Callable[[int, ua.DataValue], ua.MonitoredItemNotification] = ua.MonitoredItemNotification
+"""(client handle, value)"""
+
+extension: Callable[..., ua.ExtensionObject] = ua.ExtensionObject
+"""(type, body)"""
+
 node_id: Callable[..., ua.NodeId] = ua.NodeId
 """(identifier, namespace index)"""
 
 GOOD: Final = status(StatusCodes.Good)
 
 _T = TypeVar("_T")
+
+_new: Final = object.__new__
+
+
+def scalar(value: object, kind: ua.VariantType) -> ua.Variant:
+    """A single value of this type. asyncua's constructor, which finds out what it is given, takes as long as
+    all else that is done for a value that has changed."""
+    made = _new(ua.Variant)
+    made.Value, made.VariantType, made.is_array, made.Dimensions = value, kind, False, None
+    return made
+
+
+def stamped(
+    value: ua.Variant, code: ua.StatusCode, source: datetime | None, server: datetime | None
+) -> ua.DataValue:
+    """A DataValue, made as ``scalar`` makes values."""
+    made: Any = _new(ua.DataValue)
+    made.Encoding, made.Value, made.StatusCode = 0, value, code
+    made.SourceTimestamp, made.ServerTimestamp = source, server
+    made.SourcePicoseconds = made.ServerPicoseconds = None
+    return made
 
 
 def make(structure: Callable[..., _T], **fields: object) -> _T:

@@ -147,20 +147,15 @@ class MonitoredItems:
 
     def _watch(self, subscription: Subscription, item: ValueItem) -> None:
         """Have the item told of every change, and of what there is now."""
-
-        async def tell(_handle: int, value: ua.DataValue) -> None:
-            is_queued = item.change(subscription.owner.seen(item.target, value), loop_time())
-            subscription.noticed(item, is_queued=is_queued)
-
         where = get(item.target, "NodeId"), get(item.target, "AttributeId")
-        _, item.handle = get(self._space, "add_datachange_callback")(*where, tell)
+        watcher = _ItemWatcher(subscription, item)
+        _, item.handle = get(self._space, "add_datachange_callback")(*where, watcher)
         self._watching[item.share] += 1
         self._look(subscription, item)
 
     def _look(self, subscription: Subscription, item: ValueItem) -> None:
         value = self._space.read_attribute_value(get(item.target, "NodeId"), get(item.target, "AttributeId"))
-        is_queued = item.change(subscription.owner.seen(item.target, value), loop_time())
-        subscription.noticed(item, is_queued=is_queued)
+        _ItemWatcher(subscription, item).told(value, loop_time())
 
     def modify(
         self, found: Subscription, params: ua.ModifyMonitoredItemsParameters
@@ -242,6 +237,27 @@ class MonitoredItems:
             self._watching[item.share] -= 1
             if not self._watching[item.share]:
                 del self._watching[item.share]
+
+
+class _ItemWatcher:
+    """Tells ``item`` of each value of what it watches."""
+
+    __slots__ = ("_item", "_looks_alike", "_subscription")
+
+    def __init__(self, subscription: Subscription, item: ValueItem) -> None:
+        self._subscription = subscription
+        self._item = item
+        self._looks_alike = subscription.owner.looks_alike(item.target)
+
+    def told(self, value: ua.DataValue, now: float) -> None:
+        item, subscription = self._item, self._subscription
+        if not self._looks_alike:
+            value = subscription.owner.seen(item.target, value)
+        is_queued = item.change(value, now)
+        subscription.noticed(item, is_queued=is_queued)
+
+    async def __call__(self, handle: int, value: ua.DataValue) -> None:
+        self.told(value, loop_time())
 
 
 def loop_time() -> float:

@@ -30,7 +30,7 @@ class PublishRequest:
     most_bytes: int = MOST_BYTES
     """Approximate size of the notifications: the last one may go beyond it."""
     handle: int = 0
-    """Name that its client has given it, for a Cancel, too."""
+    """Handle that its client has given it, and names in a Cancel."""
     results: list[ua.StatusCode] = field(default_factory=list[ua.StatusCode])
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import inspect
 import logging
-import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -20,8 +19,8 @@ from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import struct_from_binary
 
 from bridge.uaserver.browsing import Browser
-from bridge.uaserver.encoding import Results
-from bridge.uaserver.library import ServiceError, StatusCodes, UaError, change, get, make, status, ua
+from bridge.uaserver.encoding import UNSENDABLE, Results
+from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.uaserver.monitoring import MonitoredItems, loop_time
 from bridge.uaserver.publishing import MOST_BYTES, PublishRequest
 from bridge.uaserver.services import request_type
@@ -33,8 +32,6 @@ MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100
 
 _log = logging.getLogger(__name__)
-
-_UNSENDABLE: Final = (UaError, ValueError, TypeError, AttributeError, struct.error)
 
 _Act = Callable[[Session, Any], Any]
 """Given the session and the parameters of the request."""
@@ -174,7 +171,7 @@ def _publish(session: Session, params: ua.PublishParameters, request: ServiceReq
             request.send(make(ua.PublishResponse, Parameters=result))
         except ServiceError as error:
             refuse(int(error.code))
-        except _UNSENDABLE as error:
+        except UNSENDABLE as error:
             _log.warning("a message of a subscription cannot be sent: %r", error)
             refuse(StatusCodes.BadEncodingError)
 

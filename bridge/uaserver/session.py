@@ -54,8 +54,11 @@ _NAME_BYTES: Final = 4
 _MOST_LOCALES: Final = 10
 _READ: Final = 1
 """Bit of an access level."""
-_OBSERVER_ACCESS: Final = data_value(variant(_READ, ua.VariantType.Byte))
-_OBSERVER_EXECUTABLE: Final = data_value(variant(False, ua.VariantType.Boolean))
+_BY_USER: Final = {
+    AttributeIds.UserAccessLevel: data_value(variant(_READ, ua.VariantType.Byte)),
+    AttributeIds.UserExecutable: data_value(variant(False, ua.VariantType.Boolean)),
+}
+"""Attributes that depend on who looks, as they are for who may only read."""
 _NOTHING: Final = variant(None, ua.VariantType.Null)
 _NOT_FOR_HIM: Final = data_value(_NOTHING, status(StatusCodes.BadUserAccessDenied))
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
@@ -169,28 +172,37 @@ class Session(InternalSession):
         value = self.aspace.read_attribute_value(get(wanted, "NodeId"), get(wanted, "AttributeId"))
         return looked_at.timed(looked_at.part(self.seen(wanted, value)))
 
-    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
-        """``value`` as this user may see it."""
+    def looks_alike(self, wanted: ua.ReadValueId) -> bool:
+        """Whether everybody sees the same of it: its values as they are."""
         attribute = get(wanted, "AttributeId")
         if attribute == AttributeIds.Value:
-            may_see_all = self.application.may_diagnose(self.identity)
-            if self._server.diagnostics.is_hidden(get(wanted, "NodeId"), self, may_see_all=may_see_all):
+            where = get(wanted, "NodeId")
+            return self._is_readable(where) and not self._server.diagnostics.is_about_someone(where)
+        return attribute not in _BY_USER
+
+    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
+        """``value`` as this user may see it."""
+        where, attribute = get(wanted, "NodeId"), get(wanted, "AttributeId")
+        if attribute == AttributeIds.Value:
+            if self._is_hidden(where):
                 return _NOT_FOR_HIM
-            node = self.aspace.get(get(wanted, "NodeId"))
-            access = node.attributes.get(AttributeIds.AccessLevel) if node else None
-            held = access.value.Value if access and access.value else None
-            return value if held is None or held.Value & _READ else _NOT_READABLE
-        if (
-            value.Value is None
-            or not value.Value.Value
-            or self.application.may(self.identity, get(wanted, "NodeId"))
-        ):
+            return value if self._is_readable(where) else _NOT_READABLE
+        held = value.Value
+        if attribute not in _BY_USER or held is None or not held.Value:
             return value
-        if attribute == AttributeIds.UserAccessLevel:
-            return _OBSERVER_ACCESS
-        if attribute == AttributeIds.UserExecutable:
-            return _OBSERVER_EXECUTABLE
-        return value
+        return value if self.application.may(self.identity, where) else _BY_USER[attribute]
+
+    def _is_hidden(self, where: ua.NodeId) -> bool:
+        diagnostics = self._server.diagnostics
+        if not diagnostics.is_about_someone(where):
+            return False
+        return diagnostics.is_hidden(where, self, may_see_all=self.application.may_diagnose(self.identity))
+
+    def _is_readable(self, where: ua.NodeId) -> bool:
+        node = self.aspace.get(where)
+        access = node.attributes.get(AttributeIds.AccessLevel) if node else None
+        held = access.value.Value if access and access.value else None
+        return held is None or bool(held.Value & _READ)
 
     async def subscribe(self, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
         self.subscriptions.drop_left_behind()

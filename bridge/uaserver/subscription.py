@@ -5,7 +5,7 @@ Of time it knows what ``on_cycle`` is told; ``subscriptions`` has the timer.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -14,7 +14,9 @@ from bridge.uaserver.counts import SubscriptionCounts
 from bridge.uaserver.encoding import weight
 from bridge.uaserver.eventfilter import Occurrence
 from bridge.uaserver.items import EventItem, Item, ValueItem
+from bridge.uaserver.languages import speaking
 from bridge.uaserver.library import ServiceError, StatusCodes, get, make, status, ua
+from bridge.uaserver.notifications import change, changes
 from bridge.uaserver.publishing import PublishQueue, PublishRequest
 from bridge.uaserver.triggering import TriggeringLinks
 
@@ -65,6 +67,7 @@ class SubscriptionOwner(Protocol):
 
     session_id: ua.NodeId
     address: str
+    locales: Sequence[str]
     identity: UserIdentity
     channel_certificate: bytes | None
     publishing: PublishQueue
@@ -74,6 +77,10 @@ class SubscriptionOwner(Protocol):
     @property
     def is_gone(self) -> bool:
         """Whether the session has ended. Its subscriptions may be transferred as long as they live."""
+        ...
+
+    def looks_alike(self, wanted: ua.ReadValueId) -> bool:
+        """Whether everybody sees the same of it: its values as they are."""
         ...
 
     def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
@@ -220,10 +227,11 @@ class Subscription:
     # messages
 
     def publish(self, request: PublishRequest) -> bool:
-        values, events = self._collect(request.most_bytes) if self._enabled else ([], [])
+        with speaking(self.owner.locales):
+            values, events = self._collect(request.most_bytes) if self._enabled else ([], [])
         data: list[object] = []
         if values:
-            data.append(make(ua.DataChangeNotification, MonitoredItems=values))
+            data.append(changes(values))
         if events:
             data.append(make(ua.EventNotificationList, Events=events))
         message = make(ua.NotificationMessage, SequenceNumber=self._sequence, NotificationData=data)
@@ -246,17 +254,17 @@ class Subscription:
         )
         return more
 
-    def _collect(self, most_bytes: int) -> tuple[list[ua.MonitoredItemNotification], list[ua.EventFieldList]]:
-        """Notifications for one message, as many as go into it."""
-        values: list[ua.MonitoredItemNotification] = []
+    def _collect(self, most_bytes: int) -> tuple[list[bytes], list[ua.EventFieldList]]:
+        """Notifications for one message, as many as go into it; those of values are encoded."""
+        values: list[bytes] = []
         events: list[ua.EventFieldList] = []
         left, bytes_left = self.terms.most_per_message, most_bytes
         for item in list(self._reporting()):
             while left and item.has_report:
                 left -= 1
                 if isinstance(item, ValueItem):
-                    values.append(item.notification())
-                    bytes_left -= weight(get(values[-1], "Value").Value)
+                    values.append(change(item.settings.client_handle, item.take()))
+                    bytes_left -= len(values[-1])
                 else:
                     events.append(item.notification())
                     bytes_left -= weight(get(events[-1], "EventFields"))

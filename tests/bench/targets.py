@@ -188,6 +188,18 @@ TARGETS: Sequence[Target] = (
         most=75,
         unit=" ms",
     ),
+    Target(
+        "OPC UA: 2,000 values at 10 Hz to node-opcua, changes per CPU second beside plain asyncua",
+        _number("opcua: changes per CPU second, times asyncua's"),
+        least=4,
+        unit=" ×",
+    ),
+    Target(
+        "OPC UA: 5,000 values at 2 Hz to five clients, changes told",
+        _number("opcua: 5,000 values at 2 Hz to five clients, % told"),
+        least=99,
+        unit=" %",
+    ),
     Target("FC16 → RPDO under the front's worst load, p50", _under_load("p50_ms"), most=1, unit=" ms"),
     Target("the same, p99", _under_load("p99_ms"), most=4, unit=" ms"),
     Target("PDOs that ours lost end to end, at all rates", _lost, most=0),

@@ -6,15 +6,17 @@ import asyncio
 from collections.abc import Sequence
 from typing import Final
 
+from bridge.base import clock
 from bridge.base.guard import Guard
 from bridge.base.publishing_clock import next_publish
 from bridge.image import Image
 from bridge.northbound.opcua.events import EventSender
-from bridge.northbound.opcua.point_values import AllWatched
+from bridge.northbound.opcua.point_values import AllWatched, WatchedVariable
 from bridge.northbound.opcua.service_level import ServiceLevel
 
 _TAKE: Final = 500
-_BEFORE_YIELD: Final = 20
+_TURN_S: Final = 0.001
+"""Time in seconds after which others have their turn."""
 
 
 class Publisher:
@@ -26,6 +28,7 @@ class Publisher:
         self._events = events
         self._level = level
         self._guard = Guard("OPC UA publisher")
+        self._turn_ends = 0.0
 
     async def run(self) -> None:
         feed = self._image.feed()
@@ -47,23 +50,30 @@ class Publisher:
             self._image.drop_feed(feed)
 
     async def _publish(self, indices: Sequence[int]) -> None:
-        sent = 0
+        self._begin_turn()
         for index in indices:
             for _, variable in sorted(self._watched.get(index, {}).items()):
-                watchers = variable.callbacks
-                if not watchers:
-                    continue
-                with self._guard:
-                    value = variable.read()
-                    for handle, tell in list(watchers.items()):
-                        if handle not in watchers:  # deleted while others had their turn
-                            continue
-                        with self._guard:
-                            await tell(handle, value)
-                        sent += 1
-                        if sent >= _BEFORE_YIELD:
-                            sent = 0
-                            await asyncio.sleep(0)
-                            # Who was told a newer one meanwhile must not be told an older one now.
-                            value = variable.read()
+                if variable.watchers:
+                    with self._guard:
+                        await self._tell(variable)
         await asyncio.sleep(0)
+
+    async def _tell(self, variable: WatchedVariable) -> None:
+        watchers = variable.watchers
+        value = variable.read()
+        for handle, watcher in list(watchers.items()):
+            if handle not in watchers:  # deleted while others had their turn
+                continue
+            now = clock.now()
+            if now >= self._turn_ends:
+                await asyncio.sleep(0)
+                now = self._begin_turn()
+                # Who was told a newer one meanwhile must not be told an older one now.
+                value = variable.read()
+            with self._guard:
+                watcher.told(value, now)
+
+    def _begin_turn(self) -> float:
+        now = clock.now()
+        self._turn_ends = now + _TURN_S
+        return now

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
+from functools import lru_cache
 from typing import Final
 
 from bridge.command import Rejection
 from bridge.command.messages.request import Code, Identity, Outcome
 from bridge.image import DataType, Image, Point, Quality, Reading, Value
 from bridge.text import Text
-from bridge.uaserver.library import GOOD, StatusCodes, data_value, status, ua, variant
+from bridge.uaserver.library import GOOD, StatusCodes, scalar, stamped, status, ua, variant
 
 EpochNs = Callable[[float], int]
 
@@ -126,26 +128,34 @@ def _cut(value: Value) -> Value:
     return value[:_LONGEST] if isinstance(value, str) else value
 
 
+@lru_cache(maxsize=256)
 def source_time(epoch_ns: int) -> datetime:
-    """A time in ns since 1970 as OPC UA's DateTime, to the microsecond."""
+    """A time in ns since 1970 as OPC UA's DateTime, to the microsecond. What changes together has the
+    same."""
     return datetime.fromtimestamp(epoch_ns / 1e9, UTC)
+
+
+@lru_cache(maxsize=2)
+def _server_time(epoch_ms: int) -> datetime:
+    """A time that all have which are looked at together."""
+    return datetime.fromtimestamp(epoch_ms / 1000, UTC)
 
 
 def reading_value(
     reading: Reading, variant_type: ua.VariantType, epoch_ns: int, bit: int | None = None
 ) -> ua.DataValue:
-    """``reading`` for a client, or with ``bit`` that bit of it. The server's time is now."""
+    """``reading`` for a client, or with ``bit`` that bit of it. The server's time is now, in milliseconds."""
     quality = reading.quality
     code = QUALITY_STATUS[quality]
     if code.is_bad():
         value = _NO_VALUE
     elif bit is None:
-        value = variant(reading.value, variant_type)
+        value = scalar(reading.value, variant_type)
     else:
         value = _BITS[int(reading.value) >> bit & 1]
     # A point that has never had a value has no source time either.
     stamp = None if quality is Quality.WAITING else source_time(epoch_ns)
-    return data_value(value, code, stamp, datetime.now(UTC))
+    return stamped(value, code, stamp, _server_time(int(time.time() * 1000)))
 
 
 def present_value(

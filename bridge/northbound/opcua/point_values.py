@@ -12,7 +12,7 @@ from bridge.image import Image
 from bridge.northbound.opcua.data_values import EpochNs, present_value
 from bridge.northbound.opcua.nodes import VariableNode
 from bridge.northbound.opcua.structures import value_type
-from bridge.uaserver.address_space import Callbacks
+from bridge.uaserver.address_space import Watchers
 from bridge.uaserver.library import ua
 
 _WHOLE_POINT: Final = -1
@@ -22,7 +22,7 @@ _WHOLE_POINT: Final = -1
 class WatchedVariable:
     """A variable that is watched, or was once, and how to read it."""
 
-    callbacks: Callbacks
+    watchers: Watchers
     read: Callable[[], ua.DataValue]
 
 
@@ -50,8 +50,8 @@ class PointValue(AttributeValue):
     value_callback = read  # pyright: ignore[reportAssignmentType]
 
     @property
-    def datachange_callbacks(self) -> Callbacks:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def datachange_callbacks(self) -> Watchers:  # pyright: ignore[reportIncompatibleVariableOverride]
         node = self._node
         place = _WHOLE_POINT if node.bit is None else node.bit
         of_point = self._watched.setdefault(node.index, {})
-        return of_point.setdefault(place, WatchedVariable({}, self.read)).callbacks
+        return of_point.setdefault(place, WatchedVariable({}, self.read)).watchers

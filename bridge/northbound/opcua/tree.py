@@ -18,7 +18,7 @@ from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
 from bridge.northbound.opcua.point_values import AllWatched, PointValue
 from bridge.northbound.opcua.structures import PropertyNode, property_nodes
-from bridge.uaserver.address_space import Attributes, Callbacks, Nodes
+from bridge.uaserver.address_space import Attributes, Nodes, Watchers
 from bridge.uaserver.library import AttributeIds, ObjectIds, get, node_id, ua
 
 _ORGANIZES: Final = node_id(ObjectIds.Organizes)
@@ -127,8 +127,8 @@ class Tree:
         self.to_server = reference_to(space, ObjectIds.Server, ObjectIds.HasNotifier, forward=False)
         self.notifiers: dict[str, ua.NodeId] = {}
         self.watched: AllWatched = {}
-        self.never_called: Callbacks = {}
-        """Callbacks of attributes that never change: one empty table for all of them."""
+        self.never_called: Watchers = {}
+        """Watchers of attributes that never change: one empty table for all of them."""
         for tree in trees:
             self._add(tree, None, _ORGANIZES)
         self._attach(space, [self._nodes[tree.id] for tree in trees])

@@ -81,7 +81,6 @@ def test_what_is_not_there_is_not_found(rig: Rig, path: str) -> None:
 @pytest.mark.parametrize(
     ("where", "own", "engineer", "engineer_encrypted"),
     [
-        (ua.NodeId(ua.ObjectIds.Server_ServerDiagnostics_ServerDiagnosticsSummary), True, True, True),
         (ua.NodeId(ALL_SESSIONS), False, True, True),
         (ua.NodeId(ALL_SUBSCRIPTIONS), False, True, True),
         (ua.NodeId(ALL_SECURITY), False, False, True),
@@ -94,6 +93,7 @@ def test_what_is_about_a_session_is_for_few(
     rig: Rig, where: ua.NodeId, own: bool, engineer: bool, engineer_encrypted: bool
 ) -> None:
     mine, other = rig.sessions
+    assert rig.nodes.is_about_someone(where)
     is_hidden = rig.nodes.is_hidden
     assert is_hidden(where, mine, may_see_all=False) != own
     assert is_hidden(where, other, may_see_all=True) != engineer
@@ -102,3 +102,9 @@ def test_what_is_about_a_session_is_for_few(
     other.channel_certificate = b"x"
     assert is_hidden(where, other, may_see_all=True) != engineer_encrypted
     other.channel_certificate = None
+
+
+def test_the_summary_and_what_is_no_diagnostics_are_for_all(rig: Rig) -> None:
+    summary = ua.ObjectIds.Server_ServerDiagnostics_ServerDiagnosticsSummary
+    for where in (ua.NodeId(summary), ua.NodeId("Diagnostics/session 1", 2), ua.NodeId(b"x", 1)):
+        assert not rig.nodes.is_about_someone(where)

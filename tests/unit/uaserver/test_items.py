@@ -72,9 +72,8 @@ def told(item: ValueItem) -> list[tuple[float, bool]]:
     """Values in the queue, each with whether it reports that others were lost."""
     found: list[tuple[float, bool]] = []
     while item.has_something:
-        one = item.notification()
-        assert one.ClientHandle == 77
-        found.append((one.Value.Value.Value, bool(one.Value.StatusCode.value & OVERFLOW)))
+        one = item.take()
+        found.append((one.Value.Value, bool(one.StatusCode.value & OVERFLOW)))
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +13,7 @@ from bridge.uaserver.library import ServiceError
 from bridge.uaserver.monitoring import MonitoredItems, code_of
 from bridge.uaserver.subscription import Subscription, terms
 from tests.support.opcua_application import add_variable
+from tests.support.opcua_sessions import Session
 
 Codes, Ids, Mode = ua.StatusCodes, ua.AttributeIds, ua.MonitoringMode
 WORD = ua.NodeId("word", 1)
@@ -27,7 +27,7 @@ class Rig:
         self.space = space
         add_variable(space, WORD, 7)
         self.items = MonitoredItems(space)
-        owner: Any = SimpleNamespace(address="10.0.0.1", seen=lambda wanted, value: value)
+        owner = Session()
         self.subscription = Subscription(1, owner, terms(ua.CreateSubscriptionParameters()), enabled=True)
 
     async def create(self, *wanted: ua.MonitoredItemCreateRequest, room: int = 100) -> list[Any]:
@@ -42,7 +42,7 @@ class Rig:
         (item,) = self.subscription.items.values()
         found: list[int] = []
         while item.has_something:
-            found.append(item.notification().Value.Value.Value)
+            found.append(item.take().Value.Value)
         return found
 
 

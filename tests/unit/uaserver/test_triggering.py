@@ -19,7 +19,7 @@ from bridge.uaserver.reading import window
 from bridge.uaserver.subscription import Subscription, Terms
 from bridge.uaserver.triggering import TriggeringLinks
 from bridge.uaserver.where import Where
-from tests.support.opcua_sessions import Session
+from tests.support.opcua_sessions import Session, decoded_changes
 
 Codes, Mode = ua.StatusCodes, ua.MonitoringMode
 TARGET = ua.ReadValueId(AttributeId=ua.AttributeIds.Value)
@@ -79,7 +79,7 @@ class Rig:
                 if isinstance(data, ua.EventNotificationList):
                     found += [(one.ClientHandle, one.EventFields[0].Value) for one in data.Events]
                 else:
-                    found += [(one.ClientHandle, one.Value.Value.Value) for one in data.MonitoredItems]
+                    found += [(one.ClientHandle, one.Value.Value.Value) for one in decoded_changes(data)]
         return found
 
 
@@ -230,9 +230,9 @@ def test_what_is_released_is_what_was_queued_then(
             number += 1
             item.change(ua.DataValue(ua.Variant(number, ua.VariantType.Int32)), float(number))
         while step == "l" and item.has_report:
-            told = item.notification().Value.Value.Value
+            told = item.take().Value.Value
             assert told <= released or size == 1 or not oldest
     item.release()
     left = len(item.queue)
-    assert sum(1 for _ in iter(lambda: item.has_report and item.notification(), False)) == left
+    assert sum(1 for _ in iter(lambda: item.has_report and item.take(), False)) == left
     assert not item.has_something

@@ -26,4 +26,4 @@ def test_who_watches_is_kept_however_often_it_is_made() -> None:
     first.datachange_callbacks[1] = print
     assert second.datachange_callbacks == {1: print}
     PointValue(image, lambda at: 0, word.bits[0], watched).datachange_callbacks[2] = print
-    assert {place: set(one.callbacks) for place, one in watched[0].items()} == {-1: {1}, 0: {2}}
+    assert {place: set(one.watchers) for place, one in watched[0].items()} == {-1: {1}, 0: {2}}

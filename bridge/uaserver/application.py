@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 
 from bridge.uaserver.arrivals import Arrivals
+from bridge.uaserver.explanations import Explain, Explanation
 from bridge.uaserver.library import ua
 
 
@@ -78,9 +79,24 @@ class ServedApplication(Protocol[U]):
         """Whether this user may see the diagnostics of others' sessions."""
         ...
 
-    async def write(self, user: U, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]: ...
+    def refreshable(self, nodes: Iterable[ua.NodeId]) -> Sequence[ua.NodeId]:
+        """Nodes of these whose values ``refresh`` can bring, as many as one request may have brought."""
+        ...
 
-    async def call(self, user: U, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]: ...
+    async def refresh(
+        self, user: U, nodes: Sequence[ua.NodeId]
+    ) -> Mapping[ua.NodeId, tuple[ua.StatusCode, Explanation]]:
+        """Bring the values of these nodes from where they come from. Returns those that were refused; of one
+        that takes too long the value of before stays."""
+        ...
+
+    async def write(
+        self, user: U, writes: Sequence[ua.WriteValue], explain: Explain
+    ) -> list[ua.StatusCode]: ...
+
+    async def call(
+        self, user: U, calls: Sequence[ua.CallMethodRequest], explain: Explain
+    ) -> list[ua.CallMethodResult]: ...
 
     def on_connection(self, user: U, *, is_there: bool, has_others: bool) -> None:
         """A session of ``user`` can be used, or cannot. ``has_others``: there are others of the same user."""

@@ -57,6 +57,10 @@ class SessionFacts:
             get(params, "MaxResponseMessageSize"),
         )
 
+    def note_channel(self, policy: Any) -> None:
+        """``policy`` is asyncua's security policy of the channel."""
+        self.mode, self.policy_uri = policy.Mode, policy.URI
+
     def note_user(self, name: str, mechanism: str) -> None:
         if self.users[-1:] != [name]:
             self.users = [*self.users, name][-_MOST_NAMES:]

@@ -55,8 +55,8 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
         ),
         Service(
             "Cancel",
-            "Publish requests that wait are answered with BadRequestCancelledByClient; a Write or Call is "
-            "carried out and has its outcome",
+            "Publish requests that wait, and a Read that waits for a drive, are answered with "
+            "BadRequestCancelledByClient; a Write or Call is carried out and has its outcome",
         ),
     ),
     "NodeManagement": (
@@ -79,8 +79,8 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
     "Attribute": (
         Service(
             "Read",
-            "what the bridge knows now, whatever `maxAge`; `timestampsToReturn` and `indexRange` count; "
-            "`dataEncoding` is ignored, as Part 4 §7.29 says",
+            "what the bridge knows now, and with `maxAge` 0 what the drives hold of [parameters](#writing); "
+            "`timestampsToReturn` and `indexRange` count; `dataEncoding` is ignored, as Part 4 §7.29 says",
         ),
         _no("HistoryRead", "no history is kept"),
         Service("Write", "see [Writing](#writing); with an `indexRange` BadWriteNotSupported"),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 import secrets
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, cast
 
 from asyncua.crypto.permission_rules import User, UserRole
@@ -26,6 +26,7 @@ from bridge.uaserver.counts import RequestCounts, ServerCounts
 from bridge.uaserver.diagnosticnodes import DiagnosticNodes
 from bridge.uaserver.diagnostics import SessionFacts
 from bridge.uaserver.encoding import Results
+from bridge.uaserver.explanations import Explain, Explanation
 from bridge.uaserver.library import (
     AttributeIds,
     ServiceError,
@@ -45,6 +46,7 @@ from bridge.uaserver.reading import checked_times, window
 from bridge.uaserver.serverstatus import ServerStatus
 from bridge.uaserver.subscription import Subscription
 from bridge.uaserver.subscriptions import Subscriptions
+from bridge.uaserver.undertakings import Undertakings
 
 _LONGEST_SESSION_MS: Final = 120_000.0
 
@@ -90,6 +92,10 @@ class Session(InternalSession):
         """Largest answer that its client accepts on that connection, in bytes."""
         self.left_at = 0.0
         """Monotonic time at which it lost its last connection."""
+        self.undertakings = Undertakings()
+        """Requests under way on the connection that it is activated on."""
+        self.refreshing = asyncio.Lock()
+        """Held by the one request that has values brought: those of one client wait for each other."""
         self.counts = RequestCounts()
         self.facts = SessionFacts()
         self.locales: Sequence[str] = ()
@@ -153,15 +159,40 @@ class Session(InternalSession):
 
     # services
 
-    async def read_attributes(self, params: ua.ReadParameters) -> Any:
+    def cancel(self, handle: int) -> int:
+        """Cancel the requests that the client calls so, where they change nothing; how many there were."""
+        return self.publishing.cancel(handle) + self.undertakings.cancel(handle)
+
+    def stale(self, params: ua.ReadParameters) -> Sequence[ua.NodeId]:
+        """Nodes whose values are to be brought from where they come from before they are read: those that
+        can be, where the client accepts no older ones (Part 4 §5.11.2.2)."""
+        if get(params, "MaxAge") != 0:
+            return ()
+        wanted: list[ua.ReadValueId] = get(params, "NodesToRead")
+        values = (get(one, "NodeId") for one in wanted if get(one, "AttributeId") == AttributeIds.Value)
+        return self.application.refreshable(values)
+
+    async def read_attributes(
+        self,
+        params: ua.ReadParameters,
+        refused: Mapping[ua.NodeId, tuple[ua.StatusCode, Explanation]],
+        explain: Explain,
+    ) -> Results:
+        """``refused`` are the nodes whose values could not be brought."""
         wanted: list[ua.ReadValueId] = get(params, "NodesToRead")
         times = checked_times(params)
         # `not >=` refuses NaN, too.
         if not get(params, "MaxAge") >= 0:
             raise ServiceError(StatusCodes.BadMaxAgeInvalid)
         results = self.answer = Results(self.most_bytes)
-        for one in wanted:
-            await results.add(self._read(one, times))
+        for place, one in enumerate(wanted):
+            where = get(one, "NodeId")
+            if where in refused and get(one, "AttributeId") == AttributeIds.Value:
+                code, why = refused[where]
+                explain(place, why)
+                await results.add(data_value(_NOTHING, code))
+            else:
+                await results.add(self._read(one, times))
         return results
 
     def _read(self, wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> ua.DataValue:

@@ -15,8 +15,9 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Coroutine, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any, Final
 
 from asyncua.common.connection import TransportLimits
@@ -52,12 +53,12 @@ from bridge.uaserver.security import SecureChannel
 from bridge.uaserver.services import NAMES, REFUSED, request_type
 from bridge.uaserver.session import InnerServer, Session
 from bridge.uaserver.states import REFUSALS, Need, RequestSession, need_of
+from bridge.uaserver.undertakings import Undertakings, finish
 
 _SLOW: Final = (request_type("Write"), request_type("Call"))
 """Services that may take seconds."""
 
 _ERROR: Final[Any] = ua.MessageType.Error
-_MOST_WAITING: Final = 32
 _LEAST_BUFFER: Final = 8192
 """Part 6 §7.1.2.3. Answers are cut into chunks that small."""
 MOST_BEFORE_SESSION: Final = 256 * 1024
@@ -74,7 +75,7 @@ class Processor(UaProcessor):
         super().__init__(server, transport, limits)
         self._server = server
         self._connection = SecureChannel(self._connection.security_policy, self._limits)
-        self._waiting: set[asyncio.Task[Any]] = set()
+        self._undertakings = Undertakings()
         self._source = source_of(str(self.name[0]) if isinstance(self.name, tuple) else str(self.name))
         self._connection.source = self._source
         self._was_greeted = False
@@ -184,11 +185,8 @@ class Processor(UaProcessor):
             finally:
                 if isinstance(self.session, Session):
                     self.session.answer = None
-        if len(self._waiting) >= _MOST_WAITING:
-            await asyncio.wait(self._waiting, return_when=asyncio.FIRST_COMPLETED)
-        task = asyncio.create_task(self._serve(typeid, requesthdr, seqhdr, body))
-        self._waiting.add(task)
-        task.add_done_callback(self._waiting.discard)
+        await self._undertakings.room()
+        self._undertakings.begin(self._serve(typeid, requesthdr, seqhdr, body))
         # One turn, so that it is on its way before the client's next request is looked at.
         await asyncio.sleep(0)
         return True
@@ -291,8 +289,8 @@ class Processor(UaProcessor):
 
     def _hold(self, session: Session) -> None:
         session.holder, session.most_bytes = self, self._limits.max_message_size
-        policy = self._connection.security_policy
-        session.facts.mode, session.facts.policy_uri = policy.Mode, policy.URI
+        session.undertakings = self._undertakings
+        session.facts.note_channel(self._connection.security_policy)
 
     async def _session_watchdog_loop(self) -> None:
         """Not needed: a session watches its own time-out, or ends with the connection it was made on.
@@ -303,20 +301,23 @@ class Processor(UaProcessor):
         assert isinstance(session, Session), "checked"
         session.touch()
 
-        def send(response: Any) -> None:
-            self.send_response(requesthdr.RequestHandle, seqhdr, response)
+        send = partial(self.send_response, requesthdr.RequestHandle, seqhdr)
+        refuse = partial(self._refuse, requesthdr.RequestHandle, seqhdr)
 
         def is_open() -> bool:
             return session.holder is self and not self._transport.is_closing()
 
+        async def defer(work: Coroutine[Any, Any, None]) -> None:
+            await self._undertakings.room()
+            self._undertakings.begin(finish(work, is_open, refuse), requesthdr.RequestHandle)
+
         # Results are encoded as they are found.
         with speaking(session.locales):
-            await route.carry_out(session, ServiceRequest(requesthdr, body, send, is_open))
+            await route.carry_out(session, ServiceRequest(requesthdr, body, send, is_open, defer))
         return True
 
     async def close(self) -> None:
-        for task in list(self._waiting):
-            task.cancel()
+        self._undertakings.cancel_all()
         await super().close()
         if isinstance(self.session, Session) and self.session.holder is self:
             self.session.leave(clock.now())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bridge.base import clock
@@ -10,11 +10,13 @@ from bridge.command.messages.freshness import Inflow
 from bridge.command.messages.request import Identity, Role
 from bridge.northbound.opcua.accounts import Accounts
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.read_through import ReadThrough
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.passwords import ANONYMOUS
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
+from bridge.uaserver.explanations import Explain, Explanation
 from bridge.uaserver.library import ua
 
 
@@ -54,8 +56,17 @@ class ConnectionArrivals:
 class Backend(ServedApplication[SessionUser]):
     """Users, writes and calls of the server's sessions. ``pulse`` is that of the event loop."""
 
-    def __init__(self, users: Accounts, writer: Writer, caller: Caller, view: View, pulse: Pulse) -> None:
+    def __init__(
+        self,
+        users: Accounts,
+        reader: ReadThrough,
+        writer: Writer,
+        caller: Caller,
+        view: View,
+        pulse: Pulse,
+    ) -> None:
         self._users = users
+        self._reader = reader
         self._writer = writer
         self._caller = caller
         self._view = view
@@ -75,13 +86,23 @@ class Backend(ServedApplication[SessionUser]):
     def may_diagnose(self, user: SessionUser) -> bool:
         return user.identity.role >= Role.ENGINEER
 
-    async def write(self, user: SessionUser, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
-        return await self._writer.write(user.identity, writes)
+    def refreshable(self, nodes: Iterable[ua.NodeId]) -> Sequence[ua.NodeId]:
+        return self._reader.wanted(nodes)
+
+    async def refresh(
+        self, user: SessionUser, nodes: Sequence[ua.NodeId]
+    ) -> Mapping[ua.NodeId, tuple[ua.StatusCode, Explanation]]:
+        return await self._reader.read(user.identity, nodes)
+
+    async def write(
+        self, user: SessionUser, writes: Sequence[ua.WriteValue], explain: Explain
+    ) -> list[ua.StatusCode]:
+        return await self._writer.write(user.identity, writes, explain)
 
     async def call(
-        self, user: SessionUser, calls: Sequence[ua.CallMethodRequest]
+        self, user: SessionUser, calls: Sequence[ua.CallMethodRequest], explain: Explain
     ) -> list[ua.CallMethodResult]:
-        return await self._caller.call(user.identity, calls)
+        return await self._caller.call(user.identity, calls, explain)
 
     def on_connection(self, user: SessionUser, *, is_there: bool, has_others: bool) -> None:
         self._view.on_connection(user.identity, is_there=is_there, has_others=has_others)

@@ -37,6 +37,8 @@ class ArgumentType(Enum):
     INT32 = (-0x8000_0000, 0x7FFF_FFFF)
     UINT32 = (0, 0xFFFF_FFFF)
     STRING = "string"
+    TEXT = "text"
+    """A text for people, in the client's language."""
     ANY = "any"
     """A number, a text, true or false."""
 
@@ -111,6 +113,9 @@ _PARAMETER: Final = Argument(
     "name", ArgumentType.STRING, "as the vendor calls it, such as P102[2], or an object such as 2066:01"
 )
 _VALUE: Final = Argument("value", ArgumentType.ANY, "in the parameter's unit")
+
+OUTCOME: Final = Argument("outcome", ArgumentType.TEXT, "what came of it, in words")
+"""Output argument of each method that has no other."""
 
 _Methods = Sequence[tuple[Action, tuple[Argument, ...], tuple[Argument, ...], str]]
 
@@ -227,7 +232,7 @@ def _methods(target: str, table: _Methods) -> tuple[MethodNode, ...]:
             target,
             description,
             arguments,
-            results,
+            results or (OUTCOME,),
         )
         for action, arguments, results, description in table
     )

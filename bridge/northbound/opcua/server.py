@@ -23,17 +23,18 @@ from bridge.northbound.opcua.change_publisher import Publisher
 from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.outcome_texts import spoken
+from bridge.northbound.opcua.read_through import ReadThrough
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.service_level import ServiceLevel
 from bridge.northbound.opcua.tree import Tree
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
-from bridge.text import LANGUAGES, Text, render
+from bridge.text import Text
 from bridge.uaserver import decoding
 from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
-from bridge.uaserver.languages import Spoken
 from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.session import InnerServer
@@ -133,10 +134,9 @@ class OpcUaServer:
 
     async def _tell_end(self, inner: InnerServer) -> None:
         settings = self._settings
-        reason = Spoken({one: render(Text.of("opcua.ends"), one) for one in LANGUAGES})
         await inner.status.announce_end(
             settings.shutdown_notice_s,
-            reason,
+            spoken(Text.of("opcua.ends")),
             lambda: any(one.holder is not None for one in inner.sessions),
             settings.return_after_s,
         )
@@ -175,6 +175,7 @@ class OpcUaServer:
         tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
         inner.application = Backend(
             users,
+            ReadThrough(self._view, tree.parameter),
             Writer(self._view, inner.aspace, tree.writable),
             Caller(self._view, inner.aspace, tree.method),
             self._view,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Coroutine
 from types import SimpleNamespace
 from typing import Any
 
@@ -39,7 +40,11 @@ def test_each_route_names_what_its_messages_have() -> None:
 
 async def carried_out(route: Route, params: object) -> list[Any]:
     sent: list[Any] = []
-    request = ServiceRequest(None, Buffer(struct_to_binary(params)), sent.append, lambda: True)
+
+    async def at_once(work: Coroutine[Any, Any, None]) -> None:
+        await work
+
+    request = ServiceRequest(None, Buffer(struct_to_binary(params)), sent.append, lambda: True, at_once)
     session: Any = SimpleNamespace()
     await route.carry_out(session, request)
     return sent

@@ -34,11 +34,15 @@ class Told:
         self.calls.append((*how, encrypted))
         return user().identity
 
-    async def write(self, identity: Identity, writes: object) -> list[object]:
+    async def write(self, identity: Identity, writes: object, explain: object) -> list[object]:
         self.calls.append((identity, writes))
         return []
 
     call = write
+
+    async def read(self, identity: Identity, nodes: object) -> dict[object, object]:
+        self.calls.append((identity, nodes))
+        return {}
 
     def count(self, leaf: str) -> None:
         self.calls.append((leaf,))
@@ -48,7 +52,7 @@ class Told:
 
 
 def backend(told: Any, pulse: Any = None) -> Backend:
-    return Backend(told, told, told, told, pulse)
+    return Backend(told, told, told, told, told, pulse)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +75,7 @@ def test_what_a_user_may_write_and_call_follows_from_the_role(where: str, least:
     point = Point(name=where, data_type=DataType.FLOAT, writable="/status/" not in where)
     variable = VariableNode(where, "", VariableKind.PLAIN, point, 0) if found is None else None
     writer = Writer(told, told, lambda _: variable if variable and variable.writable else None)
-    made = Backend(told, writer, Caller(told, told, lambda _: found), told, told)
+    made = Backend(told, told, writer, Caller(told, told, lambda _: found), told, told)
     allowed = [role for role in Role if made.may(user(role=role), ua.NodeId(where, 2))]
     assert allowed == [role for role in Role if role >= least]
 
@@ -95,12 +99,14 @@ def test_a_user_is_the_same_over_any_session_and_nobody_is_none() -> None:
 async def test_the_view_is_told_by_the_identity() -> None:
     told = Told()
     made, who = backend(told), user()
-    await made.write(who, [])
-    await made.call(who, [])
+    await made.write(who, [], lambda place, why: None)
+    await made.call(who, [], lambda place, why: None)
+    await made.refresh(who, [])
     made.on_connection(who, is_there=True, has_others=False)
     made.on_refused()
     made.on_broken()
     assert told.calls == [
+        (who.identity, []),
         (who.identity, []),
         (who.identity, []),
         (who.identity, True, False),

@@ -40,6 +40,7 @@ _MOST_COUNTER: Final = 240
 _SHORTEST_REASON: Final = 10
 _LOCATOR: Final = re.compile(r"[a-z][a-z0-9-]*/.+")
 _HOST_NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63})*")
+_OPCUA_URL: Final = re.compile(r"opc\.tcp://(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9.-]+):[0-9]{1,5}(/[!-~]*)?")
 _URI: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:[!-~]+")
 
 
@@ -138,6 +139,12 @@ def _uri(text: str) -> str:
     return text
 
 
+def _opcua_url(text: str) -> str:
+    if not _OPCUA_URL.fullmatch(text):
+        raise Unfit(Text.of("site.opcua_url"))
+    return text
+
+
 def _controller(text: str) -> str:
     if not _CONTROLLER.fullmatch(text) or text == "anonymous":
         raise Unfit(Text.of("site.controller"))
@@ -188,6 +195,7 @@ Network = Annotated[str, AfterValidator(_network)]
 Locator = Annotated[str, AfterValidator(_locator)]
 HostName = Annotated[str, AfterValidator(_host_name)]
 Uri = Annotated[str, AfterValidator(_uri)]
+OpcUaUrl = Annotated[str, AfterValidator(_opcua_url)]
 ControllerName = Annotated[str, AfterValidator(_controller)]
 Timeout = Annotated[int, Field(ge=0, le=LONGEST_TIMEOUT_MS)]
 Full = Annotated[float, Field(gt=0, allow_inf_nan=False)]

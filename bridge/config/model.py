@@ -37,6 +37,7 @@ from bridge.config.field_types import (
     OnIgnoredStop,
     OnIntruder,
     OnLoss,
+    OpcUaUrl,
     ParameterRights,
     PdoMapping,
     PlainValue,
@@ -336,6 +337,7 @@ class OpcUaTable(ListeningTable):
     private_key: str | None = None
     trusted_dir: str | None = None
     shutdown_notice_s: float = Field(2.0, ge=0, le=5, description="0…5 s")
+    discovery_server: OpcUaUrl | None = None
     return_after_s: float | None = Field(None, ge=0, le=86_400, description="0…86400 s")
     user: list[UserTable] = Field(default_factory=list[UserTable])
 

@@ -21,8 +21,8 @@ _MOST_CHARACTERS: Final = 50_000
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Reason why an operation ended as it did: ``symbol`` for programs, one of ``namespace``, ``text`` for people,
-    ``more`` as whoever has refused it says it."""
+    """Reason why an operation ended as it did: ``symbol`` for programs, one of ``namespace``, ``text`` for
+    people, ``more`` as whoever has refused it says it."""
 
     symbol: str
     namespace: str

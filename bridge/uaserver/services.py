@@ -32,7 +32,7 @@ def _no(name: str, why: str) -> Service:
 
 SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
     "Discovery": (
-        Service("FindServers", "names this server alone"),
+        Service("FindServers", "names this server alone, where `serverUris` has its URI or none"),
         _no("FindServersOnNetwork", "this is no discovery server"),
         Service("GetEndpoints", "those of the transport profiles that are asked for"),
         _no("RegisterServer", "this is no discovery server"),

@@ -305,6 +305,15 @@ class InnerServer(InternalServer):
         profiles: list[str] = (get(params, "ProfileUris") if params else None) or []
         return [one for one in endpoints if not profiles or get(one, "TransportProfileUri") in profiles]
 
+    def find_servers(
+        self, params: ua.FindServersParameters, sockname: tuple[str, int] | None = None
+    ) -> list[ua.ApplicationDescription]:
+        """This server, where it is asked for: asyncua takes each URI for the beginning of one."""
+        wanted: list[str] = get(params, "ServerUris") or []
+        change(params, ServerUris=[])
+        found = super().find_servers(params, sockname)
+        return [one for one in found if not wanted or get(one, "ApplicationUri") in wanted]
+
     @property
     def sessions(self) -> list[Session]:
         """Sessions of clients."""

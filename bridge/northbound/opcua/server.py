@@ -10,6 +10,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+
 import bridge
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
@@ -37,6 +39,7 @@ from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
 from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
 from bridge.uaserver.librarylog import quieten
+from bridge.uaserver.registration import RegisteredServer, Registration
 from bridge.uaserver.session import InnerServer
 
 NAMESPACE: Final = "urn:drivebridge:points"
@@ -71,6 +74,8 @@ class OpcUaServer:
         self._publisher: asyncio.Task[None] | None = None
         self._inner: InnerServer | None = None
         self._ending: asyncio.Task[None] | None = None
+        self._registration: Registration | None = None
+        self._registering: asyncio.Task[None] | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
         self.port = int(port)
@@ -146,6 +151,11 @@ class OpcUaServer:
         self._pulse.stop()
         if self._ending:
             self._ending.cancel()
+        registering, self._registering = self._registering, None
+        if registering and self._registration:
+            registering.cancel()
+            await asyncio.gather(registering, return_exceptions=True)
+            await self._registration.end()
         task, self._publisher = self._publisher, None
         if task:
             task.cancel()
@@ -187,8 +197,22 @@ class OpcUaServer:
         await server.start()
         publisher = Publisher(image, tree.watched, events, ServiceLevel(image, inner.status))
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
+        if self._settings.discovery_server:
+            self._register(self._settings.discovery_server, own, server.name)
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
+
+    def _register(self, url: str, own: ServerIdentity, name: str) -> None:
+        told = RegisteredServer(
+            own.application_uri,
+            _PRODUCT,
+            name,
+            self.endpoint_url,
+            own.certificate.public_bytes(Encoding.DER),
+            own.private_key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()),
+        )
+        self._registration = Registration(url, told)
+        self._registering = asyncio.create_task(self._registration.run(), name="opcua registration")
 
     async def _describe(self, server: BoundServer, application_uri: str, users: Accounts) -> None:
         server.set_endpoint(self.endpoint_url)

@@ -14,6 +14,7 @@ from asyncua.server.address_space import AddressSpace, AttributeValue
 
 from bridge.uaserver.address_space import is_empty
 from bridge.uaserver.browsing import MOST_CONTINUATION_POINTS
+from bridge.uaserver.conformance import claimed
 from bridge.uaserver.eventfilter import MOST_FIELDS
 from bridge.uaserver.items import LEAST_SAMPLING_MS, VALUE_QUEUE
 from bridge.uaserver.library import (
@@ -49,6 +50,7 @@ VALUES: Final[Mapping[str, ua.Variant]] = {
     "Server_ServiceLevel": variant(HEALTHY, _Type.Byte),
     "Server_EstimatedReturnTime": variant(UNKNOWN_TIME, _Type.DateTime),
     "Server_Auditing": variant(False, _Type.Boolean),
+    f"{_CAN}ServerProfileArray": variant(claimed(), _Type.String),
     f"{_CAN}LocaleIdArray": variant(["en"], _Type.String),
     f"{_CAN}MaxBrowseContinuationPoints": variant(MOST_CONTINUATION_POINTS, _Type.UInt16),
     f"{_CAN}MaxQueryContinuationPoints": variant(0, _Type.UInt16),

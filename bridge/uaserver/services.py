@@ -89,7 +89,8 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
     "Method": (
         Service(
             "Call",
-            "the [methods](#methods-of-a-drive) of drives, nodes and buses; all others are BadMethodInvalid",
+            "the [methods](#methods-of-a-drive) of drives, nodes and buses, GetMonitoredItems and "
+            "ResendData; all others are BadMethodInvalid",
         ),
     ),
     "MonitoredItem": (

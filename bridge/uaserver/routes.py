@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import inspect
 import logging
-from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -19,6 +19,7 @@ from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import struct_from_binary
 
 from bridge.uaserver.browsing import Browser
+from bridge.uaserver.decoding import decoded, first_length
 from bridge.uaserver.encoding import UNSENDABLE, Results
 from bridge.uaserver.explanations import Explain, Explanation, add_explanations
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
@@ -32,6 +33,8 @@ from bridge.uaserver.subscriptions import Subscriptions
 
 MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100
+MOST_WRITES: Final = 1_000
+"""Limit for one request: writes are begun at once, so that none is overtaken, and others wait meanwhile."""
 
 _log = logging.getLogger(__name__)
 
@@ -72,9 +75,16 @@ class Route:
 
     async def carry_out(self, session: Session, request: ServiceRequest) -> None:
         """Raises ServiceError for what is to be answered as a fault."""
-        params = struct_from_binary(get(ua, f"{self.name}Parameters"), request.body)
+        kind, fields = get(ua, f"{self.name}Parameters"), self.operations.split()
+        if self.explain is not None:
+            # What commands is decoded at once, so that no later request comes before it: it is short.
+            _limit(first_length(request.body), self.most)
+            params = struct_from_binary(kind, request.body)
+        else:
+            params = await decoded(kind, fields, request.body)
+        operations = sum(len(get(params, field) or ()) for field in fields)
         if self.operations:
-            _limit(sum(len(get(params, field) or ()) for field in self.operations.split()), self.most)
+            _limit(operations, self.most)
         if self.begin is not None:
             begun = self.begin(session, params, request)
             if begun is not None:
@@ -91,10 +101,19 @@ class Route:
         response = get(ua, f"{self.name}Response")()
         if self.answer:
             *above, field = self.answer.split(".")
+            if self.answer == "Results" and self.explain is None and not isinstance(result, Results):
+                result = await _encoded(session, result)
             change(get(response, above[0]) if above else response, **{field: result})
         if explained:
-            add_explanations(request.header, response, explained, len(result))
+            add_explanations(request.header, response, explained, operations)
         request.send(response)
+
+
+async def _encoded(session: Session, found: Iterable[object]) -> Results:
+    results = session.answer = Results(session.most_bytes)
+    for one in found:
+        await results.add(one)
+    return results
 
 
 async def _browse(session: Session, params: Any) -> Results:
@@ -215,7 +234,7 @@ ROUTES: Final[Mapping[ua.NodeId, Route]] = {
         ),
         Route("UnregisterNodes", lambda session, params: None, "NodesToUnregister", ""),
         Route("Read", None, "NodesToRead", begin=_read),
-        Route("Write", None, "NodesToWrite", explain=_write),
+        Route("Write", None, "NodesToWrite", most=MOST_WRITES, explain=_write),
         Route("Call", None, "MethodsToCall", most=MOST_CALLS, explain=_call),
         Route("CreateSubscription", Session.subscribe, answer="Parameters"),
         Route("ModifySubscription", _subscription(Subscriptions.modify), answer="Parameters"),

@@ -35,7 +35,7 @@ from bridge.uaserver.quotas import (
     MOST_SESSIONS,
     MOST_SUBSCRIPTIONS,
 )
-from bridge.uaserver.routes import MOST_CALLS
+from bridge.uaserver.routes import MOST_CALLS, MOST_WRITES
 from bridge.uaserver.serverstatus import HEALTHY, UNKNOWN_TIME
 from bridge.uaserver.where import MOST_OPERANDS
 
@@ -64,6 +64,7 @@ VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_CAN}MaxMonitoredItemsQueueSize": variant(VALUE_QUEUE, _Type.UInt32),
     f"{_CAN}MaxSelectClauseParameters": variant(MOST_FIELDS, _Type.UInt32),
     f"{_CAN}MaxWhereClauseParameters": variant(MOST_OPERANDS, _Type.UInt32),
+    f"{_AT_ONCE}MaxNodesPerWrite": variant(MOST_WRITES, _Type.UInt32),
     f"{_AT_ONCE}MaxNodesPerMethodCall": variant(MOST_CALLS, _Type.UInt32),
     "Server_ServerDiagnostics_EnabledFlag": variant(True, _Type.Boolean),
     "Server_ServerRedundancy_RedundancySupport": variant(ua.RedundancySupport.None_, _Type.Int32),

@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 from asyncua import ua
 from asyncua.common.utils import Buffer
-from asyncua.ua.ua_binary import struct_to_binary
+from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary
 
+from bridge.uaserver.encoding import encode
 from bridge.uaserver.library import ServiceError
 from bridge.uaserver.routes import MOST_CALLS, MOST_OPERATIONS, ROUTES, Route, ServiceRequest
 from bridge.uaserver.services import REFUSED, SERVICES, request_type
@@ -45,7 +46,7 @@ async def carried_out(route: Route, params: object) -> list[Any]:
         await work
 
     request = ServiceRequest(None, Buffer(struct_to_binary(params)), sent.append, lambda: True, at_once)
-    session: Any = SimpleNamespace()
+    session: Any = SimpleNamespace(most_bytes=1_000_000, answer=None)
     await route.carry_out(session, request)
     return sent
 
@@ -63,6 +64,7 @@ async def test_operations_are_counted_before_anything_is_done(count: int, code: 
     if code is None:
         (response,) = await carried_out(route, params)
         assert isinstance(response, ua.CallResponse)
+        assert struct_from_binary(ua.CallResponse, Buffer(encode(response))).Results == []
         return
     with pytest.raises(ServiceError) as refused:
         await carried_out(route, params)

@@ -13,6 +13,7 @@ from bridge.config.model import DriveTable as DriveTable
 from bridge.config.model import ListeningTable as ListeningTable
 from bridge.config.model import ModbusTable as ModbusTable
 from bridge.config.model import NodeTable as NodeTable
+from bridge.config.model import OpcUaHistoryTable as OpcUaHistoryTable
 from bridge.config.model import OpcUaTable as OpcUaTable
 from bridge.config.model import OutputsTable as OutputsTable
 from bridge.config.model import PageTable as PageTable
@@ -22,6 +23,7 @@ from bridge.config.model import Site as Site
 from bridge.config.model import UserTable as UserTable
 from bridge.config.model import ZenohTable as ZenohTable
 from bridge.config.model import mapping_key as mapping_key
+from bridge.config.point_patterns import fits as fits
 from bridge.config.reaction import REACTIONS as REACTIONS
 from bridge.config.reaction import Reaction as Reaction
 from bridge.config.reaction import ReactionRule as ReactionRule

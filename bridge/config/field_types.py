@@ -10,6 +10,7 @@ from typing import Annotated, Final, Literal, cast
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
 from bridge.canopen.pdo import MOST_BITS, PdoEntry
+from bridge.config.point_patterns import is_pattern
 from bridge.text import Text
 from bridge.tomlfile import Unfit
 
@@ -49,6 +50,12 @@ def _regular_expression(text: str) -> str:
         re.compile(text)
     except re.error as error:
         raise Unfit(Text.of("site.regular_expression", why=str(error))) from None
+    return text
+
+
+def _point_pattern(text: str) -> str:
+    if not is_pattern(text):
+        raise Unfit(Text.of("site.point_pattern"))
     return text
 
 
@@ -200,6 +207,7 @@ ControllerName = Annotated[str, AfterValidator(_controller)]
 Timeout = Annotated[int, Field(ge=0, le=LONGEST_TIMEOUT_MS)]
 Full = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Reason = Annotated[str, AfterValidator(_reason)]
+PointPattern = Annotated[str, AfterValidator(_point_pattern)]
 Prefix = Annotated[str, AfterValidator(_prefix)]
 Downtime = Annotated[float, AfterValidator(_downtime)]
 SyncCounter = Annotated[int, AfterValidator(_counter)]

@@ -41,6 +41,7 @@ from bridge.config.field_types import (
     ParameterRights,
     PdoMapping,
     PlainValue,
+    PointPattern,
     Prefix,
     Reason,
     RegularExpression,
@@ -50,6 +51,7 @@ from bridge.config.field_types import (
     WordOrder,
     listed,
 )
+from bridge.config.point_patterns import HISTORY_POINTS
 from bridge.config.reaction import REACTIONS, Reaction, ReactionRule
 from bridge.tomlfile import Unfit
 
@@ -325,6 +327,19 @@ class UserTable(Table):
     password_hash: str = Field(description="the line that `drivebridge hash-password` prints")
 
 
+class OpcUaHistoryTable(Table):
+    """History that the OPC UA server keeps."""
+
+    points: list[PointPattern] = Field(default_factory=lambda: list(HISTORY_POINTS))
+    samples_per_point: int = Field(20_000, ge=10, le=10_000_000, description="10…10000000")
+    size_mb: int = Field(16, ge=1, le=10_000, description="1…10000 MB")
+    event_hours: int = Field(168, ge=0, le=87_600, description="0 (none are kept) or 1…87600 h")
+    events_mb: int = Field(8, ge=1, le=1000, description="1…1000 MB")
+    black_boxes: int = Field(3, ge=0, le=20, description="0…20 of each drive")
+    before_s: float = Field(30.0, ge=1, le=600, description="1…600 s")
+    after_s: float = Field(5.0, ge=0, le=600, description="0…600 s")
+
+
 class OpcUaTable(ListeningTable):
     listen: Endpoint = Field("127.0.0.1:4840", description="address:port")
     no_security: bool = Field(False, description="true opens an endpoint without encryption")
@@ -339,6 +354,10 @@ class OpcUaTable(ListeningTable):
     shutdown_notice_s: float = Field(2.0, ge=0, le=5, description="0…5 s")
     discovery_server: OpcUaUrl | None = None
     return_after_s: float | None = Field(None, ge=0, le=86_400, description="0…86400 s")
+    history: OpcUaHistoryTable = Field(default_factory=lambda: OpcUaHistoryTable.model_validate({}))
+    acknowledge_resets: bool = Field(
+        False, description="true has whoever acknowledges the alarm of a drive reset its fault"
+    )
     user: list[UserTable] = Field(default_factory=list[UserTable])
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final, cast
 
 from bridge.config.field_types import LIFE_SIGN_MS
-from bridge.config.model import BusTable, Site
+from bridge.config.model import BusTable, OpcUaHistoryTable, Site, SiteTable
 from bridge.text import Text
 from bridge.tomlfile import Key, RawTable, TomlFile
 
@@ -23,7 +23,9 @@ _MUTUAL_TLS: Final = re.compile(r"(tls|quic)/.*[#;]enable_mtls=(true|1)\b.*")
 _WITHOUT_CONNECTIONS: Final = ("opcua", "zenoh")
 """Protocols of which the command side does not know whether a client is still connected."""
 _BUS: Final = BusTable.model_construct()
-"""Bus with the defaults of the site file."""
+_HISTORY: Final = OpcUaHistoryTable.model_construct()
+_SITE: Final = SiteTable.model_construct()
+"""Tables with the defaults of the site file."""
 
 
 def check(file: TomlFile) -> None:
@@ -44,6 +46,7 @@ def check(file: TomlFile) -> None:
     _check_users(file)
     _check_ports(file)
     _check_page(file)
+    _check_history(file)
     _check_zenoh(file)
 
 
@@ -205,6 +208,22 @@ def _check_ports(file: TomlFile) -> None:
     ports = _Unique(file, lambda address: Text.of("site.address_twice", address=address))
     for name in Site.model_fields:
         ports.add(file.root.table(name), "listen")
+
+
+def _check_history(file: TomlFile) -> None:
+    """Check that the history leaves the server room: a front with too much memory is killed."""
+    history = file.root.table("opcua").table("history")
+    size_mb = _given(history, "size_mb", _HISTORY.size_mb)
+    # While the events of the last run are read they are there twice.
+    needed_mb = size_mb + 2 * _given(history, "events_mb", _HISTORY.events_mb)
+    front_mb = _given(file.root.table("site"), "front_memory_mb", _SITE.front_memory_mb)
+    if needed_mb > front_mb // 2:
+        key = "size_mb" if "size_mb" in history.content else "events_mb"
+        file.fault(
+            (*history.key, key),
+            Text.of("site.history_large", needed_mb=needed_mb, front_mb=front_mb),
+            Text.of("site.history_large_advice", least_mb=2 * needed_mb),
+        )
 
 
 def _check_page(file: TomlFile) -> None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from bridge.config import IGNORE_ALL_S, DriveTable, NodeTable, Site
+from bridge.catalogue import Catalogue
+from bridge.config import IGNORE_ALL_S, DriveTable, NodeTable, Site, fits
 from bridge.lint.report import LintReport
 from bridge.mapping import Family
 from bridge.text import Text
@@ -20,8 +21,17 @@ def check_decisions(site: Site, families: Mapping[str, Family], report: LintRepo
                 _check_drive(drive, name, ("bus", b, "node", n, "drive", d), report)
     if site.opcua and site.opcua.no_security:
         report.warning(("opcua", "no_security"), Text.of("check.anyone_reads"))
+    if site.opcua and "points" in site.opcua.history.model_fields_set:
+        _check_history(site.opcua.history.points, Catalogue.of(site, families), report)
     if site.zenoh and site.zenoh.no_security:
         report.warning(("zenoh", "no_security"), Text.of("check.anyone_commands"))
+
+
+def _check_history(patterns: Sequence[str], catalogue: Catalogue, report: LintReport) -> None:
+    for number, pattern in enumerate(patterns):
+        if not any(fits(point.name, pattern) for point in catalogue.points):
+            key = "opcua", "history", "points", number
+            report.warning(key, Text.of("check.no_such_point", pattern=pattern))
 
 
 def _check_commands(node: NodeTable, key: Key, report: LintReport) -> None:

@@ -11,11 +11,11 @@ from typing import Final, cast
 import msgspec
 
 from bridge.base.guard import Guard
+from bridge.base.line_file import LineFile
 from bridge.command import Event, EventKind, Plant
 from bridge.command.audit import AuditEntry
 from bridge.config import Site
 from bridge.image import Value
-from bridge.service.audit_file import AuditFile
 from bridge.text import Text, as_json
 
 _PERIOD_S: Final = 0.5
@@ -94,9 +94,9 @@ class AuditLog:
         self._epoch = epoch
         self._guard = Guard("audit log")
         path = Path(settings.file) if settings.file else Path(site.site.state_dir) / "audit.jsonl"
-        self.file = AuditFile(path, settings.max_bytes, settings.keep)
+        self.file = LineFile(path, settings.max_bytes, settings.keep)
         refused = path.with_name(f"{path.stem}-refused{path.suffix}")
-        self.refused = AuditFile(refused, settings.max_bytes, settings.keep)
+        self.refused = LineFile(refused, settings.max_bytes, settings.keep)
         self._files = (self.file, self.refused)
         self._faults = ["" for _ in self._files]
         self._settings = settings
@@ -133,7 +133,7 @@ class AuditLog:
                 self._faults[place] = fault
                 self._tell(file, fault, now)
 
-    def _tell(self, file: AuditFile, fault: str, now: float) -> None:
+    def _tell(self, file: LineFile, fault: str, now: float) -> None:
         severity, said = 300, Text.of("audit.written_again", lost=file.all_lost)
         if fault:
             severity = 600

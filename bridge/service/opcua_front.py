@@ -4,29 +4,56 @@ from __future__ import annotations
 
 import asyncio
 import gc
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Mapping
 from contextlib import AsyncExitStack
 from pathlib import Path
 
-from bridge.config import load_site
 from bridge.northbound.listening import ListeningSocket
+from bridge.northbound.opcua.alarm_server import AlarmSite
 from bridge.northbound.opcua.server import OpcUaServer
+from bridge.northbound.trouble_words import PlantWords
 from bridge.northbound.view import View
+from bridge.project import Project, load_project
+from bridge.service.fault_texts import german_faults
 from bridge.service.front_process import on_end
 from bridge.service.mirrored import required, serve_mirrored
 
 
+def alarm_site_of(project: Project) -> AlarmSite:
+    """Fronts of the site, and what its drives add to the words of their alarms."""
+    site = project.site
+    drives = {
+        f"{node.name}/{project.families[node.mapping_key].leaf_of(drive)}": (node.mapping_key, drive)
+        for bus in site.bus
+        for node in bus.node
+        for drive in node.drive
+    }
+    tables = {"modbus": site.modbus, "opcua": site.opcua, "zenoh": site.zenoh, "page": site.page}
+    german = german_faults(project.families)
+
+    def fault_in(drive: str, number: str, language: str) -> Mapping[str, str]:
+        if language != "de" or drive not in drives:
+            return {}
+        return german[drives[drive][0]].get(number, {})
+
+    words = PlantWords(fault_in, {name: drive.on_expiry for name, (_, drive) in drives.items()})
+    return AlarmSite(words, tuple(name for name, table in tables.items() if table is not None))
+
+
 def run_opcua(path: Path, signs: int | None, listening: int | None) -> Coroutine[None, None, None]:
     """The OPC UA front of the site file at ``path``, as ``RunFront`` says."""
-    site = load_site(path)
+    project = load_project(path)
+    site = project.site
     settings = required(site.opcua, "opcua")
+
+    alarm_site = alarm_site_of(project)
 
     async def open_server(mirror: View, stack: AsyncExitStack) -> OpcUaServer:
         # Nothing of what is built here is garbage, and looking for it takes a quarter of the time.
         gc.disable()
         stack.callback(gc.enable)
         bound = None if listening is None else ListeningSocket(listening, "opcua.listen")
-        server = OpcUaServer(mirror, settings, Path(site.site.state_dir), site.site.name, bound)
+        server = OpcUaServer(mirror, settings, Path(site.site.state_dir), site.site.name, bound, alarm_site)
         await server.start()
         stack.push_async_callback(server.close)
         on_end(server.announce_end)

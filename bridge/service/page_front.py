@@ -11,29 +11,21 @@ from pathlib import Path
 from bridge.base import clock
 from bridge.catalogue import Catalogue
 from bridge.config import Site
-from bridge.drive import FaultWords
-from bridge.drive.fault_words import listed_faults
 from bridge.exports import dbc_file, modbus_table, opcua_table, zenoh_table
 from bridge.lint import dictionary_files
-from bridge.mapping import Family
 from bridge.northbound.listening import ListeningSocket, listen
 from bridge.northbound.page.integration import Export
 from bridge.northbound.page.server import PageServer
-from bridge.northbound.page.web import FaultTexts, Page, PageSources
+from bridge.northbound.page.web import Page, PageSources
 from bridge.northbound.view import View
 from bridge.parameter.ledger_file import LedgerFile
 from bridge.project import Project, load_project
+from bridge.service.fault_texts import german_faults
 from bridge.service.mirrored import required, serve_mirrored
 from bridge.service.page.buses import Buses
 from bridge.service.page.system_facts import SystemOf
-from bridge.text import render
 
 _log = logging.getLogger(__name__)
-
-
-def fault_texts(families: dict[str, Family]) -> FaultTexts:
-    """Fault texts in German; the points have the English ones."""
-    return {"de": {name: _in_german(family) for name, family in families.items()}}
 
 
 def _kept_sessions(site: Site) -> Path:
@@ -61,7 +53,7 @@ def sources_of(project: Project) -> PageSources:
     """Sources of the page: files, buses and system of ``project``."""
     buses = Buses(project, clock.epoch_ns)
     return PageSources(
-        fault_texts(project.families),
+        {"de": german_faults(project.families)},
         exports_of(project),
         buses.taps(),
         buses.layouts(),
@@ -70,14 +62,6 @@ def sources_of(project: Project) -> PageSources:
         dictionary_files(project.families, project.path),
         SystemOf(project),
     )
-
-
-def _in_german(family: Family) -> dict[str, dict[str, str]]:
-    words = FaultWords(family, "de")
-    listed = [words.listed(name) for name in listed_faults(family)]
-    return {
-        one.number: {"text": render(one.text), "cause": one.cause, "remedy": one.remedy} for one in listed
-    }
 
 
 def run_page(path: Path, signs: int | None, listening: int | None) -> Coroutine[None, None, None]:

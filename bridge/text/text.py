@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import isfinite
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, cast
 
 from bridge.text.templates import TemplatePart, templates
 
@@ -74,6 +74,20 @@ def _json_of(fact: Fact) -> object:
     if isinstance(fact, float) and not isfinite(fact):
         return str(fact)
     return [_json_of(one) for one in fact] if isinstance(fact, tuple) else fact
+
+
+def from_json(told: dict[str, Any]) -> Text:
+    """The text that ``as_json`` has told."""
+    facts = ((name, _fact_of(fact)) for name, fact in told["facts"].items())
+    return Text(told["code"], tuple(facts))
+
+
+def _fact_of(told: Any) -> Fact:
+    if isinstance(told, dict):
+        return from_json(cast("dict[str, Any]", told))
+    if isinstance(told, list):
+        return tuple(cast("Text | str", _fact_of(one)) for one in cast("list[Any]", told))
+    return told
 
 
 def render(said: Words, language: str = "en") -> str:

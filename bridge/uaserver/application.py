@@ -10,6 +10,7 @@ from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 
 from bridge.uaserver.arrivals import Arrivals
 from bridge.uaserver.explanations import Explain, Explanation
+from bridge.uaserver.history import EventHistory, ValueHistory
 from bridge.uaserver.library import ua
 
 
@@ -97,6 +98,14 @@ class ServedApplication(Protocol[U]):
     async def call(
         self, user: U, calls: Sequence[ua.CallMethodRequest], explain: Explain
     ) -> list[ua.CallMethodResult]: ...
+
+    def value_history(self, where: ua.NodeId) -> ValueHistory | None:
+        """History of a variable; None where it has none."""
+        ...
+
+    def event_history(self, where: ua.NodeId) -> EventHistory | None:
+        """Past events of an object; None where none are kept."""
+        ...
 
     def on_connection(self, user: U, *, is_there: bool, has_others: bool) -> None:
         """A session of ``user`` can be used, or cannot. ``has_others``: there are others of the same user."""

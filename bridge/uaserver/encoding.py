@@ -33,13 +33,13 @@ class Results:
     def __init__(self, most_bytes: int) -> None:
         self.count = 0
         self.encoded = bytearray()
-        self._most_bytes = most_bytes
+        self.most_bytes = most_bytes
         self._turn_at = _TURN_BYTES
 
     async def add(self, result: object) -> None:
         """Raises ServiceError where all of them are more than the client takes."""
         self.encoded += struct_to_binary(result)
-        if len(self.encoded) > self._most_bytes:
+        if len(self.encoded) > self.most_bytes:
             raise ServiceError(StatusCodes.BadResponseTooLarge)
         self.count += 1
         done = len(self.encoded) + _EACH_BYTES * self.count

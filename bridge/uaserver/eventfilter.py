@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -18,7 +18,7 @@ from bridge.uaserver.library import (
     ua,
     variant,
 )
-from bridge.uaserver.where import Where, field_name, where_clause
+from bridge.uaserver.where import Fields, Where, field_name, where_clause
 
 _NO_FIELD: Final = variant(None, ua.VariantType.Null)
 MOST_FIELDS: Final = 500
@@ -26,10 +26,12 @@ MOST_FIELDS: Final = 500
 
 @dataclass(frozen=True, slots=True)
 class Occurrence:
-    """An event as it is told at one node. ``fields`` by their names in BaseEventType."""
+    """An event as it is told at one node. ``fields`` by their names, as ``where.field_name`` has them.
+    ``is_of_refresh``: it begins or ends a ConditionRefresh, which no filter holds back (Part 9 §4.5)."""
 
     emitter: ua.NodeId
-    fields: Mapping[str, ua.Variant]
+    fields: Fields
+    is_of_refresh: bool = False
 
 
 class EventFilterFault(ServiceError):
@@ -54,10 +56,11 @@ class EventFilter:
         return 1 + (len(self.names) + self.where.operands) // 10
 
     def passes(self, event: Occurrence) -> bool:
-        return self.where.passes(event.fields)
+        return event.is_of_refresh or self.where.passes(event.fields)
 
     def fields(self, event: Occurrence) -> list[ua.Variant]:
-        return [event.fields.get(name or "", _NO_FIELD) for name in self.names]
+        told = event.fields
+        return [_NO_FIELD if name is None else told.get(name, _NO_FIELD) for name in self.names]
 
 
 def event_filter(asked: object, types: EventTypes) -> EventFilter:

@@ -28,6 +28,7 @@ from bridge.uaserver.library import (
     variant,
 )
 from bridge.uaserver.reading import Window
+from bridge.uaserver.where import Fields
 
 LEAST_SAMPLING_MS: Final = PUBLISH_EVERY_S * 1000
 _HALF_GRID_S: Final = PUBLISH_EVERY_S / 2
@@ -35,6 +36,9 @@ _HALF_GRID_S: Final = PUBLISH_EVERY_S / 2
 MOST_SAMPLING_MS: Final = 3_600_000.0
 VALUE_QUEUE: Final = 100
 EVENT_QUEUE: Final = 200
+"""Length of the queue of an item for events that leaves it to the server."""
+MOST_EVENTS: Final = 2_000
+"""Longest queue of an item for events: a plant with a thousand alarms at once."""
 _OVERFLOW: Final = 0x0480
 """InfoType DataValue and the bit Overflow of a status code (Part 4 §7.39.1)."""
 
@@ -62,10 +66,15 @@ def value_settings(asked: ua.MonitoringParameters, publishing_ms: float) -> Item
     return ItemSettings(get(asked, "ClientHandle"), sampling, size, get(asked, "DiscardOldest"))
 
 
+def event_weight(settings: ItemSettings, filter_: EventFilter) -> int:
+    """Weight of an item for events: cost of judging an event, and of keeping a queue of them."""
+    return filter_.weight * math.ceil(settings.queue_size / EVENT_QUEUE)
+
+
 def event_settings(asked: ua.MonitoringParameters) -> ItemSettings:
     """Events are not sampled; a queue of 0 or 1 asks for the server's own (Part 4 §7.21)."""
     size: int = get(asked, "QueueSize")
-    size = min(size, EVENT_QUEUE) if size > 1 else EVENT_QUEUE
+    size = min(size, MOST_EVENTS) if size > 1 else EVENT_QUEUE
     return ItemSettings(get(asked, "ClientHandle"), 0.0, size, get(asked, "DiscardOldest"))
 
 
@@ -215,8 +224,17 @@ class EventItem:
     """Number of events that a full queue has lost and nobody has counted yet."""
 
     @property
+    def weight(self) -> int:
+        return event_weight(self.settings, self.filter)
+
+    @property
     def has_something(self) -> bool:
         return bool(self.queue) or self._loss is not None
+
+    @property
+    def is_full(self) -> bool:
+        """The next event would cost another one."""
+        return len(self.queue) >= self.settings.queue_size
 
     @property
     def has_report(self) -> bool:
@@ -280,15 +298,21 @@ Item = ValueItem | EventItem
 
 def _loss(emitter: ua.NodeId) -> Occurrence:
     """The event that says that others were lost (Part 5 §6.4.34)."""
+    said = "events were lost: the queue was full"
+    fields = system_event(ObjectIds.EventQueueOverflowEventType, "Internal/EventQueueOverflow", said)
+    return Occurrence(emitter, fields)
+
+
+def system_event(kind: int, source: str, said: str) -> Fields:
+    """Fields of an event of the server about what it tells."""
     now = variant(datetime.now(UTC), ua.VariantType.DateTime)
-    fields = {
+    return {
         "EventId": variant(uuid.uuid4().bytes, ua.VariantType.ByteString),
-        "EventType": variant(node_id(ObjectIds.EventQueueOverflowEventType), ua.VariantType.NodeId),
+        "EventType": variant(node_id(kind), ua.VariantType.NodeId),
         "SourceNode": variant(node_id(ObjectIds.Server), ua.VariantType.NodeId),
-        "SourceName": variant("Internal/EventQueueOverflow", ua.VariantType.String),
+        "SourceName": variant(source, ua.VariantType.String),
         "Time": now,
         "ReceiveTime": now,
-        "Message": variant(text("events were lost: the queue was full"), ua.VariantType.LocalizedText),
+        "Message": variant(text(said), ua.VariantType.LocalizedText),
         "Severity": variant(100, ua.VariantType.UInt16),
     }
-    return Occurrence(emitter, fields)

@@ -16,7 +16,14 @@ from bridge.uaserver import ranges
 from bridge.uaserver.eventfilter import EventFilterFault, event_filter
 from bridge.uaserver.filters import change_filter
 from bridge.uaserver.hierarchy import EventTypes
-from bridge.uaserver.items import EventItem, Item, ValueItem, event_settings, value_settings
+from bridge.uaserver.items import (
+    EventItem,
+    Item,
+    ValueItem,
+    event_settings,
+    event_weight,
+    value_settings,
+)
 from bridge.uaserver.library import (
     GOOD,
     AttributeIds,
@@ -115,7 +122,7 @@ class MonitoredItems:
         filter_ = event_filter(get(asked, "Filter"), self.event_types)
         mode = get(wanted, "MonitoringMode")
         settings, share = event_settings(asked), source_of(subscription.owner.address)
-        self._event_items.change(share, filter_.weight)
+        self._event_items.change(share, event_weight(settings, filter_))
         return EventItem(next(self._numbers), node.nodeid, settings, filter_, mode, share)
 
     def _value_item(
@@ -180,7 +187,7 @@ class MonitoredItems:
             if isinstance(item, EventItem):
                 settings = event_settings(asked)
                 filter_ = event_filter(get(asked, "Filter"), self.event_types)
-                self._event_items.change(item.share, filter_.weight - item.filter.weight)
+                self._event_items.change(item.share, event_weight(settings, filter_) - item.weight)
                 item.modify(settings, filter_)
             else:
                 node = self._space[get(item.target, "NodeId")]
@@ -238,7 +245,7 @@ class MonitoredItems:
     def drop(self, subscription: Subscription, item: Item) -> None:
         subscription.drop(item)
         if isinstance(item, EventItem):
-            self._event_items.change(item.share, -item.filter.weight)
+            self._event_items.change(item.share, -item.weight)
         else:
             # A node of the diagnostics goes with its session.
             with suppress(KeyError):

@@ -22,10 +22,10 @@ from bridge.uaserver.browsing import Browser
 from bridge.uaserver.decoding import decoded, first_length
 from bridge.uaserver.encoding import UNSENDABLE, Results
 from bridge.uaserver.explanations import Explain, Explanation, add_explanations
+from bridge.uaserver.historyread import MOST_NODES
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.uaserver.monitoring import MonitoredItems, loop_time
 from bridge.uaserver.publishing import MOST_BYTES, PublishRequest
-from bridge.uaserver.servermethods import call_server, is_of_server
 from bridge.uaserver.services import request_type
 from bridge.uaserver.session import Session
 from bridge.uaserver.subscription import Subscription
@@ -155,18 +155,8 @@ def _write(session: Session, params: Any, explain: Explain) -> Any:
     return session.application.write(session.identity, get(params, "NodesToWrite"), explain)
 
 
-async def _call(session: Session, params: Any, explain: Explain) -> list[ua.CallMethodResult]:
-    calls: list[ua.CallMethodRequest] = get(params, "MethodsToCall")
-    places = [place for place, call in enumerate(calls) if not is_of_server(call)]
-    wanted = [calls[place] for place in places]
-    others = await session.application.call(
-        session.identity, wanted, lambda place, why: explain(places[place], why)
-    )
-    results = dict(zip(places, others, strict=True))
-    return [
-        results[place] if place in results else call_server(session.subscriptions, session, call)
-        for place, call in enumerate(calls)
-    ]
+def _call(session: Session, params: Any, explain: Explain) -> Any:
+    return session.call_methods(get(params, "MethodsToCall"), explain)
 
 
 def _cancel(session: Session, params: Any) -> ua.CancelResult:
@@ -234,6 +224,7 @@ ROUTES: Final[Mapping[ua.NodeId, Route]] = {
         ),
         Route("UnregisterNodes", lambda session, params: None, "NodesToUnregister", ""),
         Route("Read", None, "NodesToRead", begin=_read),
+        Route("HistoryRead", Session.read_history, "NodesToRead", most=MOST_NODES),
         Route("Write", None, "NodesToWrite", most=MOST_WRITES, explain=_write),
         Route("Call", None, "MethodsToCall", most=MOST_CALLS, explain=_call),
         Route("CreateSubscription", Session.subscribe, answer="Parameters"),

@@ -12,6 +12,7 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace, AttributeValue
 
+from bridge.uaserver import historyread
 from bridge.uaserver.address_space import is_empty
 from bridge.uaserver.browsing import MOST_CONTINUATION_POINTS
 from bridge.uaserver.conformance import claimed
@@ -43,6 +44,19 @@ _Type = ua.VariantType
 _STATUS: Final = "Server_ServerStatus_"
 _CAN: Final = "Server_ServerCapabilities_"
 _AT_ONCE: Final = f"{_CAN}OperationLimits_"
+_HISTORY: Final = "HistoryServerCapabilities_"
+_CHANGES_OF_HISTORY: Final = (
+    "InsertData",
+    "ReplaceData",
+    "UpdateData",
+    "DeleteRaw",
+    "DeleteAtTime",
+    "InsertEvent",
+    "ReplaceEvent",
+    "UpdateEvent",
+    "DeleteEvent",
+    "InsertAnnotation",
+)
 
 VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_STATUS}SecondsTillShutdown": variant(0, _Type.UInt32),
@@ -54,7 +68,7 @@ VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_CAN}LocaleIdArray": variant(["en"], _Type.String),
     f"{_CAN}MaxBrowseContinuationPoints": variant(MOST_CONTINUATION_POINTS, _Type.UInt16),
     f"{_CAN}MaxQueryContinuationPoints": variant(0, _Type.UInt16),
-    f"{_CAN}MaxHistoryContinuationPoints": variant(0, _Type.UInt16),
+    f"{_CAN}MaxHistoryContinuationPoints": variant(historyread.MOST_CONTINUATION_POINTS, _Type.UInt16),
     f"{_CAN}MinSupportedSampleRate": variant(LEAST_SAMPLING_MS, _Type.Double),
     f"{_CAN}MaxSessions": variant(MOST_SESSIONS, _Type.UInt32),
     f"{_CAN}MaxSubscriptions": variant(MOST_SUBSCRIPTIONS, _Type.UInt32),
@@ -66,14 +80,20 @@ VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_CAN}MaxWhereClauseParameters": variant(MOST_OPERANDS, _Type.UInt32),
     f"{_AT_ONCE}MaxNodesPerWrite": variant(MOST_WRITES, _Type.UInt32),
     f"{_AT_ONCE}MaxNodesPerMethodCall": variant(MOST_CALLS, _Type.UInt32),
+    f"{_AT_ONCE}MaxNodesPerHistoryReadData": variant(historyread.MOST_NODES, _Type.UInt32),
+    f"{_AT_ONCE}MaxNodesPerHistoryReadEvents": variant(historyread.MOST_NODES, _Type.UInt32),
+    f"{_HISTORY}AccessHistoryDataCapability": variant(True, _Type.Boolean),
+    f"{_HISTORY}AccessHistoryEventsCapability": variant(True, _Type.Boolean),
+    f"{_HISTORY}MaxReturnDataValues": variant(historyread.MOST_VALUES, _Type.UInt32),
+    f"{_HISTORY}MaxReturnEventValues": variant(historyread.MOST_VALUES, _Type.UInt32),
+    f"{_HISTORY}ServerTimestampSupported": variant(False, _Type.Boolean),
+    **{f"{_HISTORY}{name}Capability": variant(False, _Type.Boolean) for name in _CHANGES_OF_HISTORY},
     "Server_ServerDiagnostics_EnabledFlag": variant(True, _Type.Boolean),
     "Server_ServerRedundancy_RedundancySupport": variant(ua.RedundancySupport.None_, _Type.Int32),
 }
 """Values by the names of the nodes."""
 
 NOT_DONE: Final = (
-    f"{_AT_ONCE}MaxNodesPerHistoryReadData",
-    f"{_AT_ONCE}MaxNodesPerHistoryReadEvents",
     f"{_AT_ONCE}MaxNodesPerHistoryUpdateData",
     f"{_AT_ONCE}MaxNodesPerHistoryUpdateEvents",
     f"{_AT_ONCE}MaxNodesPerNodeManagement",

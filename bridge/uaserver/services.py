@@ -26,8 +26,8 @@ def request_type(name: str) -> ua.NodeId:
     return node_id(get(ObjectIds, f"{name}Request_Encoding_DefaultBinary"))
 
 
-def _no(name: str, why: str) -> Service:
-    return Service(name, why, StatusCodes.BadServiceUnsupported)
+def _no(name: str, why: str, code: int = StatusCodes.BadServiceUnsupported) -> Service:
+    return Service(name, why, code)
 
 
 SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
@@ -82,15 +82,18 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
             "what the bridge knows now, and with `maxAge` 0 what the drives hold of [parameters](#writing); "
             "`timestampsToReturn` and `indexRange` count; `dataEncoding` is ignored, as Part 4 §7.29 says",
         ),
-        _no("HistoryRead", "no history is kept"),
+        Service(
+            "HistoryRead",
+            "raw, at times and events, see [History](#history); anything else BadHistoryOperationUnsupported",
+        ),
         Service("Write", "see [Writing](#writing); with an `indexRange` BadWriteNotSupported"),
-        _no("HistoryUpdate", "no history is kept"),
+        _no("HistoryUpdate", "history is only read", StatusCodes.BadHistoryOperationUnsupported),
     ),
     "Method": (
         Service(
             "Call",
-            "the [methods](#methods-of-a-drive) of drives, nodes and buses, GetMonitoredItems and "
-            "ResendData; all others are BadMethodInvalid",
+            "the [methods](#methods-of-a-drive) of drives, nodes, buses and [alarms](#alarms), "
+            "GetMonitoredItems and ResendData; all others are BadMethodInvalid",
         ),
     ),
     "MonitoredItem": (

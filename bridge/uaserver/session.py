@@ -21,12 +21,15 @@ from asyncua.server.subscription_service import SubscriptionService
 from bridge.base.guard import Guard
 from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
 from bridge.uaserver.browsing import Browser
+from bridge.uaserver.condition_calls import METHODS
+from bridge.uaserver.conditions import Conditions
 from bridge.uaserver.connection_limits import MOST_CONNECTIONS
 from bridge.uaserver.counts import RequestCounts, ServerCounts
 from bridge.uaserver.diagnosticnodes import DiagnosticNodes
 from bridge.uaserver.diagnostics import SessionFacts
 from bridge.uaserver.encoding import Results
 from bridge.uaserver.explanations import Explain, Explanation
+from bridge.uaserver.historyread import HistoryReader
 from bridge.uaserver.library import (
     AttributeIds,
     ServiceError,
@@ -43,6 +46,7 @@ from bridge.uaserver.monitoring import loop_time
 from bridge.uaserver.publishing import PublishQueue
 from bridge.uaserver.quotas import make_room
 from bridge.uaserver.reading import checked_times, window
+from bridge.uaserver.servermethods import call_server, is_of_server
 from bridge.uaserver.serverstatus import ServerStatus
 from bridge.uaserver.subscription import Subscription
 from bridge.uaserver.subscriptions import Subscriptions
@@ -55,12 +59,13 @@ _NAME_BYTES: Final = 4
 """Length of the name by which a session is told from others of its user, also from those before a restart."""
 _MOST_LOCALES: Final = 10
 _READ: Final = 1
-"""Bit of an access level."""
+_READ_HISTORY: Final = 4
+"""Bits of an access level."""
 _BY_USER: Final = {
-    AttributeIds.UserAccessLevel: data_value(variant(_READ, ua.VariantType.Byte)),
-    AttributeIds.UserExecutable: data_value(variant(False, ua.VariantType.Boolean)),
+    AttributeIds.UserAccessLevel: _READ | _READ_HISTORY,
+    AttributeIds.UserExecutable: False,
 }
-"""Attributes that depend on who looks, as they are for who may only read."""
+"""Attributes that depend on who looks, with what is left of them for who may only read."""
 _NOTHING: Final = variant(None, ua.VariantType.Null)
 _NOT_FOR_HIM: Final = data_value(_NOTHING, status(StatusCodes.BadUserAccessDenied))
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
@@ -84,6 +89,7 @@ class Session(InternalSession):
         self.channel_certificate: bytes | None = None
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
+        self.history = HistoryReader(aspace, server.subscriptions.items.event_types)
         self.holder: object | None = None
         """The processor of the connection that it is activated on."""
         self.answer: Results | None = None
@@ -195,6 +201,11 @@ class Session(InternalSession):
                 await results.add(self._read(one, times))
         return results
 
+    async def read_history(self, params: ua.HistoryReadParameters) -> Any:
+        results = self.answer = Results(self.most_bytes)
+        await self.history.read(params, self.application, results)
+        return results
+
     def _read(self, wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> ua.DataValue:
         try:
             looked_at = window(wanted, times)
@@ -221,7 +232,10 @@ class Session(InternalSession):
         held = value.Value
         if attribute not in _BY_USER or held is None or not held.Value:
             return value
-        return value if self.application.may(self.identity, where) else _BY_USER[attribute]
+        if self.application.may(self.identity, where):
+            return value
+        left = variant(held.Value & _BY_USER[attribute], held.VariantType)
+        return data_value(left, value.StatusCode, value.SourceTimestamp, value.ServerTimestamp)
 
     def _is_hidden(self, where: ua.NodeId) -> bool:
         diagnostics = self._server.diagnostics
@@ -234,6 +248,23 @@ class Session(InternalSession):
         access = node.attributes.get(AttributeIds.AccessLevel) if node else None
         held = access.value.Value if access and access.value else None
         return held is None or bool(held.Value & _READ)
+
+    async def call_methods(
+        self, calls: Sequence[ua.CallMethodRequest], explain: Explain
+    ) -> list[ua.CallMethodResult]:
+        """One result for each of ``calls``, in their order: methods of conditions and of the Server object
+        are this server's own, all others the application's."""
+        conditions = self._server.conditions
+
+        async def call_one(place: int, one: ua.CallMethodRequest) -> ua.CallMethodResult:
+            if is_of_server(one):
+                return call_server(self.subscriptions, self, one)
+            if conditions is not None and get(one, "MethodId") in METHODS:
+                return await conditions.call(self, one)
+            (result,) = await self.application.call(self.identity, [one], lambda _, why: explain(place, why))
+            return result
+
+        return list(await asyncio.gather(*(call_one(place, one) for place, one in enumerate(calls))))
 
     async def subscribe(self, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
         self.subscriptions.drop_left_behind()
@@ -268,6 +299,8 @@ class InnerServer(InternalServer):
     """
 
     application: ServedApplication[Any]
+    conditions: Conditions | None = None
+    """Conditions of the application; None where it has none."""
 
     def __init__(self, *, no_security: bool) -> None:
         super().__init__()

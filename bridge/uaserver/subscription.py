@@ -176,10 +176,18 @@ class Subscription:
             held.pop(item.number, None)
         self.links.drop(item.number)
 
+    @property
+    def listeners(self) -> list[EventItem]:
+        return list(self._listeners.values())
+
     def hear(self, event: Occurrence) -> None:
         for item in self._listeners.values():
-            if item.hear(event):
-                self.noticed(item, is_queued=True)
+            self.tell(item, event)
+
+    def tell(self, item: EventItem, event: Occurrence) -> None:
+        """Tell one of its items alone."""
+        if item.hear(event):
+            self.noticed(item, is_queued=True)
 
     def repeat_values(self) -> None:
         """Tell every value again that nothing newer is queued for."""

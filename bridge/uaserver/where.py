@@ -16,9 +16,13 @@ from bridge.uaserver.library import AttributeIds, StatusCodes, get, make, status
 
 Operator = ua.FilterOperator
 _MOST_ELEMENTS: Final = 100
+_VALUE: Final = AttributeIds.Value
 MOST_OPERANDS: Final = 500
 
 Fields = Mapping[str, ua.Variant]
+"""Fields of an event by ``field_name``."""
+CONDITION_ID: Final = ""
+"""Name of the field that is a condition's own NodeId."""
 _Operand = Callable[[Fields, Sequence[Any]], Any]
 """Operand: its value for an event, and for what the elements after its own have come to."""
 
@@ -183,16 +187,23 @@ def _value_of(operand: object) -> _Operand:
     if isinstance(operand, ua.LiteralOperand):
         value = _literal(operand)
         return lambda _fields, _values: value
-    name = field_name(operand) or ""
-    return lambda fields, _values: _plain(fields.get(name))
+    name = field_name(operand)
+    return lambda fields, _values: None if name is None else _plain(fields.get(name))
 
 
 def field_name(operand: object) -> str | None:
-    """The field in our events that is meant. None of them has a field of a field, or is a condition."""
+    """The field that is meant, None for what no event has: its path, names of another namespace with its
+    index: ``Message``, ``AckedState/Id``, ``2:Code``."""
     path: list[ua.QualifiedName] = get(operand, "BrowsePath") or []
-    if len(path) != 1 or path[0].NamespaceIndex or get(operand, "AttributeId") != AttributeIds.Value:
-        return None
-    return path[0].Name
+    attribute: int = get(operand, "AttributeId")
+    if not path:
+        return CONDITION_ID if attribute == AttributeIds.NodeId else None
+    return "/".join(own_name(one.Name, one.NamespaceIndex) for one in path) if attribute == _VALUE else None
+
+
+def own_name(name: str | None, namespace: int) -> str:
+    """Name of a field in ``Fields``, of a namespace other than the standard's with its index."""
+    return f"{namespace}:{name}" if namespace else str(name)
 
 
 def _literal(operand: object) -> Any:

@@ -11,6 +11,7 @@ from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.uaserver.application import LoginAttempt, ServedApplication
 from bridge.uaserver.explanations import Explain, Explanation
+from bridge.uaserver.history import EventHistory, ValueHistory
 from bridge.uaserver.library import ServiceError
 
 Ids = ua.AttributeIds
@@ -79,6 +80,12 @@ class Served(ServedApplication[User]):
         self, user: User, calls: Sequence[ua.CallMethodRequest], explain: Explain
     ) -> list[ua.CallMethodResult]:
         return [ua.CallMethodResult() for _ in calls]
+
+    def value_history(self, where: ua.NodeId) -> ValueHistory | None:
+        return None
+
+    def event_history(self, where: ua.NodeId) -> EventHistory | None:
+        return None
 
     def on_connection(self, user: User, *, is_there: bool, has_others: bool) -> None:
         self.told.append((user.name, is_there, has_others))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from asyncua import ua
@@ -9,8 +10,7 @@ from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData,
 from asyncua.server.standard_address_space import standard_address_space
 from asyncua.ua.ua_binary import struct_to_binary
 
-from bridge.image import Image
-from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode, layout
+from bridge.northbound.opcua.nodes import FileNode, MethodNode, ObjectNode, VariableKind, VariableNode
 from bridge.northbound.opcua.structures import (
     point_attributes,
     property_attributes,
@@ -52,19 +52,22 @@ Seen = tuple[list[bytes], dict[int, bytes]]
 
 
 class HeldTree:
-    """The nodes of an image's points in ``space``. ``ids`` are theirs, ``points`` those with a value of the
-    image."""
+    """The nodes of ``trees`` in ``space``. ``ids`` are theirs, ``points`` those with a value that changes.
+    ``notifies`` is the EventNotifier of those that tell events."""
 
-    def __init__(self, space: AddressSpace, namespace: int, image: Image) -> None:
+    def __init__(
+        self, space: AddressSpace, namespace: int, trees: Sequence[ObjectNode], notifies: int = 1
+    ) -> None:
         self.space = space
         self.ids: list[ua.NodeId] = []
         self.points: set[ua.NodeId] = set()
         self._namespace = namespace
         self._management = NodeManagementService(space)
         server = ua.NodeId(Ids.Server)
-        notifies = ua.DataValue(ua.Variant(1, ua.VariantType.Byte))
-        space[server].attributes[ua.AttributeIds.EventNotifier] = AttributeValue(notifies)
-        for tree in layout(image.points):
+        self._notifies = notifies
+        told = ua.DataValue(ua.Variant(notifies, ua.VariantType.Byte))
+        space[server].attributes[ua.AttributeIds.EventNotifier] = AttributeValue(told)
+        for tree in trees:
             self._object(tree, ua.NodeId(Ids.ObjectsFolder), Ids.Organizes)
 
     def seen(self, where: ua.NodeId, space: AddressSpace | None = None) -> Seen:
@@ -82,7 +85,7 @@ class HeldTree:
         return references, {kind: as_told(value) for kind, value in values.items()}
 
     def _object(self, node: ObjectNode, parent: ua.NodeId, reference: int) -> None:
-        attributes = make(ua.ObjectAttributes, EventNotifier=1 if node.notifier else 0)
+        attributes = make(ua.ObjectAttributes, EventNotifier=self._notifies if node.notifier else 0)
         type_id = Ids.FolderType if node.folder else Ids.BaseObjectType
         where = self._add(node, ua.NodeClass.Object, attributes, type_id, parent, reference)
         if node.notifier:
@@ -93,6 +96,19 @@ class HeldTree:
             self._object(child, where, Ids.Organizes if node.folder else Ids.HasComponent)
         for variable in node.variables:
             self._variable(variable, where)
+        for file in node.files:
+            self._file(file, where)
+
+    def _file(self, node: FileNode, parent: ua.NodeId) -> None:
+        attributes = make(ua.ObjectAttributes, EventNotifier=0)
+        where = self._add(node, ua.NodeClass.Object, attributes, Ids.FileType, parent, Ids.HasComponent)
+        for live in node.properties:
+            attributes = point_attributes(ua.VariantType[live.type.value])
+            how = Ids.PropertyType, where, Ids.HasProperty, "", 0 if live.standard else None
+            self.points.add(self._add(live, ua.NodeClass.Variable, attributes, *how))
+        for method in ("Open", "Close", "Read", "Write", "GetPosition", "SetPosition"):
+            target = ua.NodeId(getattr(Ids, f"FileType_{method}"))
+            self._refer(where, Ids.HasComponent, target, ua.NodeClass.Method, one_way=True)
 
     def _method(self, method: MethodNode, parent: ua.NodeId) -> None:
         attributes = make(ua.MethodAttributes, Executable=True, UserExecutable=True)
@@ -103,11 +119,13 @@ class HeldTree:
 
     def _variable(self, node: VariableNode, parent: ua.NodeId) -> None:
         told = node.point.description if node.bit is None else f"bit {node.bit} of {node.point.leaf}"
-        attributes = point_attributes(value_type(node), writable=node.writable)
+        attributes = point_attributes(value_type(node), writable=node.writable, kept=node.kept)
         where = self._add(
             node, ua.NodeClass.Variable, attributes, _TYPES[node.kind], parent, Ids.HasComponent, told
         )
         self.points.add(where)
+        if node.kept:
+            self._refer(where, Ids.HasHistoricalConfiguration, ua.NodeId(Ids.HAConfiguration), one_way=True)
         self._properties(node, where)
         for bit in node.bits:
             self._variable(bit, where)
@@ -148,15 +166,24 @@ class HeldTree:
         self.ids.append(result.AddedNodeId)
         return result.AddedNodeId
 
-    def _refer(self, source: ua.NodeId, reference: int, target: ua.NodeId) -> None:
-        for forward, start, end in ((True, source, target), (False, target, source)):
+    def _refer(
+        self,
+        source: ua.NodeId,
+        reference: int,
+        target: ua.NodeId,
+        kind: ua.NodeClass = ua.NodeClass.Object,
+        *,
+        one_way: bool = False,
+    ) -> None:
+        ways = ((True, source, target), (False, target, source))
+        for forward, start, end in ways[:1] if one_way else ways:
             item = make(
                 ua.AddReferencesItem,
                 SourceNodeId=start,
                 ReferenceTypeId=ua.NodeId(reference),
                 IsForward=forward,
                 TargetNodeId=end,
-                TargetNodeClass=ua.NodeClass.Object,
+                TargetNodeClass=kind,
             )
             self._management.add_references([item])
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import csv
 import os
 import signal
 import subprocess
 import time
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 from asyncua import Client, ua
+from asyncua.client.ua_file import UaFile
 from pymodbus.client import AsyncModbusTcpClient
 
 from tests.support import sites
@@ -83,6 +86,52 @@ async def test_a_killed_front_is_back_and_the_drive_never_noticed(
         assert inputs[0] & 0x6F == 0x27, "still running"
         plc.close()
         assert "hung" not in bridge.output()
+
+
+@pytest.mark.landing
+async def test_a_trip_is_in_the_history_after_a_restart_of_front_and_service(
+    tmp_path: Path, ports: tuple[int, int]
+) -> None:
+    path = start(tmp_path, ports)
+    with path.open("a") as file:
+        file.write("[opcua.history]\nafter_s = 0\n")
+    silent = "modbus:127.0.0.1 was silent for 2000 ms"
+    url = f"opc.tcp://127.0.0.1:{ports[1]}"
+
+    async def past() -> tuple[list[str], bytes]:
+        """Messages of the drive's events, and its newest black box."""
+        async with Client(url, timeout=10) as client:
+            space = await client.get_namespace_index("urn:drivebridge:points")
+            drive = client.get_node(f"ns={space};s=conveyor/fu1")
+            events = await drive.read_event_history(datetime(2020, 1, 1, tzinfo=UTC), None, 1000)
+            async with UaFile(client.get_node(f"ns={space};s=conveyor/fu1/BlackBox/1"), "r") as file:
+                return [event.Message.Text for event in events], await file.read()
+
+    with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:
+        bridge.wait_ready()
+        bridge.wait_output("node operational")
+        wait_for_front(bridge)
+        plc = AsyncModbusTcpClient("127.0.0.1", port=ports[0])
+        assert await plc.connect()
+        for words in ([0x047E, 0], [0x047F, 0x2000]):
+            assert not (await plc.write_registers(0, words, device_id=UNIT)).isError()
+        bridge.wait_output("was silent for 2000 ms")
+        plc.close()
+        time.sleep(0.5)  # noqa: ASYNC251 - nothing else runs in this loop
+        before, table = await past()
+        assert any(silent in message for message in before), before
+        rows = list(csv.DictReader(table.decode("utf-8-sig").splitlines()))
+        assert float(rows[-1]["conveyor/fu1/actual/frequency [Hz]"]) > 0
+        [front] = children(bridge.pid)
+        os.kill(front, signal.SIGKILL)
+        until(lambda: starts(bridge) == 2, 30.0, "the front serves again")
+        assert await past() == (before, table)
+    with drivebridge(tmp_path, "again", "run", str(path), notify=True) as bridge:
+        bridge.wait_ready()
+        wait_for_front(bridge)
+        after, same = await past()
+        assert after[: len(before)] == before
+        assert same == table
 
 
 @pytest.mark.landing

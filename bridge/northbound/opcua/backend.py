@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import asyncio
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
 from bridge.command.messages.request import Identity, Role
 from bridge.northbound.opcua.accounts import Accounts
+from bridge.northbound.opcua.file_transfer import READING, FileTransfer, file_method
 from bridge.northbound.opcua.methods import Caller
+from bridge.northbound.opcua.plant_history import PlantHistory
 from bridge.northbound.opcua.read_through import ReadThrough
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.passwords import ANONYMOUS
@@ -17,7 +21,8 @@ from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
 from bridge.uaserver.explanations import Explain, Explanation
-from bridge.uaserver.library import ua
+from bridge.uaserver.history import EventHistory, ValueHistory
+from bridge.uaserver.library import get, ua
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +59,8 @@ class ConnectionArrivals:
 
 
 class Backend(ServedApplication[SessionUser]):
-    """Users, writes and calls of the server's sessions. ``pulse`` is that of the event loop."""
+    """Users, writes and calls of the server's sessions, and what they read of the past. ``pulse`` is that of
+    the event loop."""
 
     def __init__(
         self,
@@ -64,6 +70,7 @@ class Backend(ServedApplication[SessionUser]):
         caller: Caller,
         view: View,
         pulse: Pulse,
+        past: PlantHistory,
     ) -> None:
         self._users = users
         self._reader = reader
@@ -71,6 +78,8 @@ class Backend(ServedApplication[SessionUser]):
         self._caller = caller
         self._view = view
         self._pulse = pulse
+        self._past = past
+        self._transfer = FileTransfer(past.files)
 
     async def identify(self, login: LoginAttempt) -> SessionUser:
         how = login.token, login.nonce, login.key, login.address
@@ -78,6 +87,8 @@ class Backend(ServedApplication[SessionUser]):
         return SessionUser(replace(identity, connection=login.session))
 
     def may(self, user: SessionUser, where: ua.NodeId) -> bool:
+        if where in READING:
+            return True
         least = self._caller.least_role(where)
         if least is None:
             least = self._writer.least_role(where)
@@ -102,9 +113,31 @@ class Backend(ServedApplication[SessionUser]):
     async def call(
         self, user: SessionUser, calls: Sequence[ua.CallMethodRequest], explain: Explain
     ) -> list[ua.CallMethodResult]:
-        return await self._caller.call(user.identity, calls, explain)
+        return list(
+            await asyncio.gather(
+                *(self._call(user, call, partial(explain, place)) for place, call in enumerate(calls))
+            )
+        )
+
+    async def _call(
+        self, user: SessionUser, call: ua.CallMethodRequest, explain: Callable[[Explanation], None]
+    ) -> ua.CallMethodResult:
+        method, file = file_method(call), self._past.file(get(call, "ObjectId"))
+        if method and file:
+            given: list[ua.Variant] = get(call, "InputArguments") or []
+            return await self._transfer.call(user.identity.connection, file, method, given)
+        (result,) = await self._caller.call(user.identity, [call], lambda _, why: explain(why))
+        return result
+
+    def value_history(self, where: ua.NodeId) -> ValueHistory | None:
+        return self._past.value_history(where)
+
+    def event_history(self, where: ua.NodeId) -> EventHistory | None:
+        return self._past.event_history(where)
 
     def on_connection(self, user: SessionUser, *, is_there: bool, has_others: bool) -> None:
+        if not is_there:
+            self._transfer.leave(user.identity.connection)
         self._view.on_connection(user.identity, is_there=is_there, has_others=has_others)
 
     def on_refused(self) -> None:

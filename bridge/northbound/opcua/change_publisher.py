@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, Protocol
 
 from bridge.base import clock
 from bridge.base.guard import Guard
@@ -19,13 +19,33 @@ _TURN_S: Final = 0.001
 """Time in seconds after which others have their turn."""
 
 
-class Publisher:
-    """Follows the image for the variables in ``watched``."""
+class Past(Protocol):
+    """History that is fed with changes."""
 
-    def __init__(self, image: Image, watched: AllWatched, events: EventSender, level: ServiceLevel) -> None:
+    def record(self, places: Sequence[int]) -> None:
+        """These points have changed."""
+        ...
+
+    def look(self) -> None:
+        """Do what is due; called at each look."""
+        ...
+
+
+class Publisher:
+    """Follows the image for the variables in ``watched``, and for the history."""
+
+    def __init__(
+        self,
+        image: Image,
+        watched: AllWatched,
+        events: EventSender,
+        past: Past,
+        level: ServiceLevel,
+    ) -> None:
         self._image = image
         self._watched = watched
         self._events = events
+        self._past = past
         self._level = level
         self._guard = Guard("OPC UA publisher")
         self._turn_ends = 0.0
@@ -43,7 +63,11 @@ class Publisher:
                 while left > 0:
                     taken = feed.take(min(left, _TAKE))
                     left -= len(taken)
+                    with self._guard:
+                        self._past.record(taken)
                     await self._publish(taken)
+                with self._guard:
+                    self._past.look()
                 now = asyncio.get_running_loop().time()
                 await asyncio.sleep(next_publish(now) - now)
         finally:

@@ -13,6 +13,7 @@ from bridge.command import Rejection
 from bridge.command.messages.request import Code, Identity, Outcome
 from bridge.image import DataType, Image, Point, Quality, Reading, Value
 from bridge.text import Text
+from bridge.uaserver.history import date_time
 from bridge.uaserver.library import GOOD, StatusCodes, scalar, stamped, status, ua, variant
 
 EpochNs = Callable[[float], int]
@@ -57,6 +58,7 @@ _REJECTION_CODE: Final = {
     StatusCodes.BadNotWritable: Code.READ_ONLY,
     StatusCodes.BadNotExecutable: Code.NOT_CONFIGURED,
     StatusCodes.BadOutOfRange: Code.OUT_OF_RANGE,
+    StatusCodes.BadUserAccessDenied: Code.NOT_ALLOWED,
 }
 """Outcomes for what the server itself refuses, by status code; every other code is ``NOT_VALID``."""
 _LONGEST: Final = 200
@@ -132,7 +134,12 @@ def _cut(value: Value) -> Value:
 def source_time(epoch_ns: int) -> datetime:
     """A time in ns since 1970 as OPC UA's DateTime, to the microsecond. What changes together has the
     same."""
-    return datetime.fromtimestamp(epoch_ns / 1e9, UTC)
+    return date_time(epoch_us(epoch_ns))
+
+
+def epoch_us(epoch_ns: int) -> int:
+    """A time in ns since 1970 in µs."""
+    return (epoch_ns + 500) // 1000
 
 
 @lru_cache(maxsize=2)
@@ -156,6 +163,14 @@ def reading_value(
     # A point that has never had a value has no source time either.
     stamp = None if quality is Quality.WAITING else source_time(epoch_ns)
     return stamped(value, code, stamp, _server_time(int(time.time() * 1000)))
+
+
+def past_value(value: Value, quality: Quality, data_type: DataType, time_us: int) -> ua.DataValue:
+    """A former value of a point of this type, as ``reading_value`` tells the present one; without a server's
+    time."""
+    code = QUALITY_STATUS[quality]
+    held = _NO_VALUE if code.is_bad() else scalar(value, VARIANT_TYPE[data_type])
+    return stamped(held, code, date_time(time_us), None)
 
 
 def present_value(

@@ -11,7 +11,14 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeManagementService
 
-from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableKind, VariableNode
+from bridge.northbound.opcua.nodes import (
+    FileNode,
+    LiveProperty,
+    MethodNode,
+    ObjectNode,
+    VariableKind,
+    VariableNode,
+)
 from bridge.northbound.opcua.structures import (
     PropertyNode,
     point_attributes,
@@ -33,9 +40,10 @@ from bridge.uaserver.library import (
     variant,
 )
 
-Node = ObjectNode | MethodNode | VariableNode | PropertyNode
+Node = ObjectNode | MethodNode | VariableNode | PropertyNode | FileNode | LiveProperty
 
 SUBSCRIBE_TO_EVENTS: Final = 1
+READ_EVENT_HISTORY: Final = 4
 _ANY: Final = node_id("any", 1)
 _TYPE_DEFINITION: Final = {
     VariableKind.PLAIN: ObjectIds.BaseDataVariableType,
@@ -47,7 +55,8 @@ _TYPE_DEFINITION: Final = {
 
 @dataclass(frozen=True, slots=True)
 class NodeKind:
-    """One kind of node. ``to_type`` is the reference to the type ``type_id``; a method has none."""
+    """One kind of node. ``to_type`` are references to the type ``type_id``, which a method does
+    not have, and to other nodes of the standard's."""
 
     attributes: Mapping[AttributeIds, AttributeValue]
     node_class: ua.NodeClass
@@ -66,9 +75,12 @@ class Name:
 
 
 class Kinds:
-    """Shared parts of the nodes of a tree in ``space``. No client can write any of them."""
+    """Shared parts of the nodes of a tree in ``space``. No client can write any of them. ``keeps_events``:
+    past events are."""
 
-    def __init__(self, space: AddressSpace) -> None:
+    def __init__(self, space: AddressSpace, *, keeps_events: bool = False) -> None:
+        self.notifies = SUBSCRIBE_TO_EVENTS | (READ_EVENT_HISTORY if keeps_events else 0)
+        """EventNotifier of objects that tell events."""
         self._space = space
         self._known: dict[Hashable, NodeKind] = {}
         self._built_at = datetime.now(UTC)
@@ -87,23 +99,34 @@ class Kinds:
             case ObjectNode():
                 node_class = ua.NodeClass.Object
                 type_id = ObjectIds.FolderType if node.folder else ObjectIds.BaseObjectType
-                wanted = make(ua.ObjectAttributes, EventNotifier=SUBSCRIBE_TO_EVENTS if node.notifier else 0)
+                wanted = make(ua.ObjectAttributes, EventNotifier=self.notifies if node.notifier else 0)
             case MethodNode():
                 node_class, type_id = ua.NodeClass.Method, ObjectIds.Null
                 wanted = make(ua.MethodAttributes, Executable=True, UserExecutable=True)
             case VariableNode():
                 node_class, type_id = ua.NodeClass.Variable, _TYPE_DEFINITION[node.kind]
-                wanted = point_attributes(value_type(node), writable=node.writable)
+                wanted = point_attributes(value_type(node), writable=node.writable, kept=node.kept)
             case PropertyNode():
                 node_class, type_id = ua.NodeClass.Variable, ObjectIds.PropertyType
                 wanted = property_attributes(node.content)
-        attributes = _attributes(node_class, wanted)
+            case LiveProperty():
+                node_class, type_id = ua.NodeClass.Variable, ObjectIds.PropertyType
+                wanted = point_attributes(ua.VariantType[node.type.value])
+            case FileNode():
+                node_class, type_id = ua.NodeClass.Object, ObjectIds.FileType
+                wanted = make(ua.ObjectAttributes, EventNotifier=0)
+        attributes = node_attributes(node_class, wanted)
         if isinstance(node, PropertyNode):
             held = attributes[AttributeIds.Value].value
             change(held, SourceTimestamp=self._built_at, ServerTimestamp=self._built_at)
         to_type = ()
         if type_id != ObjectIds.Null:
             to_type = (reference_to(self._space, type_id, ObjectIds.HasTypeDefinition, forward=True),)
+        if isinstance(node, VariableNode) and node.kept:
+            how = reference_to(
+                self._space, ObjectIds.HAConfiguration, ObjectIds.HasHistoricalConfiguration, forward=True
+            )
+            to_type = (*to_type, how)
         return NodeKind(attributes, node_class, node_id(type_id), to_type)
 
 
@@ -126,10 +149,11 @@ def _description(words: str) -> AttributeValue:
 
 
 def reference_to(
-    space: AddressSpace, target: int, reference: int, *, forward: bool
+    space: AddressSpace, target: int | ua.NodeId, reference: int, *, forward: bool
 ) -> ua.ReferenceDescription:
-    """A reference of this type to a node of the standard's, as asyncua describes it."""
-    where = node_id(target)
+    """A reference of this type to a node that asyncua holds, as asyncua describes it; a number is a node of
+    the standard's."""
+    where = node_id(target) if isinstance(target, int) else target
     fields = {
         name: get(space.read_attribute_value(where, attribute).Value, "Value")
         for name, attribute in (
@@ -157,12 +181,19 @@ def _key(node: Node) -> Hashable:
         case MethodNode():
             return MethodNode
         case VariableNode():
-            return node.kind, value_type(node), node.writable
+            return node.kind, value_type(node), node.writable, node.kept
         case PropertyNode():
             return node.content
+        case LiveProperty():
+            return node.type
+        case FileNode():
+            return FileNode
 
 
-def _attributes(node_class: ua.NodeClass, wanted: ua.NodeAttributes) -> dict[AttributeIds, AttributeValue]:
+def node_attributes(
+    node_class: ua.NodeClass, wanted: ua.NodeAttributes
+) -> dict[AttributeIds, AttributeValue]:
+    """Attributes of a node as asyncua makes them."""
     space = AddressSpace()
     item = make(ua.AddNodesItem, RequestedNewNodeId=_ANY, NodeClass=node_class, NodeAttributes=wanted)
     # Without its checks: there is no parent.

@@ -91,8 +91,8 @@ class Caller:
         place = _AT_FAULT.get(outcome.code) if method.action in PARAMETER_ACTIONS else None
         if place is not None and place < len(faults):
             faults[place] = outcome_status(outcome).value
-            return _result(StatusCodes.BadInvalidArgument, faults)
-        return _result(outcome_status(outcome).value, faults, _results(method, outcome))
+            return call_result(StatusCodes.BadInvalidArgument, faults)
+        return call_result(outcome_status(outcome).value, faults, _results(method, outcome))
 
     def _rejected(
         self, identity: Identity, call: ua.CallMethodRequest, code: int, faults: Sequence[int] = ()
@@ -103,7 +103,7 @@ class Caller:
         target = method.target if method else str(get(call, "ObjectId").Identifier)
         if action != Action.READ_PARAMETER:
             self._view.rejected(rejection(identity, target, action, code, {}))
-        return _result(code, faults)
+        return call_result(code, faults)
 
     def _refusal(self, call: ua.CallMethodRequest, method_id: ua.NodeId) -> int | None:
         node = self._space.get(method_id)
@@ -153,7 +153,7 @@ def _argument(method: MethodNode, argument: Argument, given: ua.Variant) -> Valu
     return given.Value
 
 
-def _result(
+def call_result(
     code: int, arguments: Sequence[int] = (), results: Sequence[ua.Variant] = ()
 ) -> ua.CallMethodResult:
     return make(

@@ -6,7 +6,7 @@ followed by a PascalCase name, so it can never be that of a point, whose names a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
@@ -65,7 +65,8 @@ class MethodNode:
 
 @dataclass(frozen=True, slots=True)
 class VariableNode:
-    """A point, or with ``bit`` one bit of it. ``index`` is the point's place in the image."""
+    """A point, or with ``bit`` one bit of it. ``index`` is the point's place in the image. ``kept``: its past
+    values are."""
 
     id: str
     browse_name: str
@@ -74,10 +75,64 @@ class VariableNode:
     index: int
     bit: int | None = None
     bits: tuple[VariableNode, ...] = ()
+    kept: bool = False
 
     @property
     def writable(self) -> bool:
         return self.bit is None and self.point.writable
+
+
+class LiveType(Enum):
+    """Types of values that are neither a point's nor always the same."""
+
+    BOOLEAN = "Boolean"
+    UINT16 = "UInt16"
+    UINT64 = "UInt64"
+    STRING = "String"
+    DATE_TIME = "DateTime"
+
+
+@dataclass(frozen=True, slots=True)
+class LiveProperty:
+    """A property that changes while the server runs. ``standard``: its name is the standard's."""
+
+    id: str
+    browse_name: str
+    type: LiveType
+    standard: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class FileNode:
+    """A file that clients may read (FileType, OPC 10000-20 §4.2): black box of ``drive`` with this number."""
+
+    drive: str
+    number: int
+
+    @property
+    def id(self) -> str:
+        return black_box_id(self.drive, self.number)
+
+    @property
+    def browse_name(self) -> str:
+        return str(self.number)
+
+    @property
+    def properties(self) -> tuple[LiveProperty, ...]:
+        return tuple(
+            LiveProperty(f"{self.id}/{name}", name, kind, standard)
+            for name, kind, standard in _FILE_PROPERTIES
+        )
+
+
+_FILE_PROPERTIES: Final = (
+    ("Size", LiveType.UINT64, True),
+    ("Writable", LiveType.BOOLEAN, True),
+    ("UserWritable", LiveType.BOOLEAN, True),
+    ("OpenCount", LiveType.UINT16, True),
+    ("MimeType", LiveType.STRING, True),
+    ("TripTime", LiveType.DATE_TIME, False),
+)
 
 
 @dataclass(slots=True)
@@ -89,6 +144,7 @@ class ObjectNode:
     folder: bool = True
     notifier: bool = False
     methods: tuple[MethodNode, ...] = ()
+    files: tuple[FileNode, ...] = ()
     variables: list[VariableNode] = field(default_factory=list[VariableNode])
     _below: dict[str, ObjectNode] = field(default_factory=dict[str, "ObjectNode"])
 
@@ -170,8 +226,19 @@ def pascal_case(name: str) -> str:
     return "".join(word[:1].upper() + word[1:] for word in name.split("_"))
 
 
-def layout(points: Sequence[Point]) -> tuple[ObjectNode, ObjectNode, ObjectNode]:
-    """The folders ``Drives``, ``Buses`` and the object ``Bridge`` with everything below them.
+BLACK_BOX: Final = "BlackBox"
+
+
+def black_box_id(drive: str, number: int) -> str:
+    """Id of one of a drive's files, the newest of which is 1."""
+    return f"{drive}/{BLACK_BOX}/{number}"
+
+
+def layout(
+    points: Sequence[Point], kept: Collection[int] = (), black_boxes: int = 0
+) -> tuple[ObjectNode, ObjectNode, ObjectNode]:
+    """The folders ``Drives``, ``Buses`` and the object ``Bridge`` with everything below them. ``kept`` are
+    the places of points whose past values are, ``black_boxes`` the files of each drive.
 
     Nodes, drives and buses are called as the site file calls them; all other BrowseNames are
     PascalCase. Raises ValueError for a point that has no place here.
@@ -201,11 +268,12 @@ def layout(points: Sequence[Point]) -> tuple[ObjectNode, ObjectNode, ObjectNode]
                 home = node(name).folder_below(group)
             case (name, drive, *rest) if len(rest) > 1 and rest[0] in GROUPS:
                 home = _owner(node(name), f"{name}/{drive}", drive, _DRIVE_METHODS, GROUPS)
+                _add_black_boxes(home, black_boxes)
             case _:
                 raise ValueError(f"the point {point.name!r} has no place in the address space")
         for name in rest[:-1]:
             home = home.folder_below(name)
-        home.variables.append(_variable(point, index))
+        home.variables.append(_variable(point, index, kept=index in kept))
     return drives, buses, bridge
 
 
@@ -221,6 +289,12 @@ def _owner(
         return made
 
     return above.below(name, make)
+
+
+def _add_black_boxes(drive: ObjectNode, count: int) -> None:
+    if count:
+        folder = drive.folder_below(BLACK_BOX)
+        folder.files = tuple(FileNode(drive.id, number) for number in range(1, count + 1))
 
 
 def _methods(target: str, table: _Methods) -> tuple[MethodNode, ...]:
@@ -242,7 +316,7 @@ _MOST_STATES: Final = 256
 """Highest code with an entry in EnumStrings, a list from code 0 on (Part 8 §5.3.3.3)."""
 
 
-def _variable(point: Point, index: int) -> VariableNode:
+def _variable(point: Point, index: int, *, kept: bool) -> VariableNode:
     kind = VariableKind.PLAIN
     if point.states and all(0 <= code < _MOST_STATES for code, _ in point.states):
         kind = VariableKind.MULTI_STATE
@@ -257,7 +331,7 @@ def _variable(point: Point, index: int) -> VariableNode:
     )
     if len({bit.id for bit in bits}) != len(bits):
         raise ValueError(f"the point {point.name!r} has two bits of one name")
-    return VariableNode(point.name, pascal_case(point.leaf), kind, point, index, bits=bits)
+    return VariableNode(point.name, pascal_case(point.leaf), kind, point, index, bits=bits, kept=kept)
 
 
 def enum_strings(states: Sequence[tuple[int, str]]) -> tuple[str, ...]:

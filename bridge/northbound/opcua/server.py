@@ -19,17 +19,26 @@ from bridge.command import EventKind
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
 from bridge.northbound.opcua.accounts import Accounts, security_policies
+from bridge.northbound.opcua.alarm_server import AlarmSite, serve_alarms
+from bridge.northbound.opcua.alarms import AlarmTask
 from bridge.northbound.opcua.backend import Backend
 from bridge.northbound.opcua.certificates import TrustedCertificates
 from bridge.northbound.opcua.change_publisher import Publisher
-from bridge.northbound.opcua.events import BASE_TYPE, EventSender, type_name
+from bridge.northbound.opcua.event_keeper import EventKeeper
+from bridge.northbound.opcua.event_log import EventLog
+from bridge.northbound.opcua.event_records import EventCodec
+from bridge.northbound.opcua.event_types import BASE_TYPE, DRIVE_EVENT_FIELDS, EventTypeMaker, type_name
+from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.notifiers import Notifiers
 from bridge.northbound.opcua.outcome_texts import spoken
+from bridge.northbound.opcua.plant_history import PlantHistory
 from bridge.northbound.opcua.read_through import ReadThrough
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.service_level import ServiceLevel
 from bridge.northbound.opcua.tree import Tree
+from bridge.northbound.opcua.value_rings import ValueRings
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -37,13 +46,14 @@ from bridge.text import Text
 from bridge.uaserver import decoding
 from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
-from bridge.uaserver.library import ObjectIds, get, make, node_id, text, ua
+from bridge.uaserver.library import ObjectIds, node_id, ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.registration import RegisteredServer, Registration
 from bridge.uaserver.session import InnerServer
 
 NAMESPACE: Final = "urn:drivebridge:points"
 _PRODUCT: Final = "urn:drivebridge"
+_MB: Final = 1_000_000
 
 _log = logging.getLogger(__name__)
 
@@ -51,8 +61,8 @@ _log = logging.getLogger(__name__)
 class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
-    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``. ``bound`` is a
-    listening socket where somebody else holds the port.
+    ``state_dir`` is the site's; the server's own certificate is made in its folder ``opcua``, where the state
+    of the alarms is kept, too. ``bound`` is a listening socket where somebody else holds the port.
     """
 
     def __init__(
@@ -62,11 +72,13 @@ class OpcUaServer:
         state_dir: Path,
         site_name: str,
         bound: socket.socket | None = None,
+        alarm_site: AlarmSite | None = None,
     ) -> None:
         self._view = view
         self._settings = settings
         self._folder = state_dir / "opcua"
         self._site_name = site_name
+        self._alarm_site = alarm_site or AlarmSite()
         self._users: Accounts | None = None
         self._server: BoundServer | None = None
         self._socket = bound
@@ -76,6 +88,9 @@ class OpcUaServer:
         self._ending: asyncio.Task[None] | None = None
         self._registration: Registration | None = None
         self._registering: asyncio.Task[None] | None = None
+        self._follower: asyncio.Task[None] | None = None
+        self._alarms: AlarmTask | None = None
+        self._past: PlantHistory | None = None
         host, _, port = settings.listen.rpartition(":")
         self._host = host.strip("[]")
         self.port = int(port)
@@ -114,11 +129,11 @@ class OpcUaServer:
     async def failed(self) -> None:
         """Wait for ever, or raise ``OperationFailed`` when no client can connect any more or changes are not
         published."""
-        if self._socket is None or self._publisher is None:
+        if self._socket is None or self._publisher is None or self._follower is None:
             return
         deaf = asyncio.create_task(until_deaf(self._socket, "opcua.listen"))
         try:
-            await asyncio.wait((deaf, self._publisher), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((deaf, self._publisher, self._follower), return_when=asyncio.FIRST_COMPLETED)
             if not deaf.done():
                 raise OperationFailed("OPC UA: clients are told of no change any more")
             await deaf
@@ -156,16 +171,23 @@ class OpcUaServer:
             registering.cancel()
             await asyncio.gather(registering, return_exceptions=True)
             await self._registration.end()
-        task, self._publisher = self._publisher, None
-        if task:
+        tasks = [one for one in (self._publisher, self._follower) if one]
+        self._publisher = self._follower = None
+        for task in tasks:
             task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
+        if self._alarms:
+            await self._alarms.end()
         server, self._server = self._server, None
         if server:
             await server.stop()
         bound, self._socket = self._socket, None
         if bound:
             bound.close()
+        past, self._past = self._past, None
+        if past:
+            self._view.forget(past.on_event)
+            await past.close()
         if self._users:
             self._users.close()
 
@@ -182,7 +204,22 @@ class OpcUaServer:
         await self._describe(server, own.application_uri, users)
         namespace = await server.register_namespace(NAMESPACE)
         image = self._view.image
-        tree = Tree(inner.aspace, namespace, image, self._view.epoch_ns, layout(image.points))
+        kept = self._settings.history
+        rings = ValueRings(image, self._view.epoch_ns, kept)
+        trees = layout(image.points, rings.rings, kept.black_boxes)
+        how = inner.aspace, namespace, image, self._view.epoch_ns
+        tree = Tree(*how, trees, keeps_events=kept.event_hours > 0)
+        notifiers = Notifiers(tree.notifiers)
+        keeper = self._keeper(EventCodec(await server.get_namespace_array()), notifiers)
+        past = self._past = PlantHistory(
+            kept, image, self._view.epoch_ns, tree, rings, keeper, self._folder / "black_box"
+        )
+        await past.start()
+        self._view.on_event(past.on_event)
+        resets = self._settings.acknowledge_resets
+        self._alarms = serve_alarms(
+            inner, tree, self._view, self._alarm_site, own.certificate, self._folder, keeper, resets=resets
+        )
         inner.application = Backend(
             users,
             ReadThrough(self._view, tree.parameter),
@@ -190,13 +227,15 @@ class OpcUaServer:
             Caller(self._view, inner.aspace, tree.method),
             self._view,
             self._pulse,
+            past,
         )
-        events = self._events(inner, tree)
+        events = self._events(inner, tree.namespace, notifiers, keeper)
         inner.subscriptions.prepare()
         self._server, self._inner = server, inner
         await server.start()
-        publisher = Publisher(image, tree.watched, events, ServiceLevel(image, inner.status))
+        publisher = Publisher(image, tree.watched, events, past, ServiceLevel(image, inner.status))
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
+        self._follower = asyncio.create_task(self._alarms.run(), name="opcua alarms")
         if self._settings.discovery_server:
             self._register(self._settings.discovery_server, own, server.name)
         # What is there now lives as long as the process: no collection need look at it again.
@@ -228,12 +267,23 @@ class OpcUaServer:
         server.set_security_policy(security_policies(self._settings))
         server.set_identity_tokens(users.tokens)
 
-    def _events(self, inner: InnerServer, tree: Tree) -> EventSender:
-        base = _event_type(inner, node_id(BASE_TYPE, tree.namespace), node_id(ObjectIds.BaseEventType))
-        types = {
-            kind: _event_type(inner, node_id(type_name(kind), tree.namespace), base) for kind in EventKind
-        }
-        events = EventSender(self._view.epoch_ns, inner.subscriptions, tree.notifiers, types)
+    def _keeper(self, codec: EventCodec, notifiers: Notifiers) -> EventKeeper | None:
+        """The keeper of past events; None where none are kept."""
+        kept = self._settings.history
+        if not kept.event_hours:
+            return None
+        most_bytes = kept.events_mb * _MB
+        log = EventLog(codec, notifiers, kept.event_hours, most_bytes)
+        return EventKeeper(log, self._folder, most_bytes)
+
+    def _events(
+        self, inner: InnerServer, namespace: int, notifiers: Notifiers, keeper: EventKeeper | None
+    ) -> EventSender:
+        types = EventTypeMaker(inner, namespace)
+        base = types.make(BASE_TYPE, node_id(ObjectIds.BaseEventType), DRIVE_EVENT_FIELDS)
+        types.generates(base)
+        made = {kind: types.make(type_name(kind), base) for kind in EventKind}
+        events = EventSender(self._view.epoch_ns, inner.subscriptions, notifiers, made, keeper)
         self._view.on_event(events.on_event)
         return events
 
@@ -248,23 +298,6 @@ class OpcUaServer:
             )
         if settings.anonymous == "none" and not settings.user:
             _log.warning('OPC UA: nobody can log in: no [[opcua.user]] and anonymous = "none"')
-
-
-def _event_type(inner: InnerServer, where: ua.NodeId, parent: ua.NodeId) -> ua.NodeId:
-    """A new type below ``parent``. Raises UaError where there is one already."""
-    name = str(where.Identifier)
-    item = make(
-        ua.AddNodesItem,
-        RequestedNewNodeId=where,
-        BrowseName=ua.QualifiedName(name, where.NamespaceIndex),
-        NodeClass=ua.NodeClass.ObjectType,
-        ParentNodeId=parent,
-        ReferenceTypeId=node_id(ObjectIds.HasSubtype),
-        NodeAttributes=make(ua.ObjectTypeAttributes, DisplayName=text(name)),
-    )
-    (result,) = inner.node_mgt_service.add_nodes([item])
-    get(result, "StatusCode").check()
-    return where
 
 
 def built_at() -> datetime:

@@ -17,10 +17,11 @@ from bridge.northbound.opcua.nodes import (
     VariableNode,
     enum_strings,
 )
-from bridge.uaserver.library import ObjectIds, make, node_id, text, ua, variant
+from bridge.uaserver.library import ObjectIds, change, make, node_id, text, ua, variant
 
 READ: Final = 1
 READ_WRITE: Final = 3
+READ_HISTORY: Final = 4
 
 _SAMPLING_MS: Final = 50.0
 _SCALAR: Final = -1
@@ -139,15 +140,19 @@ def value_type(node: VariableNode) -> ua.VariantType:
 
 def property_attributes(content: Property) -> ua.VariableAttributes:
     rank = _ONE_DIMENSION if content.value.is_array else _SCALAR
-    return _variable_attributes(content.data_type, READ, rank, Value=content.value)
+    return variable_attributes(content.data_type, READ, rank, Value=content.value)
 
 
-def point_attributes(kind: ua.VariantType, *, writable: bool) -> ua.VariableAttributes:
-    access = READ_WRITE if writable else READ
-    return _variable_attributes(kind.value, access, _SCALAR, MinimumSamplingInterval=_SAMPLING_MS)
+def point_attributes(
+    kind: ua.VariantType, *, writable: bool = False, kept: bool = False
+) -> ua.VariableAttributes:
+    """``kept``: past values are."""
+    access = (READ_WRITE if writable else READ) | (READ_HISTORY if kept else 0)
+    made = variable_attributes(kind.value, access, _SCALAR, MinimumSamplingInterval=_SAMPLING_MS)
+    return change(made, Historizing=kept)
 
 
-def _variable_attributes(data_type: int, access: int, rank: int, **more: object) -> ua.VariableAttributes:
+def variable_attributes(data_type: int, access: int, rank: int, **more: object) -> ua.VariableAttributes:
     return make(
         ua.VariableAttributes,
         DataType=node_id(data_type),

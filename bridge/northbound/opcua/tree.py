@@ -8,18 +8,18 @@ references downwards are kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Final, cast
+from typing import Final, Protocol, cast
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.image import Image
 from bridge.northbound.opcua.data_values import EpochNs
-from bridge.northbound.opcua.kinds import SUBSCRIBE_TO_EVENTS, Kinds, Name, Node, constant, reference_to
-from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, VariableNode
+from bridge.northbound.opcua.kinds import Kinds, Name, Node, constant, reference_to
+from bridge.northbound.opcua.nodes import FileNode, LiveProperty, MethodNode, ObjectNode, VariableNode
 from bridge.northbound.opcua.point_values import AllWatched, PointValue
 from bridge.northbound.opcua.structures import PropertyNode, property_nodes
 from bridge.uaserver.address_space import Attributes, Nodes, Watchers
-from bridge.uaserver.library import AttributeIds, ObjectIds, get, node_id, ua
+from bridge.uaserver.library import AttributeIds, ObjectIds, data_value, get, node_id, ua
 
 _ORGANIZES: Final = node_id(ObjectIds.Organizes)
 _HAS_COMPONENT: Final = node_id(ObjectIds.HasComponent)
@@ -49,11 +49,13 @@ class _TreeNode:
     def references(self) -> list[ua.ReferenceDescription]:
         if self._below is None:
             self._below = [below.refer(below.reference) for below in self._tree.below(self)]
-        return [*self._upwards(), *self._below]
+            if isinstance(self.node, FileNode):
+                self._below += self._tree.to_file_methods
+        return [*self._upwards(), *self._below, *self._tree.beside.below(self.node.id)]
 
     @property
     def attributes(self) -> Attributes:
-        own = _OWN_OF_POINT if isinstance(self.node, VariableNode) else _OWN
+        own = _OWN_BY_NODE.get(type(self.node), _OWN)
         return Attributes(self._kind.attributes, own, self)
 
     @property
@@ -79,7 +81,9 @@ class _TreeNode:
     @property
     def name(self) -> Name:
         # The names of properties are the standard's, in the standard's namespace.
-        namespace = 0 if isinstance(self.node, PropertyNode) else self._tree.namespace
+        node = self.node
+        is_standard = isinstance(node, PropertyNode) or (isinstance(node, LiveProperty) and node.standard)
+        namespace = 0 if is_standard else self._tree.namespace
         return self._tree.kinds.name(self.node.browse_name, namespace)
 
     def id_attribute(self) -> AttributeValue:
@@ -93,6 +97,9 @@ class _TreeNode:
     def value_attribute(self) -> AttributeValue:
         return self._tree.value_of(cast("VariableNode", self.node))
 
+    def live_attribute(self) -> AttributeValue:
+        return self._tree.live[self.node.id]
+
 
 _OWN: Final[Mapping[int, Callable[[_TreeNode], AttributeValue]]] = {
     AttributeIds.NodeId: _TreeNode.id_attribute,
@@ -100,13 +107,41 @@ _OWN: Final[Mapping[int, Callable[[_TreeNode], AttributeValue]]] = {
     AttributeIds.DisplayName: lambda node: node.name.display_name,
     AttributeIds.Description: _TreeNode.description_attribute,
 }
-_OWN_OF_POINT: Final = {**_OWN, AttributeIds.Value: _TreeNode.value_attribute}
+_OWN_BY_NODE: Final[Mapping[type, Mapping[int, Callable[[_TreeNode], AttributeValue]]]] = {
+    VariableNode: {**_OWN, AttributeIds.Value: _TreeNode.value_attribute},
+    LiveProperty: {**_OWN, AttributeIds.Value: _TreeNode.live_attribute},
+}
+_FILE_METHODS: Final = (
+    ObjectIds.FileType_Open,
+    ObjectIds.FileType_Close,
+    ObjectIds.FileType_Read,
+    ObjectIds.FileType_Write,
+    ObjectIds.FileType_GetPosition,
+    ObjectIds.FileType_SetPosition,
+)
+
+
+class Beside(Protocol):
+    """Nodes that are not the tree's, and may stand below some of it."""
+
+    def find(self, name: str, /) -> NodeData | None: ...
+
+    def below(self, owner: str, /) -> Iterable[ua.ReferenceDescription]: ...
+
+
+class _Nothing:
+    def find(self, name: str, /) -> None:
+        return None
+
+    def below(self, owner: str, /) -> tuple[()]:
+        return ()
 
 
 class Tree:
     """The nodes of ``trees`` in ``space``. Raises ValueError where two have the same id.
 
-    ``notifiers`` are the objects that send events, by their names, ``watched`` the variables with watchers.
+    ``notifiers`` are the objects that send events, by their names, ``watched`` the variables with watchers,
+    ``live`` the values of live properties by their ids. ``keeps_events``: past events are.
     """
 
     def __init__(
@@ -116,17 +151,25 @@ class Tree:
         image: Image,
         epoch_ns: EpochNs,
         trees: Sequence[ObjectNode],
+        *,
+        keeps_events: bool = False,
     ) -> None:
         self._image = image
         self._epoch_ns = epoch_ns
         self._nodes: dict[str, _TreeNode] = {}
         self._latest_property: _TreeNode | None = None
         self.namespace = namespace
-        self.kinds = Kinds(space)
+        self.kinds = Kinds(space, keeps_events=keeps_events)
         self.to_objects = reference_to(space, ObjectIds.ObjectsFolder, ObjectIds.Organizes, forward=False)
         self.to_server = reference_to(space, ObjectIds.Server, ObjectIds.HasNotifier, forward=False)
+        # Files share the methods of their type.
+        self.to_file_methods = [
+            reference_to(space, method, ObjectIds.HasComponent, forward=True) for method in _FILE_METHODS
+        ]
+        self.live: dict[str, AttributeValue] = {}
         self.notifiers: dict[str, ua.NodeId] = {}
         self.watched: AllWatched = {}
+        self.beside: Beside = _Nothing()
         self.never_called: Watchers = {}
         """Watchers of attributes that never change: one empty table for all of them."""
         for tree in trees:
@@ -139,6 +182,8 @@ class Tree:
         made = self._nodes[node.id] = _TreeNode(self, node, above, reference)
         if made.is_notifier:
             self.notifiers[node.id] = made.nodeid
+        if isinstance(node, LiveProperty):
+            self.live[node.id] = AttributeValue(data_value(None))
         for kind, part in _parts(node):
             self._add(part, made, kind)
 
@@ -148,13 +193,31 @@ class Tree:
         notifiers = [self._nodes[name] for name in self.notifiers]
         server = space[node_id(ObjectIds.Server)]
         server.references += [one.refer(_HAS_NOTIFIER) for one in notifiers]
-        server.attributes[AttributeIds.EventNotifier] = constant(SUBSCRIBE_TO_EVENTS, ua.VariantType.Byte)
+        server.attributes[AttributeIds.EventNotifier] = constant(self.kinds.notifies, ua.VariantType.Byte)
+        # Of each change a sample is kept: between two of them nothing has changed.
+        stepped = space[node_id(ObjectIds.HAConfiguration_Stepped)]
+        stepped.attributes[AttributeIds.Value] = constant(True, ua.VariantType.Boolean)
         # asyncua puts a mapping of its own there, too, for nodes that it loads when they are asked for.
         space._nodes = Nodes(get(space, "_nodes"), self._find)  # pyright: ignore[reportPrivateUsage]
 
     def method(self, where: ua.NodeId) -> MethodNode | None:
         node = self._node(where)
         return node if isinstance(node, MethodNode) else None
+
+    @property
+    def drives(self) -> list[str]:
+        """Names of the drives that have files."""
+        nodes = (held.node for held in self._nodes.values())
+        return list(dict.fromkeys(node.drive for node in nodes if isinstance(node, FileNode)))
+
+    def point(self, where: ua.NodeId) -> int | None:
+        """Place in the image of the point that a variable is; None where it is none, or one bit of it."""
+        node = self._node(where)
+        return node.index if isinstance(node, VariableNode) and node.bit is None else None
+
+    def file(self, where: ua.NodeId) -> FileNode | None:
+        node = self._node(where)
+        return node if isinstance(node, FileNode) else None
 
     def writable(self, where: ua.NodeId) -> VariableNode | None:
         """The variable, where it is one that clients may write."""
@@ -179,7 +242,8 @@ class Tree:
 
     def _find(self, where: ua.NodeId) -> NodeData | None:
         name = self._name(where)
-        return cast("NodeData | None", self._nodes.get(name) or self._property(name))
+        found = self._nodes.get(name) or self._property(name)
+        return cast("NodeData", found) if found else self.beside.find(name)
 
     def _property(self, name: str) -> _TreeNode | None:
         # Clients ask for one attribute of a node after the other.
@@ -226,6 +290,11 @@ def _parts(node: Node) -> Iterator[tuple[ua.NodeId, Node]]:
                 yield _ORGANIZES if node.folder else _HAS_COMPONENT, child
             for variable in node.variables:
                 yield _HAS_COMPONENT, variable
+            for file in node.files:
+                yield _HAS_COMPONENT, file
+        case FileNode():
+            for live in node.properties:
+                yield _HAS_PROPERTY, live
         case VariableNode():
             for bit in node.bits:
                 yield _HAS_COMPONENT, bit

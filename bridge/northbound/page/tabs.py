@@ -23,8 +23,8 @@ from bridge.northbound.page.shares import Seat, admit
 from bridge.northbound.page.tab import BAD_MESSAGE, GONE, NO_TOKEN, SESSION_OVER, TOO_MANY, Tab, close
 from bridge.northbound.page.topics import Topics
 from bridge.northbound.page.traffic import TrafficViews
-from bridge.northbound.page.trouble_reader import TroubleReader
 from bridge.northbound.page.viewer import BadMessage
+from bridge.northbound.trouble_reader import TroubleReader
 from bridge.northbound.view import View
 from bridge.text import as_json
 

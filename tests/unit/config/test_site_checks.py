@@ -234,3 +234,22 @@ def test_a_node_of_drives_has_one(tmp_path: Path):
         f"{path}:7: bus[0].node[0].drive: is missing "
         "(a [[bus.node.drive]] for each drive; slots: fu1, fu2, fu3, fu4)"
     )
+
+
+class TestHistory:
+    @pytest.mark.parametrize(
+        ("keys", "at"),
+        [
+            ("size_mb = 200", "size_mb"),
+            ("events_mb = 100", "events_mb"),
+            ("size_mb = 101\nevents_mb = 50", "size_mb"),
+        ],
+    )
+    def test_it_leaves_the_server_room(self, tmp_path: Path, keys: str, at: str):
+        (fault,) = faults(tmp_path, f"{SMALL}[opcua.history]\n{keys}\n")
+        assert fault.startswith(f"14: opcua.history.{at}: the history takes up to 2")
+        assert "more than half of front_memory_mb = 400" in fault
+
+    def test_what_fits_is_taken(self, tmp_path: Path):
+        more = "[opcua.history]\nsize_mb = 100\nevents_mb = 50\n"
+        assert load(tmp_path, f"{SMALL}{more}").opcua

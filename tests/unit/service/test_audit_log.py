@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from bridge.base.line_file import LineFile
 from bridge.command import Action, Do, Event, Identity, Plant, Request, Source, Write
 from bridge.command.audit import AuditEntry, AuditOutcome
 from bridge.config import Site
-from bridge.service.audit_file import AuditFile
 from bridge.service.audit_log import AuditLog, as_line
 from tests.support import sites
 from tests.support.process import until
@@ -28,7 +28,7 @@ def lines(path: Path) -> list[bytes]:
     return path.read_bytes().splitlines()
 
 
-def written(file: AuditFile, *these: bytes) -> AuditFile:
+def written(file: LineFile, *these: bytes) -> LineFile:
     """The file after these lines, closed."""
     file.start()
     for line in these:
@@ -39,8 +39,8 @@ def written(file: AuditFile, *these: bytes) -> AuditFile:
 
 def test_lines_are_appended_to_what_is_there(tmp_path: Path) -> None:
     path = tmp_path / "deep" / "audit.jsonl"
-    written(AuditFile(path, 10_000, 2), b"one\n", b"two\n")
-    file = written(AuditFile(path, 10_000, 2), b"three\n")
+    written(LineFile(path, 10_000, 2), b"one\n", b"two\n")
+    file = written(LineFile(path, 10_000, 2), b"three\n")
     assert lines(path) == [b"one", b"two", b"three"]
     assert file.all_lost == 0
     assert path.stat().st_mode & 0o777 == 0o640
@@ -48,7 +48,7 @@ def test_lines_are_appended_to_what_is_there(tmp_path: Path) -> None:
 
 def test_it_is_rotated_by_size_and_the_oldest_go(tmp_path: Path) -> None:
     path = tmp_path / "audit.jsonl"
-    written(AuditFile(path, 1000, 2), *(b"%04d%s" % (n, LINE[4:]) for n in range(35)))
+    written(LineFile(path, 1000, 2), *(b"%04d%s" % (n, LINE[4:]) for n in range(35)))
     assert sorted(entry.name for entry in tmp_path.iterdir()) == [
         "audit.jsonl",
         "audit.jsonl.1",
@@ -61,20 +61,20 @@ def test_it_is_rotated_by_size_and_the_oldest_go(tmp_path: Path) -> None:
 
 def test_none_is_kept_where_none_is_wanted(tmp_path: Path) -> None:
     path = tmp_path / "audit.jsonl"
-    written(AuditFile(path, 1000, 0), *[LINE] * 11)
+    written(LineFile(path, 1000, 0), *[LINE] * 11)
     assert [entry.name for entry in tmp_path.iterdir()] == ["audit.jsonl"]
     assert len(lines(path)) == 1
 
 
 def test_a_full_disk_costs_lines_and_says_so() -> None:
-    file = written(AuditFile(Path("/dev/full"), 10_000, 2), LINE, LINE)
+    file = written(LineFile(Path("/dev/full"), 10_000, 2), LINE, LINE)
     assert file.all_lost == 2
     assert file.fault == os.strerror(28)
 
 
 def test_a_folder_that_cannot_be_made_costs_lines_and_says_so(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    file = written(AuditFile(tmp_path / "file" / "audit.jsonl", 10_000, 2), LINE)
+    file = written(LineFile(tmp_path / "file" / "audit.jsonl", 10_000, 2), LINE)
     assert file.all_lost == 1
     assert file.fault
 
@@ -84,7 +84,7 @@ def test_a_line_that_fits_in_part_is_taken_back(tmp_path: Path) -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (150, hard))
     try:
-        file = written(AuditFile(path, 10_000, 2), LINE, LINE)
+        file = written(LineFile(path, 10_000, 2), LINE, LINE)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert path.read_bytes() == LINE
@@ -95,7 +95,7 @@ def test_it_goes_on_when_the_disk_does(tmp_path: Path) -> None:
     folder = tmp_path / "state"
     folder.touch()
     now = 100.0
-    file = AuditFile(folder / "audit.jsonl", 10_000, 2, lambda: now)
+    file = LineFile(folder / "audit.jsonl", 10_000, 2, lambda: now)
     file.start()
     file.put(b"lost\n")
     until(lambda: file.lost == 1, 5, "the first line is lost")
@@ -113,7 +113,7 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path: Path) -> None:
     """A FIFO without a reader: opening it never returns."""
     path = tmp_path / "audit.jsonl"
     os.mkfifo(path)
-    file = AuditFile(path, 10_000, 2)
+    file = LineFile(path, 10_000, 2)
     file.start()
     begin = time.monotonic()
     for _ in range(10_500):

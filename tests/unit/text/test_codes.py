@@ -17,18 +17,24 @@ from bridge.canopen.nmt import NmtCommand, NmtState, command_name
 from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import Action
 from bridge.condition.causes import RULES
+from bridge.condition.plant_layout import MOVES_BY
 from bridge.config import NodeTable, Reaction
 from bridge.drive import DriveState
+from bridge.northbound.trouble_words import CONDITION_WORDS
 from bridge.text import LANGUAGES, Text
 from bridge.text.templates import parse, source, templates
+from bridge.uaserver.condition_fields import STATES
 
 GROUPS: Final[Mapping[str, Iterable[str]]] = {
     "action": list(Action),
+    "alarm_state": STATES,
+    "condition": CONDITION_WORDS,
     "controller_state": [state.name.lower() for state in ControllerState],
     "drive_state": [state.label for state in DriveState],
     "nmt_command": [command_name(command) for command in NmtCommand],
     "nmt_state": [state.words for state in NmtState],
     "node_state": [state.value for state in NodeState],
+    "quantity": MOVES_BY,
     "reaction": get_args(Reaction),
     "supervision": get_args(NodeTable.model_fields["supervision"].annotation),
     "trouble": sorted({rule.cause for rule in RULES}),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from bridge.text import Text, as_json, render
+from bridge.text import Text, as_json, from_json, render
 
 
 def test_equal_codes_and_facts_are_the_same_text() -> None:
@@ -53,3 +53,11 @@ def test_a_text_comes_through_messagepack_as_it_is() -> None:
     back = msgspec.msgpack.decode(msgspec.msgpack.encode(said), type=Text)
     assert back == said
     assert render(back) == render(said)
+
+
+def test_json_is_the_text_again() -> None:
+    inner = Text.of("front.fails", front="zenoh", how=Text.of("front.has_ended"))
+    whole = Text.of("front.failing", parts=(inner, inner))
+    told = as_json(whole)
+    assert told is not None
+    assert from_json(told) == whole

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from asyncua import ua
 
-from bridge.uaserver.eventfilter import EventFilterFault, event_filter
+from bridge.uaserver.eventfilter import EventFilterFault, Occurrence, event_filter
 from bridge.uaserver.hierarchy import EventTypes
 from bridge.uaserver.library import DataChangeFilter, ServiceError
+from bridge.uaserver.where import field_name, own_name
 from tests.support.opcua_filters import (
     EVENT,
     MESSAGE,
+    SERVER,
     SEVERITY,
     asked,
     chosen,
@@ -73,3 +77,33 @@ def test_what_is_no_event_filter_is_refused(types: EventTypes, wrong: object, co
     with pytest.raises(ServiceError) as refused:
         event_filter(wrong, types)
     assert refused.value.code == code
+
+
+def test_a_field_is_found_by_a_path_of_several_names(types: EventTypes) -> None:
+    node_id = chosen(type_id=Ids.ConditionType, attribute=ua.AttributeIds.NodeId)
+    acked = chosen("AckedState", "Id", type_id=Ids.AcknowledgeableConditionType)
+    state = chosen("ShelvingState", "CurrentState", "Id", type_id=Ids.AlarmConditionType)
+    found = event_filter(asked(element(Op.Equals, acked, False), select=[node_id, acked, state]), types)
+    fields = {
+        "": ua.Variant(ua.NodeId("conveyor/fu1/Alarm", 2)),
+        "AckedState/Id": ua.Variant(False),
+        "ShelvingState/CurrentState/Id": ua.Variant(ua.NodeId(Ids.ShelvedStateMachineType_Unshelved)),
+    }
+    event = Occurrence(SERVER, fields)
+    assert found.passes(event)
+    assert found.fields(event) == list(fields.values())
+    assert not found.passes(EVENT), "an event without the field"
+    assert [one.Value for one in found.fields(EVENT)] == [None] * 3
+
+
+def test_no_filter_holds_back_what_begins_and_ends_a_refresh(types: EventTypes) -> None:
+    found = event_filter(asked(element(Op.Equals, SEVERITY, 1)), types)
+    assert not found.passes(EVENT)
+    assert found.passes(replace(EVENT, is_of_refresh=True))
+
+
+def test_a_field_of_another_namespace_has_its_index() -> None:
+    operand = ua.SimpleAttributeOperand(
+        ua.NodeId(Ids.BaseEventType), [ua.QualifiedName("Code", 2)], ua.AttributeIds.Value
+    )
+    assert field_name(operand) == own_name("Code", 2) == "2:Code"

@@ -184,7 +184,7 @@ def test_the_sampling_interval_is_revised_to_what_is_used(asked: float, used: fl
 
 
 @pytest.mark.parametrize(
-    ("asked", "values", "events"), [(0, 1, 200), (1, 1, 200), (7, 7, 7), (0xFFFF_FFFF, 100, 200)]
+    ("asked", "values", "events"), [(0, 1, 200), (1, 1, 200), (7, 7, 7), (0xFFFF_FFFF, 100, 2000)]
 )
 def test_the_queue_size_is_revised_to_what_is_used(asked: int, values: int, events: int) -> None:
     wanted = ua.MonitoringParameters(QueueSize=asked)

@@ -1,7 +1,7 @@
 // Asks node-opcua's way for what each service answers, and prints it as one line of JSON.
 // node services.mjs URL
 import {
-  AttributeIds, DataChangeFilter, DataChangeTrigger, DeadbandType, MessageSecurityMode, MonitoringMode,
+  AttributeIds, DataChangeFilter, HistoryReadRequest, ReadAtTimeDetails, ReadEventDetails, DataChangeTrigger, DeadbandType, MessageSecurityMode, MonitoringMode,
   OPCUAClient, SecurityPolicy, TimestampsToReturn, constructEventFilter, ofType,
 } from "node-opcua-client";
 
@@ -26,7 +26,29 @@ while (result.continuationPoint) {
   result = await session.browseNext(result.continuationPoint, false);
   seen.browsed.push(result.references.length);
 }
-seen.history = await failed(session.readHistoryValue(id("bus/can0/load"), new Date(0), new Date()));
+const [none_kept] = await session.readHistoryValue([id("bus/can0/load")], new Date(0), new Date());
+seen.history = none_kept.statusCode.name;
+const frequency = id("conveyor/fu1/actual/frequency");
+const [kept] = await session.readHistoryValue([frequency], new Date(0), new Date(), {
+  numValuesPerNode: 5, returnBounds: false,
+});
+seen.kept = [kept.statusCode.name, kept.historyData.dataValues.length > 0];
+const last = kept.historyData.dataValues.at(-1);
+// A Date has milliseconds only.
+const reqTimes = [new Date(last.sourceTimestamp.getTime() + 1)];
+const at = await session.historyRead(new HistoryReadRequest({
+  historyReadDetails: new ReadAtTimeDetails({ reqTimes, useSimpleBounds: true }),
+  nodesToRead: [{ nodeId: frequency }], timestampsToReturn: TimestampsToReturn.Both,
+}));
+seen.at = at.results[0].historyData.dataValues[0].value.value === last.value.value;
+const fields = constructEventFilter(["SourceName", "Message", "Severity"]);
+const past = await session.historyRead(new HistoryReadRequest({
+  historyReadDetails: new ReadEventDetails({
+    startTime: new Date(0), endTime: new Date(Date.now() + 60000), numValuesPerNode: 10, filter: fields,
+  }),
+  nodesToRead: [{ nodeId: "i=2253" }], timestampsToReturn: TimestampsToReturn.Both,
+}));
+seen.past = past.results[0].historyData.events.map((one) => one.eventFields.map(({ value }) => value.text ?? value));
 seen.query = await failed(session.queryFirst({}));
 const part = await session.read({ nodeId: "i=2255", attributeId: AttributeIds.Value, indexRange: "1:2" });
 seen.part = part.value.value.length;

@@ -21,6 +21,7 @@ from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary
 from bridge.base.errors import OperationFailed
 from bridge.mirror import MirrorClient, MirrorPublisher, socket_endpoint
 from bridge.northbound.opcua.server import OpcUaServer
+from bridge.uaserver.services import REFUSED
 from bridge.uaserver.session import Session
 from tests.support.opcua_client import node, write_value
 from tests.support.opcua_hostile import (
@@ -54,7 +55,7 @@ Served = tuple[OpcUaServer, LocalView]
 NOT_DECODED = (
     Codes.BadDecodingError,
     # Refused before anybody looks at what they say.
-    Codes.BadServiceUnsupported,
+    *REFUSED.values(),
     Codes.BadTooManySessions,
     Codes.BadUserAccessDenied,
 )

@@ -13,7 +13,10 @@ from typing import Any
 
 import pytest
 
+from bridge.command import Event, EventKind
 from bridge.config import OpcUaTable, UserTable
+from bridge.text import Text
+from tests.support.opcua_alarms import cut_bus, tell
 from tests.support.opcua_raw import cut, sessions
 from tests.support.opcua_site import OPEN, serving
 from tests.support.passwords import cheap_hash
@@ -92,13 +95,19 @@ async def test_node_opcua_browses_reads_writes_subscribes_and_calls(encrypted: b
 
 @pytest.mark.landing
 async def test_node_opcua_walks_through_the_services(tmp_path: Path) -> None:
-    async with serving(OPEN, tmp_path) as (server, _):
+    async with serving(OPEN, tmp_path) as (server, view):
+        happened = Event(time.monotonic(), EventKind.WATCHDOG, "conveyor/fu1", 900, Text.of("node.lost"))
+        view.plant.events.report(happened)
+        view.plant.deliver_outcomes()
         seen = await answers("services.mjs", tmp_path, server.endpoint_url)
     browsed = seen.pop("browsed")
     assert set(browsed[:-1]) == {3}
     assert sum(browsed) > 10
     assert seen == {
-        "history": "BadServiceUnsupported",
+        "history": "BadHistoryOperationUnsupported",
+        "kept": ["Good", True],
+        "at": True,
+        "past": [["conveyor/fu1", "node lost", 900]],
         "query": "BadServiceUnsupported",
         "part": 2,
         "none": "BadIndexRangeNoData",
@@ -172,3 +181,22 @@ async def test_node_opcua_works_in_the_middle_of_a_crowd(tmp_path: Path) -> None
         for _, writer in crowd:
             writer.close()
     assert (seen["run"], seen["stop"]) == ("Good", "Good")
+
+
+async def test_node_opcua_follows_an_alarm_and_handles_it(tmp_path: Path) -> None:
+    """By its own means for alarms, with a comment in German. It asks for no language."""
+    async with serving(settings_for(encrypted=False), tmp_path) as (server, view):
+        said: list[dict[str, Any]] = []
+        async with node("alarms.mjs", tmp_path, server.endpoint_url, "anna", "swordfish") as process:
+            assert process.stdout
+            async for line in process.stdout:
+                said.extend(lines(line))
+                if said and "monitoring" in said[-1]:
+                    tell(view, cut_bus("conveyor"))
+    _, raised, acked, shelved, done = said
+    assert raised.pop("message").startswith("No node answers.")
+    assert raised == {"severity": 800, "source": "can0", "retain": True}
+    comment = {"comment": "gesehen, Kabel wird getauscht", "locale": "de"}
+    assert acked == {"acked": "acknowledged", "user": "anna"} | comment
+    assert shelved == {"shelved": "timed shelved"}
+    assert done == {"calls": ["Good", "Good", "BadConditionBranchAlreadyAcked", "Good"]}

@@ -25,7 +25,9 @@ def user(name: str = "anna", role: Role = Role.OPERATOR, connection: str = "") -
 
 
 class Told:
-    """In place of the users, the writer, the caller and the view."""
+    """In place of the users, the writer, the caller, the view and the past."""
+
+    files: Any = None
 
     def __init__(self) -> None:
         self.calls: list[tuple[object, ...]] = []
@@ -38,7 +40,10 @@ class Told:
         self.calls.append((identity, writes))
         return []
 
-    call = write
+    async def call(self, identity: Identity, calls: list[object], explain: object) -> list[object]:
+        return await self.write(identity, calls, explain) or calls
+
+    def file(self, where: ua.NodeId) -> None: ...
 
     async def read(self, identity: Identity, nodes: object) -> dict[object, object]:
         self.calls.append((identity, nodes))
@@ -52,7 +57,7 @@ class Told:
 
 
 def backend(told: Any, pulse: Any = None) -> Backend:
-    return Backend(told, told, told, told, told, pulse)
+    return Backend(told, told, told, told, told, pulse, told)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +80,7 @@ def test_what_a_user_may_write_and_call_follows_from_the_role(where: str, least:
     point = Point(name=where, data_type=DataType.FLOAT, writable="/status/" not in where)
     variable = VariableNode(where, "", VariableKind.PLAIN, point, 0) if found is None else None
     writer = Writer(told, told, lambda _: variable if variable and variable.writable else None)
-    made = Backend(told, told, writer, Caller(told, told, lambda _: found), told, told)
+    made = Backend(told, told, writer, Caller(told, told, lambda _: found), told, told, told)
     allowed = [role for role in Role if made.may(user(role=role), ua.NodeId(where, 2))]
     assert allowed == [role for role in Role if role >= least]
 
@@ -100,14 +105,15 @@ async def test_the_view_is_told_by_the_identity() -> None:
     told = Told()
     made, who = backend(told), user()
     await made.write(who, [], lambda place, why: None)
-    await made.call(who, [], lambda place, why: None)
+    call = ua.CallMethodRequest()
+    assert await made.call(who, [call], lambda place, why: None) == [call]
     await made.refresh(who, [])
     made.on_connection(who, is_there=True, has_others=False)
     made.on_refused()
     made.on_broken()
     assert told.calls == [
         (who.identity, []),
-        (who.identity, []),
+        (who.identity, [call]),
         (who.identity, []),
         (who.identity, True, False),
         ("opcua_refused_connections",),

@@ -45,6 +45,12 @@ class Level:
     async def look(self) -> None: ...
 
 
+class Past:
+    def record(self, places: list[int]) -> None: ...
+
+    def look(self) -> None: ...
+
+
 async def test_many_that_watch_one_point_are_told_in_turns_and_of_the_newest_value() -> None:
     turn, number = 0, 1
     told: list[tuple[int, int, int]] = []
@@ -73,10 +79,11 @@ async def test_many_that_watch_one_point_are_told_in_turns_and_of_the_newest_val
     variable = WatchedVariable(watchers, lambda: ua.DataValue(ua.Variant(number, ua.VariantType.UInt16)))
     image: Any = Image()
     events: Any = Events()
+    past: Any = Past()
     level: Any = Level()
     running = [
         asyncio.create_task(count_turns()),
-        asyncio.create_task(Publisher(image, {0: {-1: variable}}, events, level).run()),
+        asyncio.create_task(Publisher(image, {0: {-1: variable}}, events, past, level).run()),
     ]
     await until(lambda: len(told) >= WATCHERS - 1, "the last one to be told")
     for task in running:

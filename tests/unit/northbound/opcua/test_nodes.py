@@ -160,3 +160,24 @@ def test_sparse_codes_stand_at_their_index() -> None:
         "bad",
         "unknown",
     )
+
+
+def test_each_drive_has_its_black_boxes(points: tuple[Point, ...]) -> None:
+    trees = layout(points, black_boxes=2)
+    folder = find(trees, "conveyor/fu1/BlackBox")
+    assert [(file.id, file.browse_name) for file in folder.files] == [
+        ("conveyor/fu1/BlackBox/1", "1"),
+        ("conveyor/fu1/BlackBox/2", "2"),
+    ]
+    assert [one.id for one in folder.files[0].properties][:2] == [
+        "conveyor/fu1/BlackBox/1/Size",
+        "conveyor/fu1/BlackBox/1/Writable",
+    ]
+    drives = [name for name in ids(trees) if name.endswith("/BlackBox")]
+    assert len(drives) == 4
+    assert not any("BlackBox" in name for name in ids(layout(points)))
+
+
+def test_points_whose_past_is_kept_are_marked(points: tuple[Point, ...]) -> None:
+    found = variables(layout(points, [3, 5]))
+    assert sorted(variable.index for variable in found if variable.kept) == [3, 5]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import random
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from bridge.catalogue import Catalogue
 from bridge.command import Plant
 from bridge.image import DataType, Image, Point
 from bridge.mapping import family_names
-from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.nodes import ObjectNode, layout
 from bridge.northbound.opcua.tree import Tree
 from bridge.project import load_project
 from tests.support import sites
@@ -78,9 +78,21 @@ def tree(space: AddressSpace, image: Image) -> Tree:
 @pytest.mark.parametrize("name", PLANTS)
 def test_clients_see_what_asyncua_would_have_held(name: str, standard: AddressSpace, tmp_path: Path) -> None:
     image = PLANTS[name](tmp_path).image
-    held = HeldTree(copy_of(standard), NAMESPACE, image)
+    check_against_asyncua(standard, image, layout(image.points))
+
+
+@pytest.mark.landing
+def test_clients_see_of_history_what_asyncua_would_have_held(standard: AddressSpace) -> None:
+    image = make_plant().image
+    check_against_asyncua(standard, image, layout(image.points, range(0, 500, 3), 2), keeps_events=True)
+
+
+def check_against_asyncua(
+    standard: AddressSpace, image: Image, trees: Sequence[ObjectNode], *, keeps_events: bool = False
+) -> None:
+    held = HeldTree(copy_of(standard), NAMESPACE, trees, 5 if keeps_events else 1)
     space = copy_of(standard)
-    tree_in(space, image)
+    Tree(space, NAMESPACE, image, epoch, trees, keeps_events=keeps_events)
     ids = [ua.NodeId(ua.ObjectIds.ObjectsFolder), ua.NodeId(ua.ObjectIds.Server), *held.ids]
     random.Random(1).shuffle(ids)
     for where in ids:
@@ -117,6 +129,75 @@ def test_two_nodes_of_one_id_are_an_error(space: AddressSpace) -> None:
     word = Point(name="bridge/word", data_type=DataType.UINT16, bits=("low",))
     with pytest.raises(ValueError, match="two nodes have the id 'bridge/word'"):
         tree_in(space, Image([word, Point(name="bridge/word/low", data_type=DataType.BOOL)]))
+
+
+class TestHistory:
+    KEPT, OTHER = "conveyor/fu1/actual/frequency", "conveyor/fu1/actual/current"
+
+    @pytest.fixture
+    def tree(self, space: AddressSpace, image: Image) -> Tree:
+        trees = layout(image.points, [image.index[self.KEPT]], 1)
+        return Tree(space, NAMESPACE, image, epoch, trees, keeps_events=True)
+
+    @staticmethod
+    def read(space: AddressSpace, name: str, *attributes: ua.AttributeIds) -> list[Any]:
+        where = ua.NodeId(name, NAMESPACE)
+        return [space.read_attribute_value(where, one).Value.Value for one in attributes]
+
+    def test_a_variable_says_whether_its_past_is_kept(self, tree: Tree, space: AddressSpace) -> None:
+        asked = (
+            ua.AttributeIds.AccessLevel,
+            ua.AttributeIds.UserAccessLevel,
+            ua.AttributeIds.Historizing,
+        )
+        assert self.read(space, self.KEPT, *asked) == [5, 5, True]
+        assert self.read(space, self.OTHER, *asked) == [1, 1, False]
+
+    def test_a_variable_whose_past_is_kept_says_how(self, tree: Tree, space: AddressSpace) -> None:
+        def configured(name: str) -> list[ua.NodeId]:
+            wanted = ua.NodeId(ua.ObjectIds.HasHistoricalConfiguration)
+            references = space[ua.NodeId(name, NAMESPACE)].references
+            return [one.NodeId for one in references if one.ReferenceTypeId == wanted]
+
+        assert configured(self.KEPT) == [ua.NodeId(ua.ObjectIds.HAConfiguration)]
+        assert configured(self.OTHER) == []
+        stepped = ua.NodeId(ua.ObjectIds.HAConfiguration_Stepped)
+        assert space.read_attribute_value(stepped, VALUE).Value.Value is True
+
+    def test_an_object_says_whether_its_events_are_kept(
+        self, tree: Tree, space: AddressSpace, standard: AddressSpace, image: Image
+    ) -> None:
+        notifies = ua.AttributeIds.EventNotifier
+        assert self.read(space, "conveyor/fu1", notifies) == [5]
+        server = ua.NodeId(ua.ObjectIds.Server)
+        assert space.read_attribute_value(server, notifies).Value.Value == 5
+        without = copy_of(standard)
+        tree_in(without, image)
+        assert self.read(without, "conveyor/fu1", notifies) == [1]
+
+    def test_points_and_files_are_found_by_their_node_ids(self, tree: Tree, image: Image) -> None:
+        found = {name: tree.point(ua.NodeId(name, NAMESPACE)) for name in (self.KEPT, "conveyor/fu1")}
+        assert found == {self.KEPT: image.index[self.KEPT], "conveyor/fu1": None}
+        bit = ua.NodeId("conveyor/fu1/status/status_word/fault", NAMESPACE)
+        assert tree.point(bit) is None
+        file = tree.file(ua.NodeId("conveyor/fu1/BlackBox/1", NAMESPACE))
+        assert file is not None
+        assert (file.drive, file.number) == ("conveyor/fu1", 1)
+        assert tree.file(ua.NodeId("conveyor/fu1/BlackBox", NAMESPACE)) is None
+        assert tree.drives == [f"conveyor/fu{number}" for number in range(1, 5)]
+
+    def test_a_file_has_the_methods_of_its_type(self, tree: Tree, space: AddressSpace) -> None:
+        file = space[ua.NodeId("conveyor/fu1/BlackBox/1", NAMESPACE)]
+        shared = [one.NodeId.Identifier for one in file.references if one.NodeClass == ua.NodeClass.Method]
+        assert shared[:3] == [
+            ua.ObjectIds.FileType_Open,
+            ua.ObjectIds.FileType_Close,
+            ua.ObjectIds.FileType_Read,
+        ]
+        trip = space[ua.NodeId("conveyor/fu1/BlackBox/1/TripTime", NAMESPACE)]
+        size = space[ua.NodeId("conveyor/fu1/BlackBox/1/Size", NAMESPACE)]
+        names = [one.attributes[ua.AttributeIds.BrowseName].value.Value.Value for one in (trip, size)]
+        assert names == [ua.QualifiedName("TripTime", NAMESPACE), ua.QualifiedName("Size", 0)]
 
 
 class TestWatching:

@@ -23,7 +23,10 @@ _KINDS = re.compile(r'Trouble\(\s*Rank\.\w+,\s*"(\w+)"')
 
 
 def texts(language: str) -> dict[str, str]:
-    lines = (JS / f"texts/{language}.js").read_text(encoding="utf-8").splitlines()
+    """The language's own file, and its part of those that the bridge has."""
+    of_bridge = (JS / "texts/troubles.js").read_text(encoding="utf-8")
+    shared = of_bridge.partition(f"export const {language} = ")[2].partition("};")[0]
+    lines = [*(JS / f"texts/{language}.js").read_text(encoding="utf-8").splitlines(), *shared.splitlines()]
     found = {match[1]: line[match.end() :] for line in lines if (match := _KEY.match(line))}
     assert len(found) > 150
     return found

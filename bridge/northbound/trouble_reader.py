@@ -17,7 +17,8 @@ from bridge.image import Image
 _TROUBLES: Final = "bridge/troubles"
 _RECENT: Final = "bridge/recent_troubles"
 _WAITING: Final = "bridge/drives_waiting"
-_decode = msgspec.json.Decoder(list[dict[str, Any]]).decode
+decoded = msgspec.json.Decoder(list[dict[str, Any]]).decode
+"""Troubles as their point has them."""
 
 
 class TroubleReader:
@@ -50,7 +51,7 @@ class TroubleReader:
         told = str(self._reader(_TROUBLES) or "[]"), str(self._reader(_RECENT) or "[]")
         if told != self._told:
             self._told = told
-            self.shown, self.recent = _decode(told[0]), _decode(told[1])
+            self.shown, self.recent = decoded(told[0]), decoded(told[1])
         waiting = self._reader(_WAITING)
         self.waiting = waiting if isinstance(waiting, int) else 0
 

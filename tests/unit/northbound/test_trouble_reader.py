@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bridge.condition.told import troubles_json
 from bridge.image import Quality
-from bridge.northbound.page.trouble_reader import TroubleReader
+from bridge.northbound.trouble_reader import TroubleReader
 from tests.support import sites
 from tests.support.condition import Watched
 

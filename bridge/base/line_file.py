@@ -19,7 +19,7 @@ _CLOSE_S: Final = 2.0
 _MODE: Final = 0o640
 
 
-class AuditFile:
+class LineFile:
     """The file ``path`` with ``keep`` older ones beside it, ``path.1`` the youngest, each of ``max_bytes`` at
     most.
 

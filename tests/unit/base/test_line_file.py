@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from bridge.service.audit_file import AuditFile
+from bridge.base.line_file import LineFile
 
 
-def written(folder: Path, *lines: bytes, max_bytes: int = 20, keep: int = 2) -> AuditFile:
-    file = AuditFile(folder / "log" / "audit.log", max_bytes, keep)
+def written(folder: Path, *lines: bytes, max_bytes: int = 20, keep: int = 2) -> LineFile:
+    file = LineFile(folder / "log" / "audit.log", max_bytes, keep)
     file.start()
     for line in lines:
         file.put(line)
@@ -63,7 +63,7 @@ def test_what_cannot_be_written_is_counted_with_the_reason(tmp_path: Path) -> No
 
 def test_after_a_pause_it_is_tried_again(tmp_path: Path) -> None:
     now = 100.0
-    file = AuditFile(tmp_path / "log" / "audit.log", 100, 1, lambda: now)
+    file = LineFile(tmp_path / "log" / "audit.log", 100, 1, lambda: now)
     (tmp_path / "log").write_text("a file")
     file._write(b"one\n")
     (tmp_path / "log").unlink()
@@ -77,12 +77,12 @@ def test_after_a_pause_it_is_tried_again(tmp_path: Path) -> None:
 
 
 def test_half_a_line_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from bridge.service import audit_file
+    from bridge.base import line_file
 
-    file = AuditFile(tmp_path / "log" / "audit.log", 100, 1, lambda: 0.0)
+    file = LineFile(tmp_path / "log" / "audit.log", 100, 1, lambda: 0.0)
     file._write(b"one\n")
-    write = audit_file.os.write
-    monkeypatch.setattr(audit_file.os, "write", lambda number, data: write(number, data[:2]))
+    write = line_file.os.write
+    monkeypatch.setattr(line_file.os, "write", lambda number, data: write(number, data[:2]))
     file._write(b"two\n")
     monkeypatch.undo()
     assert (file.lost, file.fault) == (1, "the disk is full")

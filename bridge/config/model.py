@@ -361,6 +361,9 @@ class OpcUaTable(ListeningTable):
     endpoints: list[EndpointUrl] = Field(
         default_factory=list[str], description="further addresses by which it is reached, opc.tcp://host:port"
     )
+    shutdown_notice_s: float = Field(2.0, ge=0, le=5, description="0…5 s")
+    discovery_server: EndpointUrl | None = None
+    return_after_s: float | None = Field(None, ge=0, le=86_400, description="0…86400 s")
     history: OpcUaHistoryTable = Field(default_factory=lambda: OpcUaHistoryTable.model_validate({}))
     acknowledge_resets: bool = Field(
         False, description="true has whoever acknowledges the alarm of a drive reset its fault"

@@ -186,6 +186,10 @@ class Image:
         for feed in self._feeds:
             feed.mark(index)
 
+    def date(self, index: int, now: float) -> None:
+        """Store a later source time of what is there: it has been read again. Feeds hear nothing of it."""
+        self._times[index] = max(self._times[index], now)
+
     def keep(self, index: int, value: Value, now: float) -> None:
         """Store a good value that changes by itself, such as an age. Feeds hear of it with ``tell_kept``,
         however often it is looked at before."""

@@ -351,6 +351,7 @@ class MirrorClient:
                 image.say(changed.index, value, changed.time, changed.quality, changed.why)
             else:
                 image.set(changed.index, value, changed.time, changed.quality, changed.why)
+                image.date(changed.index, changed.time)
 
     def _mark_dead(self) -> None:
         """The bus process is gone: no value may look current."""

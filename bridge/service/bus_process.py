@@ -164,7 +164,10 @@ class BusProcess:
             self._openings[kind.role] = partial(kind.check_ports, settings)
         command = ["run", str(self.project.path), "--role", kind.role]
         most_mb = self.project.site.site.front_memory_mb
-        self.fronts.append(Front(kind.role, command, watched=True, listening=listening, most_mb=most_mb))
+        notice_s = kind.notice_s(settings) if kind.notice_s else None
+        self.fronts.append(
+            Front(kind.role, command, watched=True, listening=listening, most_mb=most_mb, notice_s=notice_s)
+        )
 
     async def run(self, ready: Callable[[], None] = lambda: None) -> None:
         """Serve until cancelled; ``ready`` is called as soon as the buses are open.
@@ -223,8 +226,11 @@ class BusProcess:
                 _log.warning("the page will not show the traffic of a bus: %s", error)
 
     def halt(self) -> None:
-        """Stop all drives now, and take no command any more but stops. ``run`` is to be cancelled next."""
+        """Stop all drives now, take no command any more but stops, and have the clients told. ``run`` is to
+        be cancelled next."""
         self.master.halt(clock.now())
+        for front in self.fronts:
+            front.announce_end()
 
     async def _serve(self) -> None:
         """Run all tasks until cancelled or one ends: each runs for ever, or raises when its part has

@@ -30,6 +30,8 @@ _REASON: Final = b"!"
 _LONGEST_REASON: Final = 1000
 _LONGEST_SHOWN: Final = 300
 _STOP_S: Final = 3.0
+_END_SIGNAL: Final = signal.SIGUSR1
+"""Tells a front that it is going to be ended."""
 _NICE: Final = 5
 _FIRST_TO_GO: Final = 500
 """``oom_score_adj`` (proc(5)) of fronts: where the machine or the unit has no memory left, the kernel kills a
@@ -46,7 +48,8 @@ class Front:
 
     A ``watched`` one is given a pipe (``--signs``) on which it shows that its event loop runs, and says why
     it ends. ``listening`` gives the socket that it is to serve on (``--listening``), which stays ours, too.
-    One that holds more than ``most_mb`` of memory is killed.
+    One that holds more than ``most_mb`` of memory is killed. One with a ``notice_s`` gives its clients so
+    many seconds before it ends, and is told of the end by a signal as soon as it is known (``on_end``).
     """
 
     def __init__(
@@ -57,6 +60,7 @@ class Front:
         watched: bool = False,
         listening: Callable[[], socket.socket] | None = None,
         most_mb: int | None = None,
+        notice_s: float | None = None,
     ) -> None:
         self.name = role
         self.title = Text.of("front.front", role=role)
@@ -64,19 +68,36 @@ class Front:
         self._watched = watched
         self._listening = listening
         self._most_mb = most_mb
+        self._notice_s = notice_s
+        self._can_hear = False
+        """It has shown that it lives, and with that catches the signal that would end it before."""
         self._process: asyncio.subprocess.Process | None = None
 
     @property
     def pid(self) -> int | None:
         return self._process.pid if self._process else None
 
+    def announce_end(self) -> None:
+        """Tell it that it is going to be ended, if it wants to know."""
+        process = self._process
+        if process is None or process.returncode is not None or not self._can_hear or self._notice_s is None:
+            return
+        with contextlib.suppress(ProcessLookupError):
+            process.send_signal(_END_SIGNAL)
+
     async def run_once(self, serves: Callable[[], None]) -> Text:
         """Run it until it ends. Returns how, as the end of a sentence. ``serves`` is called at its first sign
         of life, or where it is not watched, once it has run for a second. When cancelled, the front is
         ended."""
+
+        def lives() -> None:
+            self._can_hear = self._watched
+            serves()
+
         ear = None
+        self._can_hear = False
         try:
-            ear = _LifePipe(serves) if self._watched else None
+            ear = _LifePipe(lives) if self._watched else None
             process = self._process = await self._spawn(ear)
             return await self._wait(process, ear, serves)
         except (BridgeError, OSError, RuntimeError) as error:
@@ -141,7 +162,7 @@ class Front:
         with contextlib.suppress(ProcessLookupError):
             process.terminate()
         try:
-            await asyncio.wait_for(process.wait(), _STOP_S)
+            await asyncio.wait_for(process.wait(), _STOP_S + (self._notice_s or 0.0))
         except TimeoutError:
             with contextlib.suppress(ProcessLookupError):
                 process.kill()
@@ -210,6 +231,11 @@ async def give_signs(pipe: int) -> None:
         except BrokenPipeError:
             raise OperationFailed("the bus process has given this front up") from None
         await asyncio.sleep(SIGN_PERIOD_S)
+
+
+def on_end(act: Callable[[], None]) -> None:
+    """Called by a front before its first sign of life: have ``act`` done when its end is announced."""
+    asyncio.get_running_loop().add_signal_handler(_END_SIGNAL, act)
 
 
 def give_reason(pipe: int, reason: str) -> None:

@@ -44,7 +44,8 @@ class FrontKind(Generic[Settings]):
     front that listens on one port has ``port``, which the bus process holds for it; one that opens sockets
     itself has ``check_ports``. Both raise ``Unavailable``. Clients of a ``is_prompt`` one command drives over
     and over, and wait for each answer: it is as important as the bus process itself, which is ahead of it all
-    the same where its unit gives it a real-time priority.
+    the same where its unit gives it a real-time priority. Clients of one with ``notice_s`` are given so many
+    seconds between the announcement that it ends and its end.
     """
 
     role: ProcessRole
@@ -54,6 +55,7 @@ class FrontKind(Generic[Settings]):
     port: Callable[[Settings], Port] | None = None
     check_ports: Callable[[Settings], Awaitable[None]] | None = None
     is_prompt: bool = False
+    notice_s: Callable[[Settings], float] | None = None
 
     def check_files(self, site: Site, path: Path) -> None:
         """Check the files of the front, where the ``site`` at ``path`` has it. Raises ``FileFaults`` and
@@ -112,6 +114,7 @@ FRONTS: Final[tuple[FrontKind[Any], ...]] = (
         _run_opcua,
         _check_opcua,
         port=lambda settings: Port(settings.listen, "opcua.listen"),
+        notice_s=lambda settings: settings.shutdown_notice_s,
     ),
     FrontKind(
         ProcessRole.PAGE,

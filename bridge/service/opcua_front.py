@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 from collections.abc import Coroutine, Mapping
 from contextlib import AsyncExitStack
@@ -16,6 +17,7 @@ from bridge.northbound.trouble_words import PlantWords
 from bridge.northbound.view import View
 from bridge.project import Project, load_project
 from bridge.service.fault_texts import german_faults
+from bridge.service.front_process import on_end
 from bridge.service.mirrored import required, serve_mirrored
 
 
@@ -58,6 +60,14 @@ def run_opcua(path: Path, signs: int | None, listening: int | None) -> Coroutine
         server = OpcUaServer(mirror, settings, folder, site.site.name, bound, alarm_site, nameplates)
         await server.start()
         stack.push_async_callback(server.close)
+        on_end(server.announce_end)
+
+        async def give_notice(why: type[BaseException] | None, *_: object) -> None:
+            # Not where the front has failed and is started again.
+            if why is not None and issubclass(why, asyncio.CancelledError):
+                await server.end()
+
+        stack.push_async_exit(give_notice)
         gc.collect()
         gc.freeze()
         gc.enable()

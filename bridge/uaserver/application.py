@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 
 from bridge.uaserver.arrivals import Arrivals
+from bridge.uaserver.explanations import Explain, Explanation
 from bridge.uaserver.history import EventHistory, ValueHistory
 from bridge.uaserver.library import ua
 
@@ -89,9 +90,28 @@ class ServedApplication(Protocol[U]):
         """Role objects of namespace 0 that this user has been granted."""
         ...
 
-    async def write(self, user: U, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]: ...
+    def may_diagnose(self, user: U) -> bool:
+        """Whether this user may see the diagnostics of others' sessions."""
+        ...
 
-    async def call(self, user: U, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]: ...
+    def refreshable(self, nodes: Iterable[ua.NodeId]) -> Sequence[ua.NodeId]:
+        """Nodes of these whose values ``refresh`` can bring, as many as one request may have brought."""
+        ...
+
+    async def refresh(
+        self, user: U, nodes: Sequence[ua.NodeId]
+    ) -> Mapping[ua.NodeId, tuple[ua.StatusCode, Explanation]]:
+        """Bring the values of these nodes from where they come from. Returns those that were refused; of one
+        that takes too long the value of before stays."""
+        ...
+
+    async def write(
+        self, user: U, writes: Sequence[ua.WriteValue], explain: Explain
+    ) -> list[ua.StatusCode]: ...
+
+    async def call(
+        self, user: U, calls: Sequence[ua.CallMethodRequest], explain: Explain
+    ) -> list[ua.CallMethodResult]: ...
 
     def value_history(self, where: ua.NodeId) -> ValueHistory | None:
         """History of a variable; None where it has none."""

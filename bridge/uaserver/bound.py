@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 from typing import Final
 
@@ -29,6 +30,7 @@ class BoundServer(LibraryServer):
         self._inner = inner
         self._bound = bound
         self._trusted = trusted
+        self._diagnosing: asyncio.Task[None] | None = None
         self.limits = TransportLimits(_CHUNK, _CHUNK, _MOST_CHUNKS, _CHUNK * _MOST_CHUNKS)
 
     async def start(self) -> None:
@@ -36,6 +38,8 @@ class BoundServer(LibraryServer):
         policies = [CheckedPolicy(policy, self._trusted) for policy in self._policies]
         await self._inner.start()
         describe(self._inner.aspace, self._inner.locales)
+        self._inner.diagnostics.install()
+        self._diagnosing = asyncio.create_task(self._inner.diagnostics.run(), name="opcua diagnostics")
         self.bserver = TcpAcceptor(self._inner, self._bound, self.limits)
         self.bserver.set_policies(policies)
         await self.bserver.start()
@@ -48,3 +52,10 @@ class BoundServer(LibraryServer):
             change(policy, certificate=certificate, private_key=private_key)
         for endpoint in self._inner.endpoints:
             change(endpoint, ServerCertificate=certificate.public_bytes(Encoding.DER))
+
+    async def stop(self) -> None:
+        task, self._diagnosing = self._diagnosing, None
+        if task:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+        await super().stop()

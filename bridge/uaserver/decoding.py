@@ -15,16 +15,17 @@ import functools
 import math
 import struct
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 from asyncua.common.utils import Buffer, NotEnoughData
 from asyncua.ua import ua_binary
 
-from bridge.uaserver.library import StatusCodes, UaError, UaStatusCodeError, ua
+from bridge.uaserver.library import InvalidSignature, StatusCodes, UaError, UaStatusCodeError, ua
+from bridge.uaserver.turns import Turns
 
 MOST_ELEMENTS: Final = 30_000
 """Limit for the elements of all arrays in one message that are decoded one by one, while nobody else has a
@@ -32,6 +33,20 @@ turn; a thousand take about 10 ms. Ten thousand operations with arrays of two fi
 MOST_BEFORE_SESSION: Final = 1_000
 """Limit for the messages that open a session, which name a few."""
 
+MALFORMED: Final = (
+    UaError,
+    InvalidSignature,
+    ValueError,
+    TypeError,
+    LookupError,
+    AttributeError,
+    ArithmeticError,
+    RecursionError,
+    struct.error,
+)
+"""Exceptions of asyncua's decoders for bytes that are not OPC UA."""
+
+_TIME_AND_HANDLE: Final = struct.Struct("<qI")
 _MOST_DIMENSIONS: Final = 10
 _LENGTH: Final = struct.Struct("<i")
 _DECODERS: Final = frozenset((ua_binary.struct_from_binary.__code__, ua_binary.nodeid_from_binary.__code__))
@@ -72,13 +87,56 @@ def install() -> None:
         getattr(ua_binary, made).cache_clear()
 
 
+async def decoded(kind: type[Any], arrays: Sequence[str], data: Buffer) -> Any:
+    """A structure, of which the elements of the ``arrays`` are decoded in turns."""
+    turns, fields_ = Turns(), dict[str, Any]()
+    for name, hint in _hints(kind).items():
+        if name not in arrays:
+            fields_[name] = _part(hint, kind, data)
+            continue
+        elements = fields_[name] = list[Any]()
+        (element,) = get_args(hint)
+        for _ in range(_length(data)):
+            elements.append(_part(element, kind, data))
+            await turns.pause()
+    return kind(**fields_)
+
+
+@functools.cache
+def _hints(kind: type[Any]) -> dict[str, Any]:
+    return dict(ua_binary.get_safe_type_hints(kind, {"ua": ua}))
+
+
+def _part(hint: Any, kind: type[Any], data: Buffer) -> Any:
+    return ua_binary._create_type_deserializer(hint, kind)(data)
+
+
+def _length(data: Buffer) -> int:
+    """Length of an array, which is no longer than what is left of the message, and of the budget."""
+    (length,) = _LENGTH.unpack(data.read(_LENGTH.size))
+    if length < -1 or length > len(data):
+        raise NotEnoughData(f"an array of {length} elements in {len(data)} bytes")
+    budget = _budget.get()
+    if budget and length > 0:
+        budget.left -= length
+        if budget.left < 0:
+            raise UaStatusCodeError(StatusCodes.BadEncodingLimitsExceeded)
+    return length
+
+
+def first_length(data: Buffer) -> int:
+    """Length of the array that comes next, which is not decoded yet; that of a null array is 0."""
+    (length,) = _LENGTH.unpack(data.copy(_LENGTH.size).read(_LENGTH.size))
+    return max(0, length)
+
+
 def is_malformed(error: BaseException) -> bool:
     """Whether ``error`` comes from decoding, and so from what the client has sent."""
     if isinstance(error, NotEnoughData):
         return True
     trace = error.__traceback__
     while trace is not None:
-        if trace.tb_frame.f_code in _DECODERS:
+        if trace.tb_frame.f_code in _DECODERS or trace.tb_frame.f_code is _part.__code__:
             return True
         trace = trace.tb_next
     return False
@@ -143,3 +201,10 @@ def _checked_shape(reshape: Callable[[Any, list[int]], Any]) -> Callable[[Any, l
         return reshape(flat, dimensions)
 
     return checked
+
+
+def request_handle(header: Buffer) -> int:
+    """Handle of a RequestHeader of which nothing else need be sound. Raises for one that ends before it."""
+    ua_binary.nodeid_from_binary(header)
+    _, handle = _TIME_AND_HANDLE.unpack(header.read(_TIME_AND_HANDLE.size))
+    return int(handle)

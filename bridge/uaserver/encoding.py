@@ -49,14 +49,14 @@ class Results:
 
 
 def encode(response: Any) -> bytes:
-    """A response. One with ``Results`` has nothing behind them but its DiagnosticInfos, which are empty."""
+    """A response. One with ``Results`` has nothing behind them but its DiagnosticInfos."""
     results = getattr(response, "Results", None)
     if not isinstance(results, Results):
         return struct_to_binary(response)
-    response.Results = []
-    empty = struct_to_binary(response)
-    head, diagnostics = empty[: -2 * _LENGTH.size], empty[-_LENGTH.size :]
-    return b"".join((head, _LENGTH.pack(results.count), results.encoded, diagnostics))
+    infos, response.Results, response.DiagnosticInfos = response.DiagnosticInfos, [], []
+    head = struct_to_binary(response)[: -2 * _LENGTH.size]
+    told = (_LENGTH.pack(len(infos)), *map(struct_to_binary, infos))
+    return b"".join((head, _LENGTH.pack(results.count), results.encoded, *told))
 
 
 def weight(value: Any) -> int:

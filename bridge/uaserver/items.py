@@ -97,6 +97,8 @@ class ValueItem:
     _due: float = -math.inf
     _released: int = 0
     """Number of the oldest in the queue that a triggering item has reported."""
+    lost: int = 0
+    """Number of values that a full queue has lost and nobody has counted yet."""
 
     @property
     def has_something(self) -> bool:
@@ -144,7 +146,10 @@ class ValueItem:
         size = self.settings.queue_size
         if len(self.queue) < size:
             self.queue.append(value)
-        elif size == 1:
+            return
+        # With a queue of one, what is replaced is not lost (Part 4 §5.13.1.5).
+        self.lost += size > 1
+        if size == 1:
             self.queue[0] = value
         elif self.settings.discard_oldest:
             self._pop()
@@ -215,6 +220,8 @@ class EventItem:
     """The event that says that others were lost. It is kept in addition to the queue's size."""
     _released: int = 0
     """Number of the oldest, the loss included, that a triggering item has reported."""
+    lost: int = 0
+    """Number of events that a full queue has lost and nobody has counted yet."""
 
     @property
     def weight(self) -> int:
@@ -248,6 +255,7 @@ class EventItem:
 
     def _shorten(self, size: int) -> None:
         while len(self.queue) > size:
+            self.lost += 1
             if self.settings.discard_oldest:
                 self.queue.popleft()
                 # A loss takes the place of the first that is lost.

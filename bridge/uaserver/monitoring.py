@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Awaitable, Callable, Hashable
+from collections.abc import Awaitable, Callable, Hashable, Sequence
+from contextlib import suppress
 from itertools import count
 from typing import Final, TypeVar
 
@@ -37,6 +38,7 @@ from bridge.uaserver.library import (
 from bridge.uaserver.quotas import MOST_ON_ONE, EventItemQuota
 from bridge.uaserver.reading import checked_times, window
 from bridge.uaserver.subscription import Subscription
+from bridge.uaserver.turns import Turns
 
 _BATCH: Final = 50
 _SUBSCRIBE_TO_EVENTS: Final = 1
@@ -163,11 +165,15 @@ class MonitoredItems:
         value = self._space.read_attribute_value(get(item.target, "NodeId"), get(item.target, "AttributeId"))
         _ItemWatcher(subscription, item).told(value, loop_time())
 
-    def modify(
+    async def modify(
         self, found: Subscription, params: ua.ModifyMonitoredItemsParameters
     ) -> list[ua.MonitoredItemModifyResult]:
         times = checked_times(params)
-        return [self._modify(found, wanted, times) for wanted in get(params, "ItemsToModify")]
+        turns, results = Turns(), list[ua.MonitoredItemModifyResult]()
+        for wanted in get(params, "ItemsToModify"):
+            results.append(self._modify(found, wanted, times))
+            await turns.pause()
+        return results
 
     def _modify(
         self,
@@ -194,7 +200,9 @@ class MonitoredItems:
             return _faulty(ua.MonitoredItemModifyResult(), error)
         return _agreed(ua.MonitoredItemModifyResult(), item)
 
-    def set_mode(self, found: Subscription, params: ua.SetMonitoringModeParameters) -> list[ua.StatusCode]:
+    async def set_mode(
+        self, found: Subscription, params: ua.SetMonitoringModeParameters
+    ) -> list[ua.StatusCode]:
         mode: ua.MonitoringMode = get(params, "MonitoringMode")
 
         def set_one(number: int) -> None:
@@ -205,7 +213,7 @@ class MonitoredItems:
                 self._look(found, item)
             found.noticed(item)
 
-        return [code_of(set_one, number) for number in get(params, "MonitoredItemIds")]
+        return await _codes(set_one, get(params, "MonitoredItemIds"))
 
     def set_triggering(
         self, found: Subscription, params: ua.SetTriggeringParameters
@@ -226,18 +234,22 @@ class MonitoredItems:
             AddResults=[code_of(add, number) for number in get(params, "LinksToAdd") or ()],
         )
 
-    def delete(self, found: Subscription, params: ua.DeleteMonitoredItemsParameters) -> list[ua.StatusCode]:
-        return [
-            code_of(lambda one: self.drop(found, _item(found, one)), number)
-            for number in get(params, "MonitoredItemIds")
-        ]
+    async def delete(
+        self, found: Subscription, params: ua.DeleteMonitoredItemsParameters
+    ) -> list[ua.StatusCode]:
+        def delete_one(number: int) -> None:
+            self.drop(found, _item(found, number))
+
+        return await _codes(delete_one, get(params, "MonitoredItemIds"))
 
     def drop(self, subscription: Subscription, item: Item) -> None:
         subscription.drop(item)
         if isinstance(item, EventItem):
             self._event_items.change(item.share, -item.weight)
         else:
-            self._space.delete_datachange_callback(item.handle)
+            # A node of the diagnostics goes with its session.
+            with suppress(KeyError):
+                self._space.delete_datachange_callback(item.handle)
             self._watching[item.share] -= 1
             if not self._watching[item.share]:
                 del self._watching[item.share]
@@ -277,6 +289,14 @@ def _item(subscription: Subscription, number: int) -> Item:
     if item is None:
         raise ServiceError(StatusCodes.BadMonitoredItemIdInvalid)
     return item
+
+
+async def _codes(act: Callable[[int], None], numbers: Sequence[int]) -> list[ua.StatusCode]:
+    turns, codes = Turns(), list[ua.StatusCode]()
+    for number in numbers:
+        codes.append(code_of(act, number))
+        await turns.pause()
+    return codes
 
 
 def code_of(act: Callable[[int], None], number: int) -> ua.StatusCode:

@@ -68,10 +68,14 @@ class PublishQueue:
             if oldest:
                 oldest.refuse(StatusCodes.BadTooManyPublishRequests)
 
-    def ask(self, subscription: PublishingSubscription, now: float) -> None:
-        """``subscription`` has something to tell, now or as soon as a request is there."""
+    def ask(self, subscription: PublishingSubscription, now: float) -> bool:
+        """``subscription`` has something to tell, now or as soon as a request is there; whether one was."""
         self._late.setdefault(subscription)
         self._serve(now)
+        return subscription not in self._late
+
+    def __len__(self) -> int:
+        return len(self._requests)
 
     def forget(self, subscription: PublishingSubscription) -> None:
         self._late.pop(subscription, None)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import inspect
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Coroutine, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -19,7 +19,9 @@ from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import struct_from_binary
 
 from bridge.uaserver.browsing import Browser
+from bridge.uaserver.decoding import decoded, first_length
 from bridge.uaserver.encoding import UNSENDABLE, Results
+from bridge.uaserver.explanations import Explain, Explanation, add_explanations
 from bridge.uaserver.historyread import MOST_NODES
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.uaserver.monitoring import MonitoredItems, loop_time
@@ -31,51 +33,87 @@ from bridge.uaserver.subscriptions import Subscriptions
 
 MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100
+MOST_WRITES: Final = 1_000
+"""Limit for one request: writes are begun at once, so that none is overtaken, and others wait meanwhile."""
 
 _log = logging.getLogger(__name__)
 
 _Act = Callable[[Session, Any], Any]
 """Given the session and the parameters of the request."""
+_ExplainingAct = Callable[[Session, Any, Explain], Any]
 
 
 @dataclass(frozen=True, slots=True)
 class ServiceRequest:
-    """Request on a connection. ``send`` takes the response, ``is_open`` says whether it still can."""
+    """Request on a connection. ``send`` takes the response, ``is_open`` says whether it still can. ``defer``
+    has the rest of it done while others are answered."""
 
     header: Any
     body: Buffer
     send: Callable[[Any], None]
     is_open: Callable[[], bool]
+    defer: Callable[[Coroutine[Any, Any, None]], Awaitable[None]]
+
+
+_Begin = Callable[[Session, Any, ServiceRequest], Awaitable[None] | None]
+"""Given the session and the parameters of the request, which it answers itself, at once or later."""
 
 
 @dataclass(frozen=True, slots=True)
 class Route:
     """``operations`` are the fields of the parameters that have them, ``most`` how many there may be. What
-    ``act`` returns is the field ``answer`` of the response. Without it a Publish request waits until there is
-    something to tell."""
+    ``act`` returns is the field ``answer`` of the response; ``explain`` is an ``act`` that can explain what
+    it refuses, and ``begin`` answers itself. A route has one of the three."""
 
     name: str
     act: _Act | None
     operations: str = ""
     answer: str = "Results"
     most: int = MOST_OPERATIONS
+    explain: _ExplainingAct | None = None
+    begin: _Begin | None = None
 
     async def carry_out(self, session: Session, request: ServiceRequest) -> None:
         """Raises ServiceError for what is to be answered as a fault."""
-        params = struct_from_binary(get(ua, f"{self.name}Parameters"), request.body)
+        kind, fields = get(ua, f"{self.name}Parameters"), self.operations.split()
+        if self.explain is not None:
+            # What commands is decoded at once, so that no later request comes before it: it is short.
+            _limit(first_length(request.body), self.most)
+            params = struct_from_binary(kind, request.body)
+        else:
+            params = await decoded(kind, fields, request.body)
+        operations = sum(len(get(params, field) or ()) for field in fields)
         if self.operations:
-            _limit(sum(len(get(params, field) or ()) for field in self.operations.split()), self.most)
-        if self.act is None:
-            _publish(session, params, request)
+            _limit(operations, self.most)
+        if self.begin is not None:
+            begun = self.begin(session, params, request)
+            if begun is not None:
+                await begun
             return
-        result = self.act(session, params)
+        explained: dict[int, Explanation] = {}
+        if self.explain is not None:
+            result = self.explain(session, params, explained.__setitem__)
+        else:
+            assert self.act, "a route has one of the three"
+            result = self.act(session, params)
         if inspect.isawaitable(result):
             result = await result
         response = get(ua, f"{self.name}Response")()
         if self.answer:
             *above, field = self.answer.split(".")
+            if self.answer == "Results" and self.explain is None and not isinstance(result, Results):
+                result = await _encoded(session, result)
             change(get(response, above[0]) if above else response, **{field: result})
+        if explained:
+            add_explanations(request.header, response, explained, operations)
         request.send(response)
+
+
+async def _encoded(session: Session, found: Iterable[object]) -> Results:
+    results = session.answer = Results(session.most_bytes)
+    for one in found:
+        await results.add(one)
+    return results
 
 
 async def _browse(session: Session, params: Any) -> Results:
@@ -84,16 +122,73 @@ async def _browse(session: Session, params: Any) -> Results:
     return results
 
 
-def _write(session: Session, params: Any) -> Any:
-    return session.application.write(session.identity, get(params, "NodesToWrite"))
+async def _read(session: Session, params: ua.ReadParameters, request: ServiceRequest) -> None:
+    stale = session.stale(params)
+    if stale:
+        await request.defer(_read_through(session, params, request, stale))
+    else:
+        await _answer_read(session, params, request, {})
 
 
-def _call(session: Session, params: Any) -> Any:
-    return session.call_methods(get(params, "MethodsToCall"))
+async def _read_through(
+    session: Session, params: ua.ReadParameters, request: ServiceRequest, stale: Sequence[ua.NodeId]
+) -> None:
+    async with session.refreshing:
+        refused = await session.application.refresh(session.identity, stale)
+        await _answer_read(session, params, request, refused)
+
+
+async def _answer_read(
+    session: Session,
+    params: ua.ReadParameters,
+    request: ServiceRequest,
+    refused: Mapping[ua.NodeId, tuple[ua.StatusCode, Explanation]],
+) -> None:
+    explained: dict[int, Explanation] = {}
+    results = await session.read_attributes(params, refused, explained.__setitem__)
+    response = make(ua.ReadResponse, Results=results)
+    add_explanations(request.header, response, explained, results.count)
+    request.send(response)
+
+
+def _write(session: Session, params: Any, explain: Explain) -> Any:
+    return session.application.write(session.identity, get(params, "NodesToWrite"), explain)
+
+
+def _call(session: Session, params: Any, explain: Explain) -> Any:
+    return session.call_methods(get(params, "MethodsToCall"), explain)
 
 
 def _cancel(session: Session, params: Any) -> ua.CancelResult:
-    return make(ua.CancelResult, CancelCount=session.publishing.cancel(get(params, "RequestHandle")))
+    return make(ua.CancelResult, CancelCount=session.cancel(get(params, "RequestHandle")))
+
+
+def _publish(session: Session, params: ua.PublishParameters, request: ServiceRequest) -> None:
+    acknowledged: list[ua.SubscriptionAcknowledgement] = get(params, "SubscriptionAcknowledgements") or []
+    if len(acknowledged) > MOST_OPERATIONS:
+        raise ServiceError(StatusCodes.BadTooManyOperations)
+
+    def answer(result: ua.PublishResult) -> None:
+        try:
+            request.send(make(ua.PublishResponse, Parameters=result))
+        except ServiceError as error:
+            refuse(int(error.code))
+        except UNSENDABLE as error:
+            _log.warning("a message of a subscription cannot be sent: %r", error)
+            refuse(StatusCodes.BadEncodingError)
+
+    def refuse(code: int) -> None:
+        fault = ua.ServiceFault()
+        change(get(fault, "ResponseHeader"), ServiceResult=status(code))
+        request.send(fault)
+
+    hint_ms: int = request.header.TimeoutHint
+    expires_at = loop_time() + hint_ms / 1000 if hint_ms else float("inf")
+    # Half of what the client accepts: the last notification may go beyond the limit.
+    most_bytes = min(MOST_BYTES, session.most_bytes // 2)
+    handle: int = request.header.RequestHandle
+    waiting = PublishRequest(expires_at, request.is_open, answer, refuse, most_bytes, handle)
+    session.subscriptions.publish(session, acknowledged, waiting)
 
 
 def _view(act: Callable[[Browser, Any], Any]) -> _Act:
@@ -128,16 +223,16 @@ ROUTES: Final[Mapping[ua.NodeId, Route]] = {
             "Parameters.RegisteredNodeIds",
         ),
         Route("UnregisterNodes", lambda session, params: None, "NodesToUnregister", ""),
-        Route("Read", Session.read_attributes, "NodesToRead"),
+        Route("Read", None, "NodesToRead", begin=_read),
         Route("HistoryRead", Session.read_history, "NodesToRead", most=MOST_NODES),
-        Route("Write", _write, "NodesToWrite"),
-        Route("Call", _call, "MethodsToCall", most=MOST_CALLS),
+        Route("Write", None, "NodesToWrite", most=MOST_WRITES, explain=_write),
+        Route("Call", None, "MethodsToCall", most=MOST_CALLS, explain=_call),
         Route("CreateSubscription", Session.subscribe, answer="Parameters"),
         Route("ModifySubscription", _subscription(Subscriptions.modify), answer="Parameters"),
         Route(
             "SetPublishingMode", _subscription(Subscriptions.set_publishing_mode), "SubscriptionIds", _RESULTS
         ),
-        Route("Publish", None),
+        Route("Publish", None, begin=_publish),
         Route("Republish", _subscription(Subscriptions.republish), answer="NotificationMessage"),
         Route("TransferSubscriptions", _subscription(Subscriptions.transfer), "SubscriptionIds", _RESULTS),
         Route("DeleteSubscriptions", _subscription(Subscriptions.delete), "SubscriptionIds"),
@@ -161,31 +256,3 @@ def _limit(operations: int, most: int) -> None:
         raise ServiceError(StatusCodes.BadNothingToDo)
     if operations > most:
         raise ServiceError(StatusCodes.BadTooManyOperations)
-
-
-def _publish(session: Session, params: ua.PublishParameters, request: ServiceRequest) -> None:
-    acknowledged: list[ua.SubscriptionAcknowledgement] = get(params, "SubscriptionAcknowledgements") or []
-    if len(acknowledged) > MOST_OPERATIONS:
-        raise ServiceError(StatusCodes.BadTooManyOperations)
-
-    def answer(result: ua.PublishResult) -> None:
-        try:
-            request.send(make(ua.PublishResponse, Parameters=result))
-        except ServiceError as error:
-            refuse(int(error.code))
-        except UNSENDABLE as error:
-            _log.warning("a message of a subscription cannot be sent: %r", error)
-            refuse(StatusCodes.BadEncodingError)
-
-    def refuse(code: int) -> None:
-        fault = ua.ServiceFault()
-        change(get(fault, "ResponseHeader"), ServiceResult=status(code))
-        request.send(fault)
-
-    hint_ms: int = request.header.TimeoutHint
-    expires_at = loop_time() + hint_ms / 1000 if hint_ms else float("inf")
-    # Half of what the client accepts: the last notification may go beyond the limit.
-    most_bytes = min(MOST_BYTES, session.most_bytes // 2)
-    handle: int = request.header.RequestHandle
-    waiting = PublishRequest(expires_at, request.is_open, answer, refuse, most_bytes, handle)
-    session.subscriptions.publish(session, acknowledged, waiting)

@@ -15,6 +15,7 @@ from asyncua.server.address_space import AddressSpace, AttributeValue
 from bridge.uaserver import historyread
 from bridge.uaserver.address_space import is_empty
 from bridge.uaserver.browsing import MOST_CONTINUATION_POINTS
+from bridge.uaserver.conformance import claimed
 from bridge.uaserver.eventfilter import MOST_FIELDS
 from bridge.uaserver.items import LEAST_SAMPLING_MS, VALUE_QUEUE
 from bridge.uaserver.library import (
@@ -35,7 +36,8 @@ from bridge.uaserver.quotas import (
     MOST_SESSIONS,
     MOST_SUBSCRIPTIONS,
 )
-from bridge.uaserver.routes import MOST_CALLS
+from bridge.uaserver.routes import MOST_CALLS, MOST_WRITES
+from bridge.uaserver.serverstatus import HEALTHY, UNKNOWN_TIME
 from bridge.uaserver.where import MOST_OPERANDS
 
 _Type = ua.VariantType
@@ -61,7 +63,10 @@ LOCALES: Final = f"{_CAN}LocaleIdArray"
 VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_STATUS}SecondsTillShutdown": variant(0, _Type.UInt32),
     f"{_STATUS}ShutdownReason": variant(ua.LocalizedText(), _Type.LocalizedText),
+    "Server_ServiceLevel": variant(HEALTHY, _Type.Byte),
+    "Server_EstimatedReturnTime": variant(UNKNOWN_TIME, _Type.DateTime),
     "Server_Auditing": variant(False, _Type.Boolean),
+    f"{_CAN}ServerProfileArray": variant(claimed(), _Type.String),
     f"{_CAN}MaxBrowseContinuationPoints": variant(MOST_CONTINUATION_POINTS, _Type.UInt16),
     f"{_CAN}MaxQueryContinuationPoints": variant(0, _Type.UInt16),
     f"{_CAN}MaxHistoryContinuationPoints": variant(historyread.MOST_CONTINUATION_POINTS, _Type.UInt16),
@@ -74,6 +79,7 @@ VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_CAN}MaxMonitoredItemsQueueSize": variant(VALUE_QUEUE, _Type.UInt32),
     f"{_CAN}MaxSelectClauseParameters": variant(MOST_FIELDS, _Type.UInt32),
     f"{_CAN}MaxWhereClauseParameters": variant(MOST_OPERANDS, _Type.UInt32),
+    f"{_AT_ONCE}MaxNodesPerWrite": variant(MOST_WRITES, _Type.UInt32),
     f"{_AT_ONCE}MaxNodesPerMethodCall": variant(MOST_CALLS, _Type.UInt32),
     f"{_AT_ONCE}MaxNodesPerHistoryReadData": variant(historyread.MOST_NODES, _Type.UInt32),
     f"{_AT_ONCE}MaxNodesPerHistoryReadEvents": variant(historyread.MOST_NODES, _Type.UInt32),
@@ -83,7 +89,7 @@ VALUES: Final[Mapping[str, ua.Variant]] = {
     f"{_HISTORY}MaxReturnEventValues": variant(historyread.MOST_VALUES, _Type.UInt32),
     f"{_HISTORY}ServerTimestampSupported": variant(False, _Type.Boolean),
     **{f"{_HISTORY}{name}Capability": variant(False, _Type.Boolean) for name in _CHANGES_OF_HISTORY},
-    "Server_ServerDiagnostics_EnabledFlag": variant(False, _Type.Boolean),
+    "Server_ServerDiagnostics_EnabledFlag": variant(True, _Type.Boolean),
     "Server_ServerRedundancy_RedundancySupport": variant(ua.RedundancySupport.None_, _Type.Int32),
 }
 """Values by the names of the nodes."""

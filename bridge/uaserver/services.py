@@ -32,7 +32,7 @@ def _no(name: str, why: str, code: int = StatusCodes.BadServiceUnsupported) -> S
 
 SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
     "Discovery": (
-        Service("FindServers", "names this server alone"),
+        Service("FindServers", "names this server alone, where `serverUris` has its URI or none"),
         _no("FindServersOnNetwork", "this is no discovery server"),
         Service("GetEndpoints", "those of the transport profiles that are asked for"),
         _no("RegisterServer", "this is no discovery server"),
@@ -55,8 +55,8 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
         ),
         Service(
             "Cancel",
-            "Publish requests that wait are answered with BadRequestCancelledByClient; a Write or Call is "
-            "carried out and has its outcome",
+            "Publish requests that wait, and a Read that waits for a drive, are answered with "
+            "BadRequestCancelledByClient; a Write or Call is carried out and has its outcome",
         ),
     ),
     "NodeManagement": (
@@ -79,8 +79,8 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
     "Attribute": (
         Service(
             "Read",
-            "what the bridge knows now, whatever `maxAge`; `timestampsToReturn` and `indexRange` count; "
-            "`dataEncoding` is ignored, as Part 4 §7.29 says",
+            "what the bridge knows now, and with `maxAge` 0 what the drives hold of [parameters](#writing); "
+            "`timestampsToReturn` and `indexRange` count; `dataEncoding` is ignored, as Part 4 §7.29 says",
         ),
         Service(
             "HistoryRead",
@@ -92,8 +92,8 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
     "Method": (
         Service(
             "Call",
-            "the [methods](#methods-of-a-drive) of drives, nodes, buses and [alarms](#alarms); "
-            "all others are BadMethodInvalid",
+            "the [methods](#methods-of-a-drive) of drives, nodes, buses and [alarms](#alarms), "
+            "GetMonitoredItems and ResendData; all others are BadMethodInvalid",
         ),
     ),
     "MonitoredItem": (
@@ -121,6 +121,10 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
     ),
 }
 """Services by service set, in the order of Part 4 §5."""
+
+NAMES: Final[Mapping[ua.NodeId, str]] = {
+    request_type(service.name): service.name for services in SERVICES.values() for service in services
+}
 
 REFUSED: Final[Mapping[ua.NodeId, int]] = {
     request_type(service.name): service.refused

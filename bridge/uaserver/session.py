@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import math
 import secrets
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, cast
 
@@ -29,7 +29,11 @@ from bridge.uaserver.client_notices import tell
 from bridge.uaserver.condition_calls import METHODS
 from bridge.uaserver.conditions import Conditions
 from bridge.uaserver.connection_limits import MOST_CONNECTIONS
+from bridge.uaserver.counts import RequestCounts, ServerCounts
+from bridge.uaserver.diagnosticnodes import DiagnosticNodes
+from bridge.uaserver.diagnostics import SessionFacts
 from bridge.uaserver.encoding import Results
+from bridge.uaserver.explanations import Explain, Explanation
 from bridge.uaserver.historyread import HistoryReader
 from bridge.uaserver.library import (
     AttributeIds,
@@ -48,7 +52,11 @@ from bridge.uaserver.own_addresses import OwnAddresses
 from bridge.uaserver.publishing import PublishQueue
 from bridge.uaserver.quotas import make_room
 from bridge.uaserver.reading import checked_times, window
+from bridge.uaserver.servermethods import call_server, is_of_server
+from bridge.uaserver.serverstatus import ServerStatus
+from bridge.uaserver.subscription import Subscription
 from bridge.uaserver.subscriptions import Subscriptions
+from bridge.uaserver.undertakings import Undertakings
 
 _LONGEST_SESSION_MS: Final = 120_000.0
 
@@ -65,6 +73,7 @@ _BY_USER: Final = {
 }
 """Attributes that depend on who looks, with what is left of them for who may only read."""
 _NOTHING: Final = variant(None, ua.VariantType.Null)
+_NOT_FOR_HIM: Final = data_value(_NOTHING, status(StatusCodes.BadUserAccessDenied))
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
 
 
@@ -113,6 +122,12 @@ class Session(InternalSession):
         """Largest answer that its client accepts on that connection, in bytes."""
         self.left_at = 0.0
         """Monotonic time at which it lost its last connection."""
+        self.undertakings = Undertakings()
+        """Requests under way on the connection that it is activated on."""
+        self.refreshing = asyncio.Lock()
+        """Held by the one request that has values brought: those of one client wait for each other."""
+        self.counts = RequestCounts()
+        self.facts = SessionFacts()
         self.locales: Sequence[str] = ()
         """LocaleIds of its client, the preferred one first."""
         self.admitted: UserIdentity | None = None
@@ -132,6 +147,8 @@ class Session(InternalSession):
         if math.isnan(get(params, "RequestedSessionTimeout")):
             # asyncua's `min` and `max` let it pass, and the session would never end.
             change(params, RequestedSessionTimeout=0.0)
+        self.facts = SessionFacts.of(params)
+        self._server.counts.sessions += 1
         return await super().create_session(params, sockname)
 
     def activate_session(
@@ -144,6 +161,8 @@ class Session(InternalSession):
         if not admitted.is_same(self.identity):
             self._tell(is_there=False)  # for the user before
         self.identity = admitted
+        mechanism = type(get(params, "UserIdentityToken")).__name__.removesuffix("IdentityToken")
+        self.facts.note_user(admitted.name, mechanism)
         # Part 4 §5.6.3: who names none later on keeps those that he has named.
         self.locales = (get(params, "LocaleIds") or self.locales)[:_MOST_LOCALES]
         self._tell(is_there=True)
@@ -170,15 +189,40 @@ class Session(InternalSession):
 
     # services
 
-    async def read_attributes(self, params: ua.ReadParameters) -> Any:
+    def cancel(self, handle: int) -> int:
+        """Cancel the requests that the client calls so, where they change nothing; how many there were."""
+        return self.publishing.cancel(handle) + self.undertakings.cancel(handle)
+
+    def stale(self, params: ua.ReadParameters) -> Sequence[ua.NodeId]:
+        """Nodes whose values are to be brought from where they come from before they are read: those that
+        can be, where the client accepts no older ones (Part 4 §5.11.2.2)."""
+        if get(params, "MaxAge") != 0:
+            return ()
+        wanted: list[ua.ReadValueId] = get(params, "NodesToRead")
+        values = (get(one, "NodeId") for one in wanted if get(one, "AttributeId") == AttributeIds.Value)
+        return self.application.refreshable(values)
+
+    async def read_attributes(
+        self,
+        params: ua.ReadParameters,
+        refused: Mapping[ua.NodeId, tuple[ua.StatusCode, Explanation]],
+        explain: Explain,
+    ) -> Results:
+        """``refused`` are the nodes whose values could not be brought."""
         wanted: list[ua.ReadValueId] = get(params, "NodesToRead")
         times = checked_times(params)
         # `not >=` refuses NaN, too.
         if not get(params, "MaxAge") >= 0:
             raise ServiceError(StatusCodes.BadMaxAgeInvalid)
         results = self.answer = Results(self.most_bytes)
-        for one in wanted:
-            await results.add(self._read(one, times))
+        for place, one in enumerate(wanted):
+            where = get(one, "NodeId")
+            if where in refused and get(one, "AttributeId") == AttributeIds.Value:
+                code, why = refused[where]
+                explain(place, why)
+                await results.add(data_value(_NOTHING, code))
+            else:
+                await results.add(self._read(one, times))
         return results
 
     async def read_history(self, params: ua.HistoryReadParameters) -> Any:
@@ -198,13 +242,16 @@ class Session(InternalSession):
         """Whether everybody sees the same of it: its values as they are."""
         attribute = get(wanted, "AttributeId")
         if attribute == AttributeIds.Value:
-            return self._is_readable(get(wanted, "NodeId"))
+            where = get(wanted, "NodeId")
+            return self._is_readable(where) and not self._server.diagnostics.is_about_someone(where)
         return attribute not in _BY_USER
 
     def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
         """``value`` as this user may see it."""
         where, attribute = get(wanted, "NodeId"), get(wanted, "AttributeId")
         if attribute == AttributeIds.Value:
+            if self._is_hidden(where):
+                return _NOT_FOR_HIM
             return value if self._is_readable(where) else _NOT_READABLE
         held = value.Value
         if attribute == AttributeIds.UserRolePermissions:
@@ -216,24 +263,34 @@ class Session(InternalSession):
         left = variant(held.Value & _BY_USER[attribute], held.VariantType)
         return data_value(left, value.StatusCode, value.SourceTimestamp, value.ServerTimestamp)
 
+    def _is_hidden(self, where: ua.NodeId) -> bool:
+        diagnostics = self._server.diagnostics
+        if not diagnostics.is_about_someone(where):
+            return False
+        return diagnostics.is_hidden(where, self, may_see_all=self.application.may_diagnose(self.identity))
+
     def _is_readable(self, where: ua.NodeId) -> bool:
         node = self.aspace.get(where)
         access = node.attributes.get(AttributeIds.AccessLevel) if node else None
         held = access.value.Value if access and access.value else None
         return held is None or bool(held.Value & _READ)
 
-    async def call_methods(self, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
-        """One result for each of ``calls``, in their order: methods of conditions are this server's own, all
-        others the application's."""
+    async def call_methods(
+        self, calls: Sequence[ua.CallMethodRequest], explain: Explain
+    ) -> list[ua.CallMethodResult]:
+        """One result for each of ``calls``, in their order: methods of conditions and of the Server object
+        are this server's own, all others the application's."""
         conditions = self._server.conditions
 
-        async def call_one(one: ua.CallMethodRequest) -> ua.CallMethodResult:
+        async def call_one(place: int, one: ua.CallMethodRequest) -> ua.CallMethodResult:
+            if is_of_server(one):
+                return call_server(self.subscriptions, self, one)
             if conditions is not None and get(one, "MethodId") in METHODS:
                 return await conditions.call(self, one)
-            (result,) = await self.application.call(self.identity, [one])
+            (result,) = await self.application.call(self.identity, [one], lambda _, why: explain(place, why))
             return result
 
-        return list(await asyncio.gather(*(call_one(one) for one in calls)))
+        return list(await asyncio.gather(*(call_one(place, one) for place, one in enumerate(calls))))
 
     async def subscribe(self, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
         self.subscriptions.drop_left_behind()
@@ -246,6 +303,7 @@ class Session(InternalSession):
         while self.state is not SessionState.Closed:
             left_s = (self.session_timeout or 0.0) + self._last_activity - loop_time()
             if left_s <= 0:
+                self._server.counts.sessions_timed_out += 1
                 await self.close_session(delete_subs=False)
                 return
             await asyncio.sleep(left_s)
@@ -300,9 +358,19 @@ class InnerServer(InternalServer):
         # Who is let in, and how long one may wait, is decided before asyncua is asked.
         self.max_connections = 10 * MOST_CONNECTIONS
         self.max_pending_activation_seconds = 0
+        self.status = ServerStatus(self.aspace)
         self.subscriptions = Subscriptions(self.aspace)
         # asyncua only looks through it for the subscriptions of a session.
         self.subscription_service = cast("SubscriptionService", self.subscriptions)
+        self.diagnostics = DiagnosticNodes(self.aspace, self)
+
+    @property
+    def counts(self) -> ServerCounts:
+        return self.subscriptions.counts
+
+    @property
+    def diagnosed_subscriptions(self) -> dict[int, Subscription]:
+        return self.subscriptions.subscriptions
 
     def create_session(self, name: str, user: User | None = None, external: bool = False) -> InternalSession:
         return Session(self, self.aspace, self.subscription_service, name)
@@ -319,6 +387,15 @@ class InnerServer(InternalServer):
         endpoints = await super().get_endpoints(params, sockname)
         profiles: list[str] = (get(params, "ProfileUris") if params else None) or []
         return [one for one in endpoints if not profiles or get(one, "TransportProfileUri") in profiles]
+
+    def find_servers(
+        self, params: ua.FindServersParameters, sockname: tuple[str, int] | None = None
+    ) -> list[ua.ApplicationDescription]:
+        """This server, where it is asked for: asyncua takes each URI for the beginning of one."""
+        wanted: list[str] = get(params, "ServerUris") or []
+        change(params, ServerUris=[])
+        found = super().find_servers(params, sockname)
+        return [one for one in found if not wanted or get(one, "ApplicationUri") in wanted]
 
     @property
     def shown(self) -> ShownCertificate:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from bridge.uaserver.application import UserIdentity
+from bridge.uaserver.counts import SubscriptionCounts
 from bridge.uaserver.encoding import weight
 from bridge.uaserver.eventfilter import Occurrence
 from bridge.uaserver.items import EventItem, Item, ValueItem
@@ -108,6 +109,7 @@ class Subscription:
         self.terms = agreed
         self.items: dict[int, Item] = {}
         self.links = TriggeringLinks()
+        self.counts = SubscriptionCounts()
         self._enabled = enabled
         self._listeners: dict[int, EventItem] = {}
         self._ready: dict[int, Item] = {}
@@ -127,6 +129,24 @@ class Subscription:
         return self.terms.priority
 
     @property
+    def is_enabled(self) -> bool:
+        return self._enabled
+
+    @property
+    def quiet_cycles(self) -> int:
+        """Publishing intervals since the last message."""
+        return self._quiet
+
+    @property
+    def silent_cycles(self) -> int:
+        """Publishing intervals since its client has last asked for something."""
+        return self._silent
+
+    @property
+    def next_sequence(self) -> int:
+        return self._sequence
+
+    @property
     def is_listening(self) -> bool:
         """Whether it has items for events."""
         return bool(self._listeners)
@@ -138,10 +158,19 @@ class Subscription:
         which triggers those that are linked to it."""
         if is_queued:
             self.links.fire(item.number)
+        if item.lost:
+            self._count_lost(item)
         if isinstance(item, ValueItem) and item.is_holding:
             self._holding[item.number] = item
         if item.has_something:
             self._ready[item.number] = item
+
+    def _count_lost(self, item: Item) -> None:
+        if isinstance(item, ValueItem):
+            self.counts.value_overflows += item.lost
+        else:
+            self.counts.event_overflows += item.lost
+        item.lost = 0
 
     def add(self, item: Item) -> None:
         self.items[item.number] = item
@@ -188,7 +217,7 @@ class Subscription:
         self.links.release()
         self._quiet += 1
         if self._quiet >= self.terms.keep_alive or (self._enabled and any(self._reporting())):
-            self.owner.publishing.ask(self, now)
+            self.counts.late_publish_requests += not self.owner.publishing.ask(self, now)
         return True
 
     def touch(self) -> None:
@@ -197,10 +226,13 @@ class Subscription:
 
     def set_enabled(self, enabled: bool) -> None:
         self._enabled = enabled
+        self.counts.enabled += enabled
+        self.counts.disabled += not enabled
         self.touch()
 
     def modify(self, agreed: Terms) -> None:
         self.terms = agreed
+        self.counts.modified += 1
         self.touch()
 
     def _reporting(self) -> Iterator[Item]:
@@ -217,6 +249,9 @@ class Subscription:
         if events:
             data.append(make(ua.EventNotificationList, Events=events))
         message = make(ua.NotificationMessage, SequenceNumber=self._sequence, NotificationData=data)
+        self.counts.publish_requests += 1
+        self.counts.data_changes += len(values)
+        self.counts.events += len(events)
         if data:
             self._keep(message)
         more = self._enabled and any(self._reporting())
@@ -261,6 +296,7 @@ class Subscription:
         self._sequence = self._sequence % _LAST_SEQUENCE + 1
         if len(self._sent) > RETRANSMISSIONS:
             del self._sent[next(iter(self._sent))]
+            self.counts.discarded_messages += 1
 
     @property
     def available(self) -> list[int]:
@@ -274,9 +310,11 @@ class Subscription:
     def republish(self, sequence: int) -> ua.NotificationMessage:
         """The message again. Raises ServiceError where it is not kept, or not any more."""
         self.touch()
+        self.counts.republish_requests += 1
         message = self._sent.get(sequence)
         if message is None:
             raise ServiceError(StatusCodes.BadMessageNotAvailable)
+        self.counts.republished += 1
         return message
 
     def last_word(self, code: int) -> ua.PublishResult:

@@ -15,6 +15,7 @@ from asyncua.server.address_space import AddressSpace
 
 from bridge.base.publishing_clock import cycle_by
 from bridge.base.sources import source_of
+from bridge.uaserver.counts import ServerCounts
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
 from bridge.uaserver.monitoring import MonitoredItems, code_of, loop_time
 from bridge.uaserver.publishing import PublishRequest
@@ -31,6 +32,7 @@ class Subscriptions:
         self.subscriptions: dict[int, Subscription] = {}
         self._numbers = count(1)
         self.items = MonitoredItems(space)
+        self.counts = ServerCounts()
         self._timers: dict[int, asyncio.TimerHandle] = {}
 
     def prepare(self) -> None:
@@ -59,6 +61,7 @@ class Subscriptions:
         enabled: bool = get(params, "PublishingEnabled")
         made = Subscription(next(self._numbers), owner, terms(params), enabled=enabled)
         self.subscriptions[made.number] = made
+        self.counts.subscriptions += 1
         self._begin(made)
         return change(_revised(ua.CreateSubscriptionResult(), made), SubscriptionId=made.number)
 
@@ -139,11 +142,14 @@ class Subscriptions:
         if found is None:
             return make(ua.TransferResult, StatusCode=status(StatusCodes.BadSubscriptionIdInvalid))
         before = found.owner
+        found.counts.transfer_requests += 1
         if before is owner:
             return make(ua.TransferResult, StatusCode=status(StatusCodes.BadNothingToDo))
         if not _is_same_client(before, owner):
             return make(ua.TransferResult, StatusCode=status(StatusCodes.BadUserAccessDenied))
         found.owner = owner
+        # Who is not the same client is refused above.
+        found.counts.transferred_to_same_client += 1
         found.touch()
         before.publishing.forget(found)
         before.publishing.say_last(found.last_word(StatusCodes.GoodSubscriptionTransferred), loop_time())

@@ -14,9 +14,10 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import struct
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Coroutine, Sequence
+from datetime import UTC, datetime
+from functools import partial
 from typing import Any, Final
 
 from asyncua.common.connection import TransportLimits
@@ -39,7 +40,6 @@ from bridge.uaserver.library import (
     InvalidSignature,
     ServiceError,
     StatusCodes,
-    UaError,
     UaStatusCodeError,
     first_certificate,
     get,
@@ -50,16 +50,15 @@ from bridge.uaserver.library import (
 from bridge.uaserver.quotas import make_room_for_session
 from bridge.uaserver.routes import ROUTES, Route, ServiceRequest
 from bridge.uaserver.security import SecureChannel
-from bridge.uaserver.services import REFUSED, request_type
+from bridge.uaserver.services import NAMES, REFUSED, request_type
 from bridge.uaserver.session import InnerServer, Session
 from bridge.uaserver.states import REFUSALS, Need, RequestSession, need_of
+from bridge.uaserver.undertakings import Undertakings, finish
 
 _SLOW: Final = (request_type("Write"), request_type("Call"))
 """Services that may take seconds."""
 
-_TIME_AND_HANDLE: Final = struct.Struct("<qI")
 _ERROR: Final[Any] = ua.MessageType.Error
-_MOST_WAITING: Final = 32
 _LEAST_BUFFER: Final = 8192
 """Part 6 §7.1.2.3. Answers are cut into chunks that small."""
 MOST_BEFORE_SESSION: Final = 256 * 1024
@@ -67,19 +66,6 @@ MOST_BEFORE_SESSION: Final = 256 * 1024
 _MOST_UNDER_WAY: Final = 16 * 1024 * 1024
 """Bytes of messages that may wait for their turn, and of answers for a client to read them."""
 _MALFORMED_KIND: Final = "malformed messages"
-
-_MALFORMED: Final = (
-    UaError,
-    InvalidSignature,
-    ValueError,
-    TypeError,
-    LookupError,
-    AttributeError,
-    ArithmeticError,
-    RecursionError,
-    struct.error,
-)
-"""Exceptions of asyncua's decoders for bytes that are not OPC UA."""
 
 
 class Processor(UaProcessor):
@@ -89,7 +75,7 @@ class Processor(UaProcessor):
         super().__init__(server, transport, limits)
         self._server = server
         self._connection: SecureChannel = SecureChannel(self._connection.security_policy, self._limits)
-        self._waiting: set[asyncio.Task[Any]] = set()
+        self._undertakings = Undertakings()
         self._source = source_of(str(self.name[0]) if isinstance(self.name, tuple) else str(self.name))
         self._connection.source = self._source
         self._was_greeted = False
@@ -158,7 +144,7 @@ class Processor(UaProcessor):
             code = int(error.code)
             is_too_large = code == StatusCodes.BadRequestTooLarge
             self._count(is_broken=is_too_large)
-        except _MALFORMED as error:
+        except decoding.MALFORMED as error:
             self._count(is_broken=True)
             tell(_MALFORMED_KIND, self._source, f"connection closed: {error!r}")
             code = StatusCodes.BadSecurityChecksFailed
@@ -199,8 +185,8 @@ class Processor(UaProcessor):
         header = body.copy()
         try:
             requesthdr = struct_from_binary(ua.RequestHeader, body)
-        except _MALFORMED as error:
-            self._refuse(_request_handle(header), seqhdr, self._fault(error))
+        except decoding.MALFORMED as error:
+            self._refuse(decoding.request_handle(header), seqhdr, self._fault(error))
             return True
         if typeid not in _SLOW:
             try:
@@ -208,11 +194,8 @@ class Processor(UaProcessor):
             finally:
                 if isinstance(self.session, Session):
                     self.session.answer = None
-        if len(self._waiting) >= _MOST_WAITING:
-            await asyncio.wait(self._waiting, return_when=asyncio.FIRST_COMPLETED)
-        task = asyncio.create_task(self._serve(typeid, requesthdr, seqhdr, body))
-        self._waiting.add(task)
-        task.add_done_callback(self._waiting.discard)
+        await self._undertakings.room()
+        self._undertakings.begin(self._serve(typeid, requesthdr, seqhdr, body))
         # One turn, so that it is on its way before the client's next request is looked at.
         await asyncio.sleep(0)
         return True
@@ -220,13 +203,26 @@ class Processor(UaProcessor):
     async def _serve(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> bool:
         """Carry out a request. Whatever is wrong with it is its answer, and ends nothing."""
         try:
-            return bool(await self._process_message(typeid, requesthdr, seqhdr, body))
+            goes_on = bool(await self._process_message(typeid, requesthdr, seqhdr, body))
+            self._note(typeid, StatusCodes.Good)
+            return goes_on
         except (ServiceError, UaStatusCodeError) as error:
             code = int(error.code)
         except Exception as error:  # noqa: BLE001 - asyncua logs a traceback for each
             code = self._fault(error)
+        self._note(typeid, code)
         self._refuse(requesthdr.RequestHandle, seqhdr, code)
         return True
+
+    def _note(self, typeid: ua.NodeId, code: int) -> None:
+        """Count a request for the diagnostics."""
+        if code:
+            is_of_session = need_of(typeid) in (Need.CREATE, Need.ACTIVATE)
+            self._server.counts.refuse(code, of_session=is_of_session)
+        session = self.session
+        if isinstance(session, Session) and session.holder is self and typeid in NAMES:
+            session.counts.note(NAMES[typeid], code)
+            session.facts.seen_at = datetime.now(UTC)
 
     def _refuse(self, handle: int, seqhdr: Any, code: int) -> None:
         fault = ua.ServiceFault()
@@ -313,6 +309,8 @@ class Processor(UaProcessor):
         if session.holder is not self:
             session.shown = self._server.shown
         session.holder, session.most_bytes = self, self._limits.max_message_size
+        session.undertakings = self._undertakings
+        session.facts.note_channel(self._connection.security_policy)
 
     async def _session_watchdog_loop(self) -> None:
         """Not needed: a session watches its own time-out, or ends with the connection it was made on.
@@ -323,20 +321,23 @@ class Processor(UaProcessor):
         assert isinstance(session, Session), "checked"
         session.touch()
 
-        def send(response: Any) -> None:
-            self.send_response(requesthdr.RequestHandle, seqhdr, response)
+        send = partial(self.send_response, requesthdr.RequestHandle, seqhdr)
+        refuse = partial(self._refuse, requesthdr.RequestHandle, seqhdr)
 
         def is_open() -> bool:
             return session.holder is self and not self._transport.is_closing()
 
+        async def defer(work: Coroutine[Any, Any, None]) -> None:
+            await self._undertakings.room()
+            self._undertakings.begin(finish(work, is_open, refuse), requesthdr.RequestHandle)
+
         # Results are encoded as they are found.
         with speaking(session.locales):
-            await route.carry_out(session, ServiceRequest(requesthdr, body, send, is_open))
+            await route.carry_out(session, ServiceRequest(requesthdr, body, send, is_open, defer))
         return True
 
     async def close(self) -> None:
-        for task in list(self._waiting):
-            task.cancel()
+        self._undertakings.cancel_all()
         await super().close()
         if isinstance(self.session, Session) and self.session.holder is self:
             self.session.leave(clock.now())
@@ -426,10 +427,3 @@ class Processor(UaProcessor):
             )
             raise ServiceError(StatusCodes.BadIdentityChangeNotSupported)
         return who
-
-
-def _request_handle(header: Buffer) -> int:
-    """Handle of a RequestHeader of which nothing else need be sound. Raises for one that ends before it."""
-    nodeid_from_binary(header)
-    _, handle = _TIME_AND_HANDLE.unpack(header.read(_TIME_AND_HANDLE.size))
-    return int(handle)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import asyncio
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.uaserver.application import LoginAttempt, ServedApplication
+from bridge.uaserver.explanations import Explain, Explanation
 from bridge.uaserver.history import EventHistory, ValueHistory
 from bridge.uaserver.library import ServiceError
 
@@ -43,7 +45,10 @@ class Served(ServedApplication[User]):
     users: dict[str, User] = field(default_factory=dict)
     told: list[tuple[str, bool, bool]] = field(default_factory=list)
     written: list[tuple[str, object]] = field(default_factory=list)
-    refused: int = 0
+    refused: dict[ua.NodeId, tuple[ua.StatusCode, Explanation]] = field(default_factory=dict)
+    """Nodes that cannot be brought from where they come from, and why."""
+    before_refresh: Callable[[], Awaitable[None]] = lambda: asyncio.sleep(0)
+    refusals: int = 0
     broken: int = 0
     after_write: Callable[[], None] = lambda: None
 
@@ -63,12 +68,28 @@ class Served(ServedApplication[User]):
     def roles(self, user: User) -> Sequence[ua.NodeId]:
         return [ua.NodeId(ua.ObjectIds.WellKnownRole_Operator)] if user.has_rights else []
 
-    async def write(self, user: User, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
+    def may_diagnose(self, user: User) -> bool:
+        return user.name == "engineer"
+
+    def refreshable(self, nodes: Iterable[ua.NodeId]) -> list[ua.NodeId]:
+        return [where for where in nodes if where in self.refused]
+
+    async def refresh(
+        self, user: User, nodes: Sequence[ua.NodeId]
+    ) -> dict[ua.NodeId, tuple[ua.StatusCode, Explanation]]:
+        await self.before_refresh()
+        return {where: self.refused[where] for where in nodes}
+
+    async def write(
+        self, user: User, writes: Sequence[ua.WriteValue], explain: Explain
+    ) -> list[ua.StatusCode]:
         self.written += [(user.name, one.Value.Value.Value) for one in writes]
         self.after_write()
         return [ua.StatusCode() for _ in writes]
 
-    async def call(self, user: User, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
+    async def call(
+        self, user: User, calls: Sequence[ua.CallMethodRequest], explain: Explain
+    ) -> list[ua.CallMethodResult]:
         return [ua.CallMethodResult() for _ in calls]
 
     def value_history(self, where: ua.NodeId) -> ValueHistory | None:
@@ -81,7 +102,7 @@ class Served(ServedApplication[User]):
         self.told.append((user.name, is_there, has_others))
 
     def on_refused(self) -> None:
-        self.refused += 1
+        self.refusals += 1
 
     def on_broken(self) -> None:
         self.broken += 1

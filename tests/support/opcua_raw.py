@@ -14,7 +14,17 @@ from bridge.uaserver.session import Session
 
 async def ask(client: Client, service: str, **params: object) -> Any:
     """The response of a service. Raises UaStatusCodeError for a service fault."""
+    return await _ask(client, service, 0, params)
+
+
+async def explained(client: Client, service: str, **params: object) -> Any:
+    """The response of a service whose operations are to be explained with all that there is."""
+    return await _ask(client, service, 0xE0, params)
+
+
+async def _ask(client: Client, service: str, diagnostics: int, params: dict[str, object]) -> Any:
     request = getattr(ua, f"{service}Request")()
+    request.RequestHeader.ReturnDiagnostics = diagnostics
     for name, value in params.items():
         setattr(request.Parameters, name, value)
     data = await client.uaclient.protocol.send_request(request)

@@ -39,7 +39,7 @@ from tests.support.docs import (
 )
 from tests.support.model_facts import KeyFacts, model_tables
 from tests.support.process import REPOSITORY
-from tools import state_table
+from tools import conformance_page, state_table
 
 DEMO_SITE = REPOSITORY / "bridge" / "demo" / "site.toml"
 
@@ -301,6 +301,11 @@ def test_every_command_and_option_is_described() -> None:
             if option.startswith("--")
         }
         assert set(re.findall(r"--[a-z0-9-]+", shown)) == options, name
+
+
+def test_the_conformance_units_are_those_of_the_code() -> None:
+    text = conformance_page.PAGE.read_text(encoding="utf-8")
+    assert text == conformance_page.drawn(text), "draw it anew: python -m tools.conformance_page"
 
 
 # explanation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import csv
 import os
 import signal
@@ -22,6 +23,7 @@ BACK_S = 5.0
 NOISE_S = 5.0
 """A machine that is busy with other things."""
 KEEP_ALIVE, UNIT = 10, 1
+STATE = "conveyor/fu1/supervision/watchdog_state"
 OPERATION_ENABLED, NO_VOLTAGE = 4, 0x0474
 """A state as Modbus numbers it, and a control word of NORD's (BU 2500 §6.8)."""
 
@@ -163,6 +165,49 @@ async def test_after_good_nobody_reads_the_value_of_before(tmp_path: Path, ports
                 assert await shown("supervision/sent_control_word") == NO_VOLTAGE
             await call("ReleaseControl")
             assert await shown("supervision/owner") == ""
+
+
+class LastWords:
+    """What a client of the OPC UA front was told while the service ended."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+
+    def datachange_notification(self, node: object, value: object, data: object) -> None:
+        self.told.append(f"level {value}" if isinstance(value, int) else "good")
+
+    def status_change_notification(self, status: object) -> None:
+        self.told.append("bad")
+
+
+async def test_clients_are_told_of_the_end_before_anything_is_bad(
+    tmp_path: Path, ports: tuple[int, int]
+) -> None:
+    path = start(tmp_path, ports)
+    with drivebridge(tmp_path, "run", "run", str(path), notify=True) as bridge:
+        bridge.wait_ready()
+        wait_for_front(bridge)
+        client = Client(f"opc.tcp://127.0.0.1:{ports[1]}/drivebridge", timeout=5)
+        words = LastWords()
+        async with client:
+            space = await client.get_namespace_index("urn:drivebridge:points")
+            subscription = await client.create_subscription(100, words)
+            await subscription.subscribe_data_change(
+                [client.get_node(ua.ObjectIds.Server_ServiceLevel), client.get_node(f"ns={space};s={STATE}")]
+            )
+            await asyncio.sleep(0.3)
+            assert "level 255" in words.told
+            bridge.signal(signal.SIGTERM)
+            began = time.monotonic()
+            while "level 0" not in words.told:
+                assert time.monotonic() - began < 1.5, words.told
+                await asyncio.sleep(0.02)
+            state = await client.get_node(ua.ObjectIds.Server_ServerStatus_State).read_value()
+            assert state == ua.ServerState.Shutdown
+            assert words.told[:3].count("bad") == 0
+        # Its only client has gone: nobody is waited for any more.
+        assert bridge.popen.wait(10) == 0
+        assert "Traceback" not in bridge.output()
 
 
 @pytest.mark.landing

@@ -11,6 +11,7 @@ import time
 from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from asyncua.client.client import Client
 from pymodbus.client import ModbusTcpClient
 
 from bridge.uaserver.library import StatusCodes, get, make, node_id, ua, variant
+from tests.support.opcua_raw import ask, explained
 from tests.support.passwords import cheap_hash
 from tests.support.process import drivebridge, drivebridge_called, free_port, peer_called, until
 
@@ -223,6 +225,55 @@ async def test_opcua_writes_the_drive_and_answers_with_its_outcome(shop: Shop) -
             await node.write_value(321.0)
         with pytest.raises(ua.uaerrors.BadNotWritable):
             await client.get_node(f"ns={ns};s=conveyor/fu2/parameter/p700_1").write_value(1.0)
+
+
+async def test_opcua_reads_through_where_no_older_value_will_do(shop: Shop) -> None:
+    async with shop.engineer() as (client, ns):
+        wanted = ua.ReadValueId(ua.NodeId("conveyor/fu2/parameter/p102", ns), ua.AttributeIds.Value)
+
+        async def read_at(age_ms: float) -> datetime:
+            (found,) = (await ask(client, "Read", NodesToRead=[wanted], MaxAge=age_ms)).Results
+            assert found.StatusCode.is_good()
+            return found.SourceTimestamp
+
+        before = await read_at(60_000.0)
+        assert await read_at(60_000.0) == before, "the value read last"
+        through = await read_at(0.0)
+        assert through > before
+        assert await read_at(60_000.0) >= through
+
+
+async def test_opcua_says_in_the_diagnostics_why_the_drive_refused(shop: Shop) -> None:
+    async with shop.engineer() as (client, ns):
+        number = ua.Variant(1.0, ua.VariantType.Double)
+        name = ua.Variant("P999")
+        methods = {"ReadParameter": [name], "WriteParameter": [name, number]}
+        calls = [
+            ua.CallMethodRequest(
+                ua.NodeId("conveyor/fu2", ns), ua.NodeId(f"conveyor/fu2/{method}", ns), arguments
+            )
+            for method, arguments in methods.items()
+        ]
+        answer = await explained(client, "Call", MethodsToCall=calls)
+        table = answer.ResponseHeader.StringTable
+        for result, info in zip(answer.Results, answer.DiagnosticInfos, strict=True):
+            assert result.StatusCode.is_bad()
+            assert info.AdditionalInfo.startswith("SDO abort 06020000h: ")
+            assert table[info.NamespaceURI] == "urn:drivebridge:codes"
+            assert "." in table[info.SymbolicId]
+            assert "P999" in table[info.LocalizedText]
+        write = ua.WriteValue(ua.NodeId("conveyor/fu2/parameter/p102", ns), ua.AttributeIds.Value)
+        write.Value = ua.DataValue(ua.Variant(321.0, ua.VariantType.Double))
+        answer = await explained(client, "Write", NodesToWrite=[write])
+        (info,) = answer.DiagnosticInfos
+        assert "321" in answer.ResponseHeader.StringTable[info.LocalizedText]
+
+
+async def test_opcua_methods_say_what_came_of_them(shop: Shop) -> None:
+    async with shop.engineer() as (client, ns):
+        drive = client.get_node(f"ns={ns};s=conveyor/fu2")
+        said = await drive.call_method(f"{ns}:WriteParameter", "P560", "EEPROM")
+        assert said == ua.LocalizedText("the drive holds this value already: not written again", "en")
 
 
 async def test_opcua_methods_take_any_name(shop: Shop) -> None:

@@ -40,6 +40,8 @@ class SlowFront:
     def __init__(self, ended: Callable[[], None]) -> None:
         self._ended = ended
 
+    def announce_end(self) -> None: ...
+
     async def run_once(self, serves: Callable[[], None]) -> Text:
         serves()
         try:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
@@ -15,6 +16,7 @@ from bridge.northbound.opcua.file_transfer import READING, FileTransfer, file_me
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.permissions import ROLE_NODES
 from bridge.northbound.opcua.plant_history import PlantHistory
+from bridge.northbound.opcua.read_through import ReadThrough
 from bridge.northbound.opcua.server_configuration import ServerConfiguration
 from bridge.northbound.opcua.session_user import SessionUser
 from bridge.northbound.opcua.writes import Writer
@@ -22,6 +24,7 @@ from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
 from bridge.uaserver.condition_calls import METHODS
+from bridge.uaserver.explanations import Explain, Explanation
 from bridge.uaserver.history import EventHistory, ValueHistory
 from bridge.uaserver.library import get, node_id, ua
 
@@ -45,6 +48,7 @@ class Backend(ServedApplication[SessionUser]):
         self,
         users: Accounts,
         least_role: Callable[[ua.NodeId], Role | None],
+        reader: ReadThrough,
         writer: Writer,
         caller: Caller,
         configuration: ServerConfiguration,
@@ -54,6 +58,7 @@ class Backend(ServedApplication[SessionUser]):
     ) -> None:
         self._users = users
         self._least_role = least_role
+        self._reader = reader
         self._writer = writer
         self._caller = caller
         self._configuration = configuration
@@ -83,22 +88,41 @@ class Backend(ServedApplication[SessionUser]):
     def roles(self, user: SessionUser) -> Sequence[ua.NodeId]:
         return [node_id(where) for where in ROLE_NODES[user.identity.role]]
 
-    async def write(self, user: SessionUser, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
-        return await self._writer.write(user.identity, writes)
+    def may_diagnose(self, user: SessionUser) -> bool:
+        return user.identity.role >= Role.ENGINEER
+
+    def refreshable(self, nodes: Iterable[ua.NodeId]) -> Sequence[ua.NodeId]:
+        return self._reader.wanted(nodes)
+
+    async def refresh(
+        self, user: SessionUser, nodes: Sequence[ua.NodeId]
+    ) -> Mapping[ua.NodeId, tuple[ua.StatusCode, Explanation]]:
+        return await self._reader.read(user.identity, nodes)
+
+    async def write(
+        self, user: SessionUser, writes: Sequence[ua.WriteValue], explain: Explain
+    ) -> list[ua.StatusCode]:
+        return await self._writer.write(user.identity, writes, explain)
 
     async def call(
-        self, user: SessionUser, calls: Sequence[ua.CallMethodRequest]
+        self, user: SessionUser, calls: Sequence[ua.CallMethodRequest], explain: Explain
     ) -> list[ua.CallMethodResult]:
-        return list(await asyncio.gather(*(self._call(user, call) for call in calls)))
+        return list(
+            await asyncio.gather(
+                *(self._call(user, call, partial(explain, place)) for place, call in enumerate(calls))
+            )
+        )
 
-    async def _call(self, user: SessionUser, call: ua.CallMethodRequest) -> ua.CallMethodResult:
+    async def _call(
+        self, user: SessionUser, call: ua.CallMethodRequest, explain: Callable[[Explanation], None]
+    ) -> ua.CallMethodResult:
         if self._configuration.has(get(call, "MethodId")):
             return await self._configuration.call(user.identity, call, encrypted=user.encrypted)
         method, file = file_method(call), self._past.file(get(call, "ObjectId"))
         if method and file:
             given: list[ua.Variant] = get(call, "InputArguments") or []
             return await self._transfer.call(user.identity.connection, file, method, given)
-        (result,) = await self._caller.call(user.identity, [call])
+        (result,) = await self._caller.call(user.identity, [call], lambda _, why: explain(why))
         return result
 
     def value_history(self, where: ua.NodeId) -> ValueHistory | None:

@@ -12,6 +12,7 @@ from bridge.base.publishing_clock import next_publish
 from bridge.image import Image
 from bridge.northbound.opcua.events import EventSender
 from bridge.northbound.opcua.point_values import AllWatched, WatchedVariable
+from bridge.northbound.opcua.service_level import ServiceLevel
 
 _TAKE: Final = 500
 _TURN_S: Final = 0.001
@@ -33,11 +34,19 @@ class Past(Protocol):
 class Publisher:
     """Follows the image for the variables in ``watched``, and for the history."""
 
-    def __init__(self, image: Image, watched: AllWatched, events: EventSender, past: Past) -> None:
+    def __init__(
+        self,
+        image: Image,
+        watched: AllWatched,
+        events: EventSender,
+        past: Past,
+        level: ServiceLevel,
+    ) -> None:
         self._image = image
         self._watched = watched
         self._events = events
         self._past = past
+        self._level = level
         self._guard = Guard("OPC UA publisher")
         self._turn_ends = 0.0
 
@@ -45,6 +54,8 @@ class Publisher:
         feed = self._image.feed()
         try:
             while True:
+                with self._guard:
+                    await self._level.look()
                 with self._guard:
                     await self._events.send_waiting()
                 # What changes meanwhile waits for the next look, or a busy image would never let go.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Final
 
 from asyncua.server.address_space import AddressSpace
@@ -13,6 +14,7 @@ from bridge.command.messages.request import (
     Action,
     Code,
     Identity,
+    Outcome,
     Request,
     command_of,
 )
@@ -24,9 +26,11 @@ from bridge.northbound.opcua.data_values import (
     plain_variant,
     rejection,
 )
-from bridge.northbound.opcua.nodes import Argument, ArgumentType, MethodNode
+from bridge.northbound.opcua.nodes import OUTCOME, Argument, ArgumentType, MethodNode
+from bridge.northbound.opcua.outcome_texts import explanation, outcome_text
 from bridge.northbound.opcua.writes import ask
 from bridge.northbound.view import View
+from bridge.uaserver.explanations import Explain, Explanation
 from bridge.uaserver.hierarchy import related
 from bridge.uaserver.library import (
     AttributeIds,
@@ -37,6 +41,7 @@ from bridge.uaserver.library import (
     make,
     status,
     ua,
+    variant,
 )
 
 _DIRECTIONS: Final = (-1, 0, 1)
@@ -55,12 +60,16 @@ class Caller:
         self._method = method
 
     async def call(
-        self, identity: Identity, calls: Sequence[ua.CallMethodRequest]
+        self, identity: Identity, calls: Sequence[ua.CallMethodRequest], explain: Explain
     ) -> list[ua.CallMethodResult]:
-        """One result for each of ``calls``, in their order; they are begun in that order, too."""
-        return list(await asyncio.gather(*(self._call(identity, call) for call in calls)))
+        """One result for each of ``calls``, in their order; they are begun in that order, too. What the plant
+        refuses is explained."""
+        called = (self._call(identity, call, partial(explain, place)) for place, call in enumerate(calls))
+        return list(await asyncio.gather(*called))
 
-    async def _call(self, identity: Identity, call: ua.CallMethodRequest) -> ua.CallMethodResult:
+    async def _call(
+        self, identity: Identity, call: ua.CallMethodRequest, explain: Callable[[Explanation], None]
+    ) -> ua.CallMethodResult:
         method_id: ua.NodeId = get(call, "MethodId")
         method = self._method(method_id)
         refusal = self._refusal(call, method_id)
@@ -81,12 +90,13 @@ class Caller:
         if any(faults):
             return self._rejected(identity, call, StatusCodes.BadInvalidArgument, faults)
         outcome = await ask(self._view, Request(identity, method.target, command_of(method.action, *values)))
+        if not outcome.ok:
+            explain(explanation(outcome))
         place = _AT_FAULT.get(outcome.code) if method.action in PARAMETER_ACTIONS else None
         if place is not None and place < len(faults):
             faults[place] = outcome_status(outcome).value
             return call_result(StatusCodes.BadInvalidArgument, faults)
-        results = [] if outcome.value is None or not method.results else [plain_variant(outcome.value)]
-        return call_result(outcome_status(outcome).value, faults, results)
+        return call_result(outcome_status(outcome).value, faults, _results(method, outcome))
 
     def _rejected(
         self, identity: Identity, call: ua.CallMethodRequest, code: int, faults: Sequence[int] = ()
@@ -115,6 +125,15 @@ class Caller:
         if executable is None or not executable.Value:
             return StatusCodes.BadNotExecutable
         return None
+
+
+def _results(method: MethodNode, outcome: Outcome) -> list[ua.Variant]:
+    """Output arguments: none where the method has failed."""
+    if not outcome.ok:
+        return []
+    if OUTCOME in method.results:
+        return [variant(outcome_text(outcome), ua.VariantType.LocalizedText)]
+    return [] if outcome.value is None else [plain_variant(outcome.value)]
 
 
 def _argument(method: MethodNode, argument: Argument, given: ua.Variant) -> Value:

@@ -42,6 +42,8 @@ class ArgumentType(Enum):
     INT32 = (-0x8000_0000, 0x7FFF_FFFF)
     UINT32 = (0, 0xFFFF_FFFF)
     STRING = "string"
+    TEXT = "text"
+    """A text for people, in the client's language."""
     ANY = "any"
     """A number, a text, true or false."""
 
@@ -170,6 +172,9 @@ _TTL: Final = Argument("ttl_ms", ArgumentType.UINT32, Text.of("method.ttl"))
 
 _PARAMETER: Final = Argument("name", ArgumentType.STRING, Text.of("method.parameter"))
 _VALUE: Final = Argument("value", ArgumentType.ANY, Text.of("method.value"))
+
+OUTCOME: Final = Argument("outcome", ArgumentType.TEXT, Text.of("method.outcome"))
+"""Output argument of each method that has no other."""
 
 _Methods = Sequence[tuple[Action, tuple[Argument, ...], tuple[Argument, ...], Text]]
 
@@ -304,7 +309,7 @@ def _methods(target: str, table: _Methods) -> tuple[MethodNode, ...]:
             target,
             description,
             arguments,
-            results,
+            results or (OUTCOME,),
         )
         for action, arguments, results, description in table
     )

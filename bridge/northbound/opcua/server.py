@@ -11,6 +11,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+
 import bridge
 from bridge.base import clock
 from bridge.base.errors import OperationFailed
@@ -33,25 +35,29 @@ from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nameplates import Nameplate
 from bridge.northbound.opcua.nodes import layout
 from bridge.northbound.opcua.notifiers import Notifiers
+from bridge.northbound.opcua.outcome_texts import spoken
 from bridge.northbound.opcua.own_files import own_folder
 from bridge.northbound.opcua.own_renewal import OwnRenewal
 from bridge.northbound.opcua.own_watch import OwnWatch
 from bridge.northbound.opcua.ownnames import names_of, reached_by
 from bridge.northbound.opcua.plant_history import PlantHistory
+from bridge.northbound.opcua.read_through import ReadThrough
 from bridge.northbound.opcua.server_configuration import ServerConfiguration
 from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
+from bridge.northbound.opcua.service_level import ServiceLevel
 from bridge.northbound.opcua.site_space import NAMESPACE, fill
 from bridge.northbound.opcua.value_rings import ValueRings
 from bridge.northbound.opcua.writes import Writer
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
-from bridge.text import LANGUAGES
+from bridge.text import LANGUAGES, Text
 from bridge.uaserver import decoding
 from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
 from bridge.uaserver.library import ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.own_addresses import OwnAddresses
+from bridge.uaserver.registration import RegisteredServer, Registration
 from bridge.uaserver.session import InnerServer
 
 _PRODUCT: Final = "urn:drivebridge"
@@ -91,6 +97,10 @@ class OpcUaServer:
         self._pulse = Pulse(clock.now)
         self._publisher: asyncio.Task[None] | None = None
         self._renewals: asyncio.Task[None] | None = None
+        self._inner: InnerServer | None = None
+        self._ending: asyncio.Task[None] | None = None
+        self._registration: Registration | None = None
+        self._registering: asyncio.Task[None] | None = None
         self._follower: asyncio.Task[None] | None = None
         self._alarms: AlarmTask | None = None
         self._past: PlantHistory | None = None
@@ -145,9 +155,37 @@ class OpcUaServer:
         finally:
             deaf.cancel()
 
+    def announce_end(self) -> None:
+        """Tell clients, at once, that the server is going to end; nothing else is changed by that."""
+        if self._inner and self._ending is None:
+            self._ending = asyncio.create_task(self._tell_end(self._inner), name="opcua end")
+
+    async def end(self) -> None:
+        """Give clients the time to go that the site gives them, from the announcement on. Ends at once where
+        there are none."""
+        self.announce_end()
+        if self._ending:
+            await asyncio.gather(self._ending, return_exceptions=True)
+
+    async def _tell_end(self, inner: InnerServer) -> None:
+        settings = self._settings
+        await inner.status.announce_end(
+            settings.shutdown_notice_s,
+            spoken(Text.of("opcua.ends")),
+            lambda: any(one.holder is not None for one in inner.sessions),
+            settings.return_after_s,
+        )
+
     async def close(self) -> None:
         """Close every session and the port. May be called at any time, also twice."""
         self._pulse.stop()
+        if self._ending:
+            self._ending.cancel()
+        registering, self._registering = self._registering, None
+        if registering and self._registration:
+            registering.cancel()
+            await asyncio.gather(registering, return_exceptions=True)
+            await self._registration.end()
         tasks = [one for one in (self._publisher, self._renewals, self._follower) if one]
         self._publisher = self._renewals = self._follower = None
         for task in tasks:
@@ -230,6 +268,7 @@ class OpcUaServer:
         inner.application = Backend(
             users,
             tree.least_role,
+            ReadThrough(self._view, tree.parameter),
             Writer(self._view, inner.aspace, tree.writable),
             Caller(self._view, inner.aspace, tree.method),
             ServerConfiguration(renewal, trusted.store, self._own_files, take_up),
@@ -241,13 +280,15 @@ class OpcUaServer:
         events = EventSender(epoch_ns, inner.subscriptions, notifiers, site.event_types, keeper)
         self._view.on_event(events.on_event)
         inner.subscriptions.prepare()
-        self._server = server
+        self._server, self._inner = server, inner
         await server.start()
-        publisher = Publisher(image, tree.watched, events, past)
+        publisher = Publisher(image, tree.watched, events, past, ServiceLevel(image, inner.status))
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
         watch = OwnWatch(self._settings, self._folder, own.application_uri)
         self._renewals = asyncio.create_task(watch.run(take_up), name="opcua renewals")
         self._follower = asyncio.create_task(alarms.run(), name="opcua alarms")
+        if self._settings.discovery_server:
+            self._register(self._settings.discovery_server, own, server.name)
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
 
@@ -259,6 +300,18 @@ class OpcUaServer:
     def _renewal(self, own: ServerIdentity) -> OwnRenewal:
         names = names_of(self._settings.listen, reached_by(self._settings))
         return OwnRenewal(OwnCertificate(own.certificate, own.private_key), own.application_uri, names)
+
+    def _register(self, url: str, own: ServerIdentity, name: str) -> None:
+        told = RegisteredServer(
+            own.application_uri,
+            _PRODUCT,
+            name,
+            self.endpoint_url,
+            own.certificate.public_bytes(Encoding.DER),
+            own.private_key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()),
+        )
+        self._registration = Registration(url, told)
+        self._registering = asyncio.create_task(self._registration.run(), name="opcua registration")
 
     async def _describe(self, server: BoundServer, application_uri: str, users: Accounts) -> None:
         server.set_endpoint(self.endpoint_url)

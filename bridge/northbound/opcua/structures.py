@@ -32,6 +32,7 @@ _ARGUMENT_TYPE: Final = {
     ArgumentType.INT32: ObjectIds.Int32,
     ArgumentType.UINT32: ObjectIds.UInt32,
     ArgumentType.STRING: ObjectIds.String,
+    ArgumentType.TEXT: ObjectIds.LocalizedText,
     ArgumentType.ANY: ObjectIds.BaseDataType,
 }
 

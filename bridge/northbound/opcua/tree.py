@@ -245,6 +245,13 @@ class Tree:
         node = self._node(where) or self._stands_for(self._name(where))
         return node if isinstance(node, VariableNode) and node.writable else None
 
+    def parameter(self, where: ua.NodeId) -> VariableNode | None:
+        """The variable, where it is a parameter."""
+        node = self._node(where)
+        if not isinstance(node, VariableNode) or node.bit is not None:
+            return None
+        return node if node.point.path[-2] == "parameter" else None
+
     def _node(self, where: ua.NodeId) -> Node | None:
         found = self._nodes.get(self._name(where))
         return found.node if found else None

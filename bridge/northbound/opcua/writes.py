@@ -31,10 +31,12 @@ from bridge.image import Value
 from bridge.image.point import WriteKind
 from bridge.northbound.opcua.data_values import outcome_status, plain_value, point_value, rejection
 from bridge.northbound.opcua.nodes import VariableNode
+from bridge.northbound.opcua.outcome_texts import explanation
 from bridge.northbound.opcua.permissions import COMMAND_OF
 from bridge.northbound.view import View
 from bridge.text import Text
 from bridge.uaserver.arrivals import received_at
+from bridge.uaserver.explanations import Explain
 from bridge.uaserver.library import GOOD, AttributeIds, ServiceError, StatusCodes, get, status, ua
 
 _log = logging.getLogger(__name__)
@@ -96,8 +98,10 @@ class Writer:
         self._space = space
         self._writable = writable
 
-    async def write(self, identity: Identity, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
-        """One status code for each of ``writes``, in their order."""
+    async def write(
+        self, identity: Identity, writes: Sequence[ua.WriteValue], explain: Explain
+    ) -> list[ua.StatusCode]:
+        """One status code for each of ``writes``, in their order; what the plant refuses is explained."""
         results = [GOOD] * len(writes)
         telegrams: list[_Telegram] = []
         latest: dict[str, _Telegram] = {}
@@ -129,11 +133,15 @@ class Writer:
         by_drive: dict[str, list[_Telegram]] = {}
         for telegram in telegrams:
             by_drive.setdefault(telegram.target, []).append(telegram)
-        await asyncio.gather(*(self._send(identity, queue, results) for queue in by_drive.values()))
+        await asyncio.gather(*(self._send(identity, one, results, explain) for one in by_drive.values()))
         return results
 
     async def _send(
-        self, identity: Identity, telegrams: Sequence[_Telegram], results: list[ua.StatusCode]
+        self,
+        identity: Identity,
+        telegrams: Sequence[_Telegram],
+        results: list[ua.StatusCode],
+        explain: Explain,
     ) -> None:
         """Send the telegrams of one drive, one after the other."""
         for telegram in telegrams:
@@ -141,7 +149,12 @@ class Writer:
             code = status(telegram.fault)
             if code.is_good():
                 request = Request(identity, telegram.target, telegram.command())
-                code = outcome_status(await ask(self._view, request))
+                outcome = await ask(self._view, request)
+                code = outcome_status(outcome)
+                if not outcome.ok:
+                    why = explanation(outcome)
+                    for place in telegram.places:
+                        explain(place, why)
             else:
                 values = telegram.values | telegram.misfits
                 told = rejection(identity, telegram.target, telegram.kind.action, code.value, values)

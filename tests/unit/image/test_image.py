@@ -230,3 +230,14 @@ def test_the_reason_for_a_quality_is_a_text_that_reads_in_english(image: Image):
     assert (image[1].why, image[1].reason) == (Text.of("node.lost"), "node lost")
     image.judge((1,), Quality.LOST, 2.0, Text.of("node.lost"))
     assert image[1].time == 1.0, "the same reason is no change"
+
+
+def test_a_later_time_of_the_same_value_is_kept_and_no_feed_hears_of_it() -> None:
+    image = Image((Point(name="a/b", data_type=DataType.UINT16),))
+    image.set(0, 7, 1.0)
+    feed = image.feed()
+    feed.take(10)
+    for now, time in ((3.0, 3.0), (2.0, 3.0)):
+        image.date(0, now)
+        assert (image[0].value, image[0].time) == (7, time)
+    assert not feed

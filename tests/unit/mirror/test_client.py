@@ -154,6 +154,12 @@ async def test_what_the_image_shows_already_is_answered_at_once(front: MirrorCli
     assert (await waiting(front, 1)).done()
 
 
+async def test_a_value_that_was_read_again_has_the_later_time(front: MirrorClient) -> None:
+    told = Delta(INSTANCE, 2, (Changed(0, 1, Quality.GOOD, 5.0, ""),))
+    front._on_delta(Sample(protocol.DELTA, protocol.encode(told)))
+    assert (front.image[0].value, front.image[0].time) == (1, 5.0)
+
+
 async def test_a_text_is_shown_in_words_and_known_as_what_it_is(front: MirrorClient) -> None:
     said = Text.of("node.lost")
     told = Delta(INSTANCE, 2, (Changed(0, said, Quality.GOOD, 1.0, ""),))

@@ -66,4 +66,4 @@ async def test_who_is_not_identified_is_refused_and_counted() -> None:
             async with Client(url):
                 pass
         assert refused.value.code == ua.StatusCodes.BadUserAccessDenied
-        assert (application.refused, application.told) == (1, [])
+        assert (application.refusals, application.told) == (1, [])

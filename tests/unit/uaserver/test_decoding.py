@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import struct
 
 import pytest
 from asyncua import ua
 from asyncua.common.utils import Buffer, NotEnoughData
 from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary, variant_from_binary, variant_to_binary
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bridge.uaserver import decoding
 from bridge.uaserver.library import UaError, UaStatusCodeError
@@ -79,3 +82,54 @@ def test_what_fails_elsewhere_is_not_malformed() -> None:
     except ValueError as error:
         assert not decoding.is_malformed(error)
     assert decoding.place(ValueError("never raised")) == ""
+
+
+# in turns
+
+
+@given(
+    st.lists(st.integers(0, 2**32 - 1), max_size=20),
+    st.lists(st.integers(0, 2**32 - 1), max_size=20),
+    st.integers(0, 2**32 - 1),
+)
+def test_what_is_decoded_in_turns_is_the_same(add: list[int], remove: list[int], number: int) -> None:
+    params = ua.SetTriggeringParameters(number, number, add, remove)
+    content = struct_to_binary(params)
+    arrays = ("LinksToAdd", "LinksToRemove")
+    decoding.begin(decoding.MOST_ELEMENTS)
+    found = asyncio.run(decoding.decoded(ua.SetTriggeringParameters, arrays, Buffer(content)))
+    assert found == struct_from_binary(ua.SetTriggeringParameters, Buffer(content)) == params
+
+
+async def test_structures_are_decoded_in_turns_too() -> None:
+    found = await decoding.decoded(ua.ReadParameters, ("NodesToRead",), Buffer(reads(3)))
+    assert found == struct_from_binary(ua.ReadParameters, Buffer(reads(3)))
+    null = struct_to_binary(ua.ReadParameters())[: -struct.calcsize("<i")] + struct.pack("<i", -1)
+    assert (await decoding.decoded(ua.ReadParameters, ("NodesToRead",), Buffer(null))).NodesToRead == []
+
+
+@pytest.mark.parametrize("length", [2**31 - 1, 1000, -2])
+async def test_in_turns_an_array_is_no_longer_than_its_message(length: int) -> None:
+    content = reads(0)[: -struct.calcsize("<i")] + struct.pack("<i", length)
+    with pytest.raises(NotEnoughData) as refused:
+        await decoding.decoded(ua.ReadParameters, ("NodesToRead",), Buffer(content))
+    assert decoding.is_malformed(refused.value)
+
+
+async def test_in_turns_no_more_is_decoded_than_the_budget_has() -> None:
+    decoding.begin(2)
+    with pytest.raises(UaStatusCodeError):
+        await decoding.decoded(ua.ReadParameters, ("NodesToRead",), Buffer(reads(3)))
+
+
+async def test_what_is_cut_off_in_an_element_is_malformed() -> None:
+    with pytest.raises(NotEnoughData) as refused:
+        await decoding.decoded(ua.ReadParameters, ("NodesToRead",), Buffer(reads(3)[:-1]))
+    assert decoding.is_malformed(refused.value)
+
+
+@pytest.mark.parametrize(("length", "known"), [(3, 3), (0, 0), (-1, 0)])
+def test_the_length_of_an_array_is_known_before_it_is_decoded(length: int, known: int) -> None:
+    data = Buffer(struct.pack("<i", length))
+    assert decoding.first_length(data) == known
+    assert len(data) == struct.calcsize("<i")

@@ -110,7 +110,7 @@ async def test_a_disabled_item_is_told_again_when_it_reports(rig: Rig) -> None:
     await rig.change(8)
     assert rig.values() == []
     params = ua.SetMonitoringModeParameters(1, Mode.Reporting, [made.MonitoredItemId, 4711])
-    codes = [one.value for one in rig.items.set_mode(rig.subscription, params)]
+    codes = [one.value for one in await rig.items.set_mode(rig.subscription, params)]
     assert codes == [Codes.Good, Codes.BadMonitoredItemIdInvalid]
     assert rig.values() == [8]
 
@@ -119,7 +119,7 @@ async def test_a_deleted_item_is_told_nothing(rig: Rig) -> None:
     (made,) = await rig.create(wanted())
     params = ua.DeleteMonitoredItemsParameters(1, [made.MonitoredItemId])
     for code in (Codes.Good, Codes.BadMonitoredItemIdInvalid):
-        (found,) = rig.items.delete(rig.subscription, params)
+        (found,) = await rig.items.delete(rig.subscription, params)
         assert found.value == code
     assert not rig.space[WORD].attributes[Ids.Value].datachange_callbacks
 
@@ -132,7 +132,7 @@ async def test_what_is_modified_is_agreed_anew(rig: Rig) -> None:
         ua.MonitoredItemModifyRequest(4711),
     ]
     params = ua.ModifyMonitoredItemsParameters(1, ua.TimestampsToReturn.Both, changes)
-    agreed, unknown = rig.items.modify(rig.subscription, params)
+    agreed, unknown = await rig.items.modify(rig.subscription, params)
     assert (agreed.RevisedQueueSize, agreed.StatusCode.value) == (3, Codes.Good)
     assert unknown.StatusCode.value == Codes.BadMonitoredItemIdInvalid
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Coroutine
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from asyncua import ua
 from asyncua.common.utils import Buffer
-from asyncua.ua.ua_binary import struct_to_binary
+from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary
 
+from bridge.uaserver.encoding import encode
 from bridge.uaserver.library import ServiceError
 from bridge.uaserver.routes import MOST_CALLS, MOST_OPERATIONS, ROUTES, Route, ServiceRequest
 from bridge.uaserver.services import REFUSED, SERVICES, request_type
@@ -39,8 +41,12 @@ def test_each_route_names_what_its_messages_have() -> None:
 
 async def carried_out(route: Route, params: object) -> list[Any]:
     sent: list[Any] = []
-    request = ServiceRequest(None, Buffer(struct_to_binary(params)), sent.append, lambda: True)
-    session: Any = SimpleNamespace()
+
+    async def at_once(work: Coroutine[Any, Any, None]) -> None:
+        await work
+
+    request = ServiceRequest(None, Buffer(struct_to_binary(params)), sent.append, lambda: True, at_once)
+    session: Any = SimpleNamespace(most_bytes=1_000_000, answer=None)
     await route.carry_out(session, request)
     return sent
 
@@ -58,6 +64,7 @@ async def test_operations_are_counted_before_anything_is_done(count: int, code: 
     if code is None:
         (response,) = await carried_out(route, params)
         assert isinstance(response, ua.CallResponse)
+        assert struct_from_binary(ua.CallResponse, Buffer(encode(response))).Results == []
         return
     with pytest.raises(ServiceError) as refused:
         await carried_out(route, params)

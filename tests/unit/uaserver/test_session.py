@@ -98,5 +98,5 @@ async def test_who_may_not_write_sees_that(rig: Rig) -> None:
 async def test_an_age_that_is_none_is_refused(rig: Rig, age: float) -> None:
     params = ua.ReadParameters(MaxAge=age, NodesToRead=[ua.ReadValueId(WORD, Ids.Value)])
     with pytest.raises(ServiceError) as refused:
-        await rig.session(User("eva")).read_attributes(params)
+        await rig.session(User("eva")).read_attributes(params, {}, lambda place, why: None)
     assert refused.value.code == Codes.BadMaxAgeInvalid

@@ -55,6 +55,16 @@ seen.part = part.value.value.length;
 const none = await session.read({ nodeId: "i=2267", attributeId: AttributeIds.Value, indexRange: "1" });
 seen.none = none.statusCode.name;
 
+// The sessions' own objects come behind the two arrays.
+const sessions = (await session.browse("i=3706")).references;
+seen.sessions = sessions.length;
+const own = sessions.at(-1).nodeId.toString();
+const security = await session.read({ nodeId: `${own}/SessionSecurityDiagnostics`, attributeId: AttributeIds.Value });
+const { encoding, transportProtocol, securityPolicyUri, clientUserIdHistory } = security.value.value;
+seen.security = [encoding, transportProtocol, securityPolicyUri, clientUserIdHistory];
+const counted = await session.read({ nodeId: `${own}/SessionDiagnostics`, attributeId: AttributeIds.Value });
+seen.queries = [counted.value.value.queryFirstCount.totalCount, counted.value.value.queryFirstCount.errorCount];
+
 const subscription = await session.createSubscription2({
   requestedPublishingInterval: 1, requestedLifetimeCount: 1, requestedMaxKeepAliveCount: 7,
   publishingEnabled: true,

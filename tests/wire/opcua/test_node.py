@@ -122,6 +122,14 @@ async def test_node_opcua_walks_through_the_services(tmp_path: Path) -> None:
         "beyond": "BadDeadbandFilterInvalid",
         "rangeless": "BadDeadbandFilterInvalid",
         "events": "Good",
+        "sessions": 3,
+        "security": [
+            "UA Binary",
+            "opc.tcp",
+            "http://opcfoundation.org/UA/SecurityPolicy#None",
+            ["anonymous"],
+        ],
+        "queries": [1, 1],
         "links": ["Good"],
         "linked": True,
     }

@@ -36,17 +36,23 @@ class Told:
         self.calls.append((login,))
         return user().identity
 
-    async def write(self, identity: Identity, writes: object) -> list[object]:
+    async def write(self, identity: Identity, writes: object, explain: object) -> list[object]:
         self.calls.append((identity, writes))
         return []
 
-    async def call(self, identity: Identity, calls: list[object], **_: object) -> list[object]:
-        return await self.write(identity, calls) or calls
+    async def call(
+        self, identity: Identity, calls: list[object], explain: object = None, **_: object
+    ) -> list[object]:
+        return await self.write(identity, calls, explain) or calls
 
     def has(self, where: object) -> bool:
         return where == PUSH
 
     def file(self, where: ua.NodeId) -> None: ...
+
+    async def read(self, identity: Identity, nodes: object) -> dict[object, object]:
+        self.calls.append((identity, nodes))
+        return {}
 
     def count(self, leaf: str) -> None:
         self.calls.append((leaf,))
@@ -56,14 +62,14 @@ class Told:
 
 
 def backend(told: Any, pulse: Any = None) -> Backend:
-    return Backend(told, lambda _: None, told, told, told, told, pulse, told)
+    return Backend(told, lambda _: None, told, told, told, told, told, pulse, told)
 
 
 @pytest.mark.parametrize("least", [*Role, None])
 def test_what_a_user_may_write_and_call_follows_from_the_role(least: Role | None) -> None:
     """What nobody may is for no observer either."""
     told: Any = Told()
-    made = Backend(told, lambda _: least, told, told, told, told, told, told)
+    made = Backend(told, lambda _: least, told, told, told, told, told, told, told)
     allowed = [role for role in Role if made.may(user(role=role), ua.NodeId("conveyor/fu1", 2))]
     assert allowed == [role for role in Role if role >= (Role.OPERATOR if least is None else least)]
 
@@ -87,15 +93,17 @@ def test_a_user_is_the_same_over_any_session_and_nobody_is_none() -> None:
 async def test_the_view_is_told_by_the_identity() -> None:
     told = Told()
     made, who = backend(told), user()
-    await made.write(who, [])
+    await made.write(who, [], lambda place, why: None)
     call = ua.CallMethodRequest()
-    assert await made.call(who, [call]) == [call]
+    assert await made.call(who, [call], lambda place, why: None) == [call]
+    await made.refresh(who, [])
     made.on_connection(who, is_there=True, has_others=False)
     made.on_refused()
     made.on_broken()
     assert told.calls == [
         (who.identity, []),
         (who.identity, [call]),
+        (who.identity, []),
         (who.identity, True, False),
         ("opcua_refused_connections",),
         ("opcua_broken_connections",),

@@ -41,6 +41,10 @@ class Events:
     async def send_waiting(self) -> None: ...
 
 
+class Level:
+    async def look(self) -> None: ...
+
+
 class Past:
     def record(self, places: list[int]) -> None: ...
 
@@ -76,9 +80,10 @@ async def test_many_that_watch_one_point_are_told_in_turns_and_of_the_newest_val
     image: Any = Image()
     events: Any = Events()
     past: Any = Past()
+    level: Any = Level()
     running = [
         asyncio.create_task(count_turns()),
-        asyncio.create_task(Publisher(image, {0: {-1: variable}}, events, past).run()),
+        asyncio.create_task(Publisher(image, {0: {-1: variable}}, events, past, level).run()),
     ]
     await until(lambda: len(told) >= WATCHERS - 1, "the last one to be told")
     for task in running:

@@ -11,6 +11,9 @@ from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 from bridge.command.messages.request import Code, Identity, Outcome, Role, Source
 from bridge.northbound.opcua.methods import Caller
 from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
+from bridge.text import Text
+from bridge.uaserver.explanations import Explanation
+from bridge.uaserver.languages import speaking
 from tests.support.opcua_site import make_plant
 
 Codes, Kind = ua.StatusCodes, ua.VariantType
@@ -55,13 +58,14 @@ class Rig:
             space[ua.NodeId(name.rpartition("/")[0], 2)].references.append(component)
         self.space = space
         view: Any = self.view
+        self.explained: dict[int, Explanation] = {}
         self.caller = Caller(view, space, lambda where: known.get(str(where.Identifier)))
 
     async def call(
         self, method: str, *arguments: ua.Variant, owner: str = DRIVE, namespace: int = 2
     ) -> ua.CallMethodResult:
         call = ua.CallMethodRequest(ua.NodeId(owner, 2), ua.NodeId(method, namespace), list(arguments))
-        (result,) = await self.caller.call(EVA, [call])
+        (result,) = await self.caller.call(EVA, [call], self.explained.__setitem__)
         return result
 
 
@@ -121,3 +125,17 @@ async def test_a_parameter_that_was_read_is_the_result(rig: Rig) -> None:
     result = await rig.call(f"{DRIVE}/ReadParameter", ua.Variant("P102"))
     (found,) = result.OutputArguments
     assert (found.Value, found.VariantType) == (2.5, Kind.Double)
+
+
+async def test_what_came_of_a_call_is_its_result_in_words(rig: Rig) -> None:
+    for outcome, words in (
+        (Outcome(Code.OK), "ausgeführt"),
+        (Outcome(Code.OK, forwarded=False), "angenommen, aber nicht an den Antrieb gesendet"),
+    ):
+        rig.view.outcome = outcome
+        (found,) = (await rig.call(f"{DRIVE}/Stop")).OutputArguments
+        with speaking(["de"]):
+            assert (found.Value.Text, found.VariantType) == (words, Kind.LocalizedText)
+    rig.view.outcome = Outcome(Code.NOT_ALLOWED, Text.of("opcua.ends"))
+    assert (await rig.call(f"{DRIVE}/Stop")).OutputArguments == []
+    assert rig.explained[0].symbol == "opcua.ends"

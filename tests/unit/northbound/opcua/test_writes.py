@@ -12,6 +12,7 @@ from bridge.command.messages.request import Code, Identity, Outcome, Role, Sourc
 from bridge.northbound.opcua.nodes import ObjectNode, VariableNode, layout
 from bridge.northbound.opcua.writes import Writer
 from bridge.uaserver.arrivals import received_at
+from bridge.uaserver.explanations import Explanation
 from tests.support.opcua_site import make_plant
 
 Codes, Kind, Ids = ua.StatusCodes, ua.VariantType, ua.AttributeIds
@@ -52,10 +53,11 @@ class Rig:
             node.attributes = {Ids.Value: None, Ids.DisplayName: None}
             space[node.nodeid] = node
         view: Any = self.view
+        self.explained: dict[int, Explanation] = {}
         self.writer = Writer(view, space, lambda where: KNOWN.get(str(where.Identifier)))
 
     async def write(self, *writes: ua.WriteValue) -> list[int]:
-        return [one.value for one in await self.writer.write(EVA, writes)]
+        return [one.value for one in await self.writer.write(EVA, writes, self.explained.__setitem__)]
 
 
 @pytest.fixture
@@ -140,3 +142,14 @@ async def test_the_same_bit_twice_is_two_telegrams(rig: Rig) -> None:
 async def test_a_bit_is_true_or_false(rig: Rig, value: object) -> None:
     assert await rig.write(bit("ready_for_operation", value)) == [Codes.BadTypeMismatch]
     assert not rig.view.requests
+
+
+async def test_what_the_plant_refuses_is_explained_at_each_of_its_places(rig: Rig) -> None:
+    rig.explained.clear()
+
+    def word(where: str) -> ua.WriteValue:
+        value = ua.DataValue(ua.Variant(0, Kind.UInt16))
+        return ua.WriteValue(NodeId=ua.NodeId(where, 2), AttributeId=Ids.Value, Value=value)
+
+    await rig.write(word(OTHER), word(WORD))
+    assert {place: one.symbol for place, one in rig.explained.items()} == {0: Code.NOT_ALLOWED.value}

@@ -1,0 +1,78 @@
+"""Methods of the Server object that the server carries out itself (OPC 10000-5 §9.1 and §9.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+from bridge.uaserver.library import (
+    ObjectIds,
+    ServiceError,
+    StatusCodes,
+    get,
+    make,
+    node_id,
+    status,
+    ua,
+    variant,
+)
+from bridge.uaserver.subscription import Subscription, SubscriptionOwner
+from bridge.uaserver.subscriptions import Subscriptions
+
+_SERVER: Final = node_id(ObjectIds.Server)
+_HANDLE: Final = ua.VariantType.UInt32
+
+
+def _monitored_items(found: Subscription) -> list[ua.Variant]:
+    """Numbers of the items, and what the client calls them."""
+    items = found.items.values()
+    return [
+        variant([one.number for one in items], _HANDLE),
+        variant([one.settings.client_handle for one in items], _HANDLE),
+    ]
+
+
+def _resend_data(found: Subscription) -> list[ua.Variant]:
+    found.repeat_values()
+    return []
+
+
+_METHODS: Final[Mapping[ua.NodeId, Callable[[Subscription], list[ua.Variant]]]] = {
+    node_id(ObjectIds.Server_GetMonitoredItems): _monitored_items,
+    node_id(ObjectIds.Server_ResendData): _resend_data,
+}
+"""Methods by their NodeIds; each takes the number of a subscription."""
+
+
+def is_of_server(call: ua.CallMethodRequest) -> bool:
+    return get(call, "MethodId") in _METHODS
+
+
+def call_server(
+    subscriptions: Subscriptions, owner: SubscriptionOwner, call: ua.CallMethodRequest
+) -> ua.CallMethodResult:
+    """Result of a call for which ``is_of_server`` is true."""
+    given: Sequence[ua.Variant] = get(call, "InputArguments") or []
+    if get(call, "ObjectId") != _SERVER:
+        return _failed(StatusCodes.BadMethodInvalid)
+    if len(given) != 1:
+        return _failed(StatusCodes.BadTooManyArguments if given else StatusCodes.BadArgumentsMissing)
+    if given[0].VariantType != _HANDLE or given[0].is_array:
+        return _failed(StatusCodes.BadInvalidArgument, StatusCodes.BadTypeMismatch)
+    try:
+        found = subscriptions.own(owner, given[0].Value)
+    except ServiceError as error:
+        return _failed(_code_of(subscriptions, given[0].Value, error))
+    results = _METHODS[get(call, "MethodId")](found)
+    good = [status(StatusCodes.Good)]
+    return make(ua.CallMethodResult, InputArgumentResults=good, OutputArguments=results)
+
+
+def _code_of(subscriptions: Subscriptions, number: int, error: ServiceError) -> int:
+    """Status code for a subscription that is not the caller's (§9.1)."""
+    return StatusCodes.BadUserAccessDenied if number in subscriptions.subscriptions else int(error.code)
+
+
+def _failed(code: int, *arguments: int) -> ua.CallMethodResult:
+    faults = [status(one) for one in arguments]
+    return make(ua.CallMethodResult, StatusCode=status(code), InputArgumentResults=faults)

@@ -49,7 +49,7 @@ from bridge.uaserver.library import (
 )
 from bridge.uaserver.quotas import make_room_for_session
 from bridge.uaserver.routes import ROUTES, Route, ServiceRequest
-from bridge.uaserver.security import SecureChannel
+from bridge.uaserver.security import SecureChannel, check_policy
 from bridge.uaserver.services import REFUSED, request_type
 from bridge.uaserver.session import InnerServer, Session
 from bridge.uaserver.states import REFUSALS, Need, RequestSession, need_of
@@ -388,6 +388,7 @@ class Processor(UaProcessor):
     async def _login(self, session: Session, token: Any) -> UserIdentity:
         """Raises ServiceError, also for another user than that of a session which comes from another channel
         (Part 4 §5.6.3): whoever has its token and its certificate is not yet its user."""
+        check_policy(token, self._server.endpoints)
         key, nonce = self._server.private_key, session.nonce or b""
         login = LoginAttempt(token, nonce, key, session.address, session.label, encrypted=self._is_secured())
         who: UserIdentity = await self._server.application.identify(login)

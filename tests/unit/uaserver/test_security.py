@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import pytest
 from asyncua import ua
 from asyncua.common.utils import ServiceError
 from asyncua.crypto.security_policies import SecurityPolicyAes256Sha256RsaPss, encrypt_asymmetric
 
 from bridge.northbound.opcua.certificates import OwnCertificate, new_own
-from bridge.uaserver.security import read_password
+from bridge.uaserver.security import check_policy, read_password
 
 URI = "urn:test:drivebridge"
 Policy = ua.SecurityPolicyType
@@ -65,3 +67,21 @@ class TestReadPassword:
         token = self.token(b"\x07" * size, "http://www.w3.org/2001/04/xmlenc#rsa-oaep")
         with pytest.raises(ServiceError):
             read_password(token, self.NONCE, own.private_key, encrypted=True)
+
+
+class TestPolicyOfAToken:
+    POLICY = ua.UserTokenPolicy(PolicyId="anonymous", TokenType=ua.UserTokenType.Anonymous)
+    ENDPOINTS: ClassVar = [ua.EndpointDescription(UserIdentityTokens=[POLICY])]
+
+    @pytest.mark.parametrize("name", ["anonymous", None, ""])
+    def test_one_that_an_endpoint_has_is_taken_and_so_is_none(self, name: str | None) -> None:
+        check_policy(ua.AnonymousIdentityToken(PolicyId=name), self.ENDPOINTS)
+        check_policy(ua.ExtensionObject(), self.ENDPOINTS)
+
+    def test_another_is_refused(self) -> None:
+        with pytest.raises(ServiceError) as refused:
+            check_policy(ua.AnonymousIdentityToken(PolicyId="nothing"), self.ENDPOINTS)
+        assert refused.value.code == ua.StatusCodes.BadIdentityTokenInvalid
+
+    def test_what_is_not_offered_at_all_is_left_to_who_knows_the_users(self) -> None:
+        check_policy(ua.UserNameIdentityToken(PolicyId="username"), self.ENDPOINTS)

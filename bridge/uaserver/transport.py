@@ -251,7 +251,13 @@ class Processor(UaProcessor):
 
     async def _process_message(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> Any:
         need = need_of(typeid)
-        self._check(typeid, need, requesthdr)
+        try:
+            self._check(typeid, need, requesthdr)
+        except ServiceError as error:
+            # Part 4 §5.7.3.1: who uses a session before it is activated has none any more.
+            if error.code == StatusCodes.BadSessionNotActivated and isinstance(self.session, Session):
+                await self.session.close_session()
+            raise
         self._begin()
         if need is Need.CREATE:
             params = struct_from_binary(ua.CreateSessionParameters, body.copy())

@@ -6,7 +6,7 @@
 # JOBS=n      how many tests run at a time; 0 in this process, as a debugger wants  (default: CPUs)
 # FUZZ=s      how long make fuzz takes for each protocol, in seconds  (default: 600)
 # PROTOCOL=.. the one that make fuzz throws at: opcua, modbus, zenoh or can  (default: all)
-# SEED=n      a number that make fuzz or make plant has printed, to do the same again
+# SEED=n      a number that make fuzz, make plant or make compare has printed, to do the same again
 # KNOWN=...   a regular expression: faults that make fuzz lets pass, to find others
 # REPLAY=...  a file that make fuzz has kept: throw what it has; REDUCE=1 finds the few cases that do it
 # ARGS=...    further arguments, e.g. make unit ARGS='-k watchdog -x'
@@ -181,6 +181,11 @@ fuzz-guided: compiled $(VENV)/guided.stamp ## fuzz every codec and parser, guide
 fuzz-deep: compiled $(VENV)/guided.stamp ## the same for hours, and what covers something new is kept (DEEP_S=s for each)
 	@$(IN) -m tests.fuzz.guided $(PARSERS) --seconds $(DEEP_S) --keep $(ARGS)
 
+CASES ?= 2000
+
+compare: compiled packages clients ## ask our OPC UA server, open62541 and node-opcua the same (SEED=n, CASES=2000, an hour)
+	@$(IN) -m tests.compare --cases $(CASES) $(SEED:%=--seed %) $(ARGS)
+
 bench: compiled packages ## measure everything in half an hour, write docs/explanation/performance.md (ARGS='--rounds 1')
 	@$(ON_VCAN) $(IN) -m tests.bench $(if $(filter 0,$(LAB)),--no-lab) --json build/bench.json --plots docs/images docs/explanation/performance.md $(ARGS)
 
@@ -277,5 +282,5 @@ help: ## this list
 	@awk -F ':.*## ' '/^##@/ { printf "\n%s\n", substr($$0, 5) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 	@echo; sed -n 's/^# \([A-Z]*=\)/  \1/p' Makefile
 
-.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short fuzz-guided fuzz-deep plant plant-short plant-long plant-mutants bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
+.PHONY: demo test landing nightly unit foreign wire pages browser lab packages clients compiled fuzz fuzz-short fuzz-guided fuzz-deep plant plant-short plant-long plant-mutants compare bench proof proof-mutants mutants check check-style check-format check-types check-scripts house \
   check-imports format docs setup lock wheel clean help

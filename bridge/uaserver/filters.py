@@ -42,10 +42,29 @@ class ChangeFilter:
         after = now.Value.Value if now.Value else None
         if self.deadband is not None and _is_finite(before) and _is_finite(after):
             return abs(after - before) > self.deadband
+        if self.deadband is not None and _is_array(before) and _is_array(after):
+            return _is_beyond(self.deadband, before, after)
         stamped = self.trigger == ua.DataChangeTrigger.StatusValueTimestamp
         if stamped and self.deadband is None and last.SourceTimestamp != now.SourceTimestamp:
             return True
         return last.Value != now.Value and not (_is_nan(before) and _is_nan(after))
+
+
+def _is_beyond(deadband: float, before: list[object], after: list[object]) -> bool:
+    """Whether an element has changed by more; one alone is enough (Part 8 §7.2)."""
+    if len(before) != len(after):
+        return True
+    for old, new in zip(before, after, strict=True):
+        if _is_finite(old) and _is_finite(new):
+            if abs(new - old) > deadband:
+                return True
+        elif old != new and not (_is_nan(old) and _is_nan(new)):
+            return True
+    return False
+
+
+def _is_array(value: object) -> TypeGuard[list[object]]:
+    return isinstance(value, list)
 
 
 def _is_finite(value: object) -> TypeGuard[float]:
@@ -95,13 +114,9 @@ def _deadband(asked: DataChangeFilter, space: AddressSpace, node: NodeData) -> f
 
 
 def _is_number(space: AddressSpace, node: NodeData) -> bool:
-    """Whether the node holds a single number: arrays have no deadband here."""
+    """Whether the node holds a number or an array of them."""
     kind = space.read_attribute_value(node.nodeid, AttributeIds.DataType).Value
-    rank = space.read_attribute_value(node.nodeid, AttributeIds.ValueRank).Value
-    if kind is None or not isinstance(kind.Value, ua.NodeId):
-        return False
-    is_array = rank is not None and isinstance(rank.Value, int) and rank.Value >= 0
-    return not is_array and _NUMBER in supertypes(space, kind.Value)
+    return kind is not None and isinstance(kind.Value, ua.NodeId) and _NUMBER in supertypes(space, kind.Value)
 
 
 def _span(space: AddressSpace, node: NodeData) -> float | None:

@@ -102,6 +102,8 @@ class MonitoredItems:
             if get(target, "AttributeId") not in node.attributes:
                 raise ServiceError(StatusCodes.BadAttributeIdInvalid)
             if get(target, "AttributeId") == AttributeIds.EventNotifier:
+                if window(target, times).ranges:
+                    raise ServiceError(StatusCodes.BadIndexRangeNoData)
                 item = self._event_item(node, wanted, subscription)
             else:
                 item = self._value_item(node, wanted, times, subscription)

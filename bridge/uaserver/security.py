@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, NoReturn, Protocol
 
@@ -25,6 +26,11 @@ from bridge.uaserver.library import (
 _LONGEST_NAME: Final = 64
 _MOST_BLOCKS: Final = 8
 """The longest password that is read, encrypted, with room for the nonce."""
+_TOKEN_TYPES: Final[Mapping[type, ua.UserTokenType]] = {
+    ua.AnonymousIdentityToken: ua.UserTokenType.Anonymous,
+    ua.UserNameIdentityToken: ua.UserTokenType.UserName,
+    ua.X509IdentityToken: ua.UserTokenType.Certificate,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +197,17 @@ def read_user_certificate(token: object, signature: object, signed: bytes) -> x5
     except (InvalidSignature, ValueError):
         raise ServiceError(StatusCodes.BadUserSignatureInvalid) from None
     return certificate
+
+
+def check_policy(token: object, endpoints: Sequence[ua.EndpointDescription]) -> None:
+    """Raises ServiceError for an identity token that follows another policy than those of its type which the
+    endpoints have (Part 4 §7.40). One that names none is taken by its type."""
+    named: str | None = getattr(token, "PolicyId", None)
+    kind = _TOKEN_TYPES.get(type(token))
+    policies = [one for endpoint in endpoints for one in get(endpoint, "UserIdentityTokens")]
+    offered = [get(one, "PolicyId") for one in policies if get(one, "TokenType") == kind]
+    if named and offered and named not in offered:
+        raise ServiceError(StatusCodes.BadIdentityTokenInvalid)
 
 
 def _decrypt(content: bytes, key: RSAPrivateKey, digest: SHA1 | SHA256) -> bytes:

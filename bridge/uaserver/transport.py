@@ -49,7 +49,7 @@ from bridge.uaserver.library import (
 )
 from bridge.uaserver.quotas import make_room_for_session
 from bridge.uaserver.routes import ROUTES, Route, ServiceRequest
-from bridge.uaserver.security import SecureChannel
+from bridge.uaserver.security import SecureChannel, check_policy
 from bridge.uaserver.services import NAMES, REFUSED, request_type
 from bridge.uaserver.session import InnerServer, Session
 from bridge.uaserver.states import REFUSALS, Need, RequestSession, need_of
@@ -256,7 +256,13 @@ class Processor(UaProcessor):
 
     async def _process_message(self, typeid: ua.NodeId, requesthdr: Any, seqhdr: Any, body: Buffer) -> Any:
         need = need_of(typeid)
-        self._check(typeid, need, requesthdr)
+        try:
+            self._check(typeid, need, requesthdr)
+        except ServiceError as error:
+            # Part 4 §5.7.3.1: who uses a session before it is activated has none any more.
+            if error.code == StatusCodes.BadSessionNotActivated and isinstance(self.session, Session):
+                await self.session.close_session()
+            raise
         self._begin()
         if need is Need.CREATE:
             params = struct_from_binary(ua.CreateSessionParameters, body.copy())
@@ -409,9 +415,11 @@ class Processor(UaProcessor):
     async def _login(self, session: Session, params: Any) -> UserIdentity:
         """Raises ServiceError, also for another user than that of a session which comes from another channel
         (Part 4 §5.6.3): whoever has its token and its certificate is not yet its user."""
+        token = get(params, "UserIdentityToken")
+        check_policy(token, self._server.endpoints)
         own = session.shown if session.holder is self else self._server.shown
         login = LoginAttempt(
-            get(params, "UserIdentityToken"),
+            token,
             get(params, "UserTokenSignature"),
             session.nonce or b"",
             own.key,

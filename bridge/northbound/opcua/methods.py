@@ -96,7 +96,7 @@ class Caller:
         if place is not None and place < len(faults):
             faults[place] = outcome_status(outcome).value
             return call_result(StatusCodes.BadInvalidArgument, faults)
-        return call_result(outcome_status(outcome).value, faults, _results(method, outcome))
+        return call_result(outcome_status(outcome).value, results=_results(method, outcome))
 
     def _rejected(
         self, identity: Identity, call: ua.CallMethodRequest, code: int, faults: Sequence[int] = ()
@@ -110,9 +110,8 @@ class Caller:
         return call_result(code, faults)
 
     def _refusal(self, call: ua.CallMethodRequest, method_id: ua.NodeId) -> int | None:
-        node = self._space.get(method_id)
         owner = self._space.get(get(call, "ObjectId"))
-        if node is None or owner is None:
+        if owner is None:
             return StatusCodes.BadNodeIdUnknown
         method = self._method(method_id)
         if method is None:
@@ -159,6 +158,7 @@ def _argument(method: MethodNode, argument: Argument, given: ua.Variant) -> Valu
 def call_result(
     code: int, arguments: Sequence[int] = (), results: Sequence[ua.Variant] = ()
 ) -> ua.CallMethodResult:
+    """``arguments`` are told with BadInvalidArgument alone (Part 4 §5.12.2.2)."""
     return make(
         ua.CallMethodResult,
         StatusCode=status(code),

@@ -52,6 +52,19 @@ def test_a_change_is_reported_beyond_the_deadband_only() -> None:
     assert not reported(value(math.nan), value(math.nan), 0.5)
 
 
+def test_one_element_beyond_the_deadband_is_enough() -> None:
+    """Part 8 §7.2."""
+
+    def values(*numbers: float) -> ua.DataValue:
+        return ua.DataValue(ua.Variant(list(numbers), Kind.Double))
+
+    assert not reported(values(1.0, 2.0), values(1.5, 1.5), 0.5)
+    assert reported(values(1.0, 2.0), values(1.0, 2.6), 0.5)
+    assert reported(values(1.0, 2.0), values(1.0), 0.5)
+    assert reported(values(1.0), values(math.nan), 0.5)
+    assert not reported(values(math.nan, 1.0), values(math.nan, 1.2), 0.5)
+
+
 def test_who_asks_for_the_status_alone_gets_no_values() -> None:
     wanted = ChangeFilter(ua.DataChangeTrigger.Status)
     assert not wanted.reports(value(1.0), value(2.0))

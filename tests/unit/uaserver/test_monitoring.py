@@ -143,3 +143,13 @@ def test_an_operation_has_the_code_of_what_it_raised() -> None:
             raise ServiceError(number)
 
     assert [code_of(act, one).value for one in (0, Codes.BadTimeout)] == [Codes.Good, Codes.BadTimeout]
+
+
+@pytest.mark.parametrize(
+    ("index_range", "code"), [("x", Codes.BadIndexRangeInvalid), ("1:2", Codes.BadIndexRangeNoData)]
+)
+async def test_events_have_no_parts(rig: Rig, index_range: str, code: int) -> None:
+    asked = wanted(EVENTS, Ids.EventNotifier)
+    asked.ItemToMonitor.IndexRange = index_range
+    (made,) = await rig.create(asked)
+    assert made.StatusCode.value == code

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import pytest
 from asyncua import ua
 from asyncua.common.utils import ServiceError
@@ -11,7 +13,7 @@ from cryptography.hazmat.primitives.asymmetric.padding import MGF1, PSS, PKCS1v1
 from cryptography.hazmat.primitives.hashes import SHA256
 
 from bridge.northbound.opcua.certificates import OwnCertificate, new_own
-from bridge.uaserver.security import read_password, read_user_certificate
+from bridge.uaserver.security import check_policy, read_password, read_user_certificate
 from tests.support.certificates import CLIENT, make, rsa_key
 
 URI = "urn:test:drivebridge"
@@ -114,3 +116,21 @@ class TestReadUserCertificate:
         with pytest.raises(ServiceError) as refused:
             read_user_certificate(self.token(make().der), signature, self.SIGNED)
         assert refused.value.code == ua.StatusCodes.BadUserSignatureInvalid
+
+
+class TestPolicyOfAToken:
+    POLICY = ua.UserTokenPolicy(PolicyId="anonymous", TokenType=ua.UserTokenType.Anonymous)
+    ENDPOINTS: ClassVar = [ua.EndpointDescription(UserIdentityTokens=[POLICY])]
+
+    @pytest.mark.parametrize("name", ["anonymous", None, ""])
+    def test_one_that_an_endpoint_has_is_taken_and_so_is_none(self, name: str | None) -> None:
+        check_policy(ua.AnonymousIdentityToken(PolicyId=name), self.ENDPOINTS)
+        check_policy(ua.ExtensionObject(), self.ENDPOINTS)
+
+    def test_another_is_refused(self) -> None:
+        with pytest.raises(ServiceError) as refused:
+            check_policy(ua.AnonymousIdentityToken(PolicyId="nothing"), self.ENDPOINTS)
+        assert refused.value.code == ua.StatusCodes.BadIdentityTokenInvalid
+
+    def test_what_is_not_offered_at_all_is_left_to_who_knows_the_users(self) -> None:
+        check_policy(ua.UserNameIdentityToken(PolicyId="username"), self.ENDPOINTS)

@@ -112,7 +112,7 @@ class TestMethods:
 
     async def test_a_method_belongs_to_its_object(self, client: Client, view: LocalView) -> None:
         assert await call(client, "conveyor/fu1", "conveyor/fu2/Stop", []) == Codes.BadMethodInvalid
-        assert await call(client, "conveyor/fu1", "conveyor/fu1/Fly", []) == Codes.BadNodeIdUnknown
+        assert await call(client, "conveyor/fu1", "conveyor/fu1/Fly", []) == Codes.BadMethodInvalid
         assert view.requests == []
         told = [(one.target, one.action, one.code) for one in view.rejections]
         assert told == [("conveyor/fu2", "stop", "unknown_point"), ("conveyor/fu1", "call", "unknown_point")]

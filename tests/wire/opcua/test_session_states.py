@@ -154,6 +154,18 @@ async def test_an_expired_session_is_one_that_is_not_there(
         assert await one.code("Read") == Codes.BadNothingToDo
 
 
+async def test_a_session_that_is_used_before_it_is_activated_ends(server: OpcUaServer) -> None:
+    """Part 4 §5.7.3.1. What needs no session does not end it."""
+    async with channel(server) as one:
+        await one.create()
+        assert await one.code("FindServers") == Codes.Good
+        assert await one.code("Read") == Codes.BadSessionNotActivated
+        with pytest.raises(Errors.BadSessionIdInvalid):
+            await one.activate()
+        await one.create()
+        await one.activate()
+
+
 async def test_a_session_is_activated_first_where_it_was_created(server: OpcUaServer) -> None:
     """Part 4 §5.6.3."""
     async with channel(server) as one, channel(server) as other:

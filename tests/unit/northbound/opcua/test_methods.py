@@ -93,7 +93,7 @@ async def test_a_call_is_a_request_and_its_result_the_outcome(rig: Rig) -> None:
 @pytest.mark.parametrize(
     ("method", "arguments", "code"),
     [
-        (f"{DRIVE}/Nothing", [], Codes.BadNodeIdUnknown),
+        (f"{DRIVE}/Nothing", [], Codes.BadMethodInvalid),
         (DRIVE, [], Codes.BadMethodInvalid),
         ("conveyor/Reset", [], Codes.BadMethodInvalid),  # of the node, not of the drive
         (f"{DRIVE}/Start", [], Codes.BadArgumentsMissing),
@@ -110,6 +110,19 @@ async def test_what_is_no_call_is_refused_and_reported(
     assert result.StatusCode.value == code
     assert rig.view.requests == []
     assert len(rig.view.rejections) == (not method.endswith("ReadParameter"))
+
+
+async def test_only_an_object_is_told_to_be_unknown(rig: Rig) -> None:
+    """Part 4 §5.12.2.4: BadNodeIdUnknown is of the object, BadMethodInvalid of the method."""
+    for owner, code in (("nowhere", Codes.BadNodeIdUnknown), (DRIVE, Codes.BadMethodInvalid)):
+        assert (await rig.call(f"{DRIVE}/Nothing", owner=owner)).StatusCode.value == code
+
+
+async def test_a_call_that_is_carried_out_tells_nothing_of_its_arguments(rig: Rig) -> None:
+    """Part 4 §5.12.2.2: the list is empty but for BadInvalidArgument."""
+    result = await rig.call(f"{DRIVE}/Start", ua.Variant(1, Kind.Int32))
+    assert result.StatusCode.value == Codes.Good
+    assert result.InputArgumentResults == []
 
 
 async def test_the_argument_that_an_outcome_is_about_is_named(rig: Rig) -> None:

@@ -89,7 +89,7 @@ def build(server: Any) -> None:
         return (o6.StatusCode.GOOD,)
 
     def done(_: Any, *inputs: Any) -> tuple[Any, ...]:
-        return (o6.StatusCode.GOOD,)
+        return o6.StatusCode.GOOD, o6.LocalizedText("done", "en")
 
     acts = {space.ADD.id: add, space.EMIT.id: emit}
     for one in space.METHODS:

@@ -20,6 +20,7 @@ from asyncua.server.address_space import NodeManagementService
 from bridge.northbound.opcua.backend import Backend
 from bridge.uaserver.application import ServedApplication
 from bridge.uaserver.eventfilter import Occurrence
+from bridge.uaserver.explanations import Explain
 from bridge.uaserver.library import make, text, variant
 from bridge.uaserver.session import InnerServer
 from tests.compare import space
@@ -42,18 +43,22 @@ class _Application(ServedApplication[Any]):
             return object.__getattribute__(self, name)
         return getattr(self._backend, name)
 
-    async def write(self, user: Any, writes: Sequence[ua.WriteValue]) -> list[ua.StatusCode]:
+    async def write(
+        self, user: Any, writes: Sequence[ua.WriteValue], explain: Explain
+    ) -> list[ua.StatusCode]:
         if not all(one.NodeId in _WRITABLE for one in writes):
-            return await self._backend.write(user, writes)
+            return await self._backend.write(user, writes, explain)
         for one in writes:
             now = datetime.now(UTC)
             value = ua.DataValue(one.Value.Value, SourceTimestamp=now, ServerTimestamp=now)
             await self._inner.aspace.write_attribute_value(one.NodeId, one.AttributeId, value)
         return [ua.StatusCode() for _ in writes]
 
-    async def call(self, user: Any, calls: Sequence[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
+    async def call(
+        self, user: Any, calls: Sequence[ua.CallMethodRequest], explain: Explain
+    ) -> list[ua.CallMethodResult]:
         if [one.MethodId for one in calls] != [_EMIT]:
-            return await self._backend.call(user, calls)
+            return await self._backend.call(user, calls, explain)
         self._emit(calls[0].InputArguments[0].Value)
         return [ua.CallMethodResult()]
 

@@ -76,6 +76,7 @@ READ_ONLY: Final = Variable("read_only", "area", "UInt16", 7, READ)
 WRITE_ONLY: Final = Variable("write_only", "area", "UInt16", 8, WRITE)
 LIMITED: Final = (READ_ONLY, WRITE_ONLY)
 _FU1: Final = "conveyor/fu1"
+_OUTCOME: Final = {"outcome": "LocalizedText"}
 POINTS: Final = (
     Variable(f"{_FU1}/command/setpoint_1", _FU1, "UInt16", 0, namespace=2),
     Variable(f"{_FU1}/command/frequency", _FU1, "Float", 0.0, namespace=2),
@@ -90,8 +91,8 @@ EMIT: Final = Method("machine/emit", "machine", {"severity": "UInt16"})
 METHODS: Final = (
     ADD,
     EMIT,
-    Method(f"{_FU1}/Stop", _FU1, namespace=2),
-    Method(f"{_FU1}/Start", _FU1, {"direction": "Int32"}, namespace=2),
+    Method(f"{_FU1}/Stop", _FU1, outputs=_OUTCOME, namespace=2),
+    Method(f"{_FU1}/Start", _FU1, {"direction": "Int32"}, _OUTCOME, namespace=2),
 )
 
 

@@ -83,6 +83,9 @@ for (const one of made.methods) {
         severity: { dataType: DataType.UInt16, value: inputs[0].value },
       });
     }
+    if (one.outputs.outcome) {
+      outputArguments.push({ dataType: DataType.LocalizedText, value: { locale: "en", text: "done" } });
+    }
     callback(null, { statusCode: StatusCodes.Good, outputArguments });
   });
 }

@@ -26,7 +26,7 @@ from tests.support.opcua_raw import ask
 from tests.support.opcua_site import OPEN, break_off, connected, serving
 
 OVERRIDDEN = {
-    "BoundServer": {"start"},
+    "BoundServer": {"start", "stop"},
     "SecureChannel": {"select_policy"},
     "TcpAcceptor": {"_make_protocol", "start", "stop"},
     "Processor": {
@@ -39,7 +39,7 @@ OVERRIDDEN = {
         "process_message",
         "send_response",
     },
-    "InnerServer": {"_mangle_endpoint_url", "create_session", "get_endpoints", "stop"},
+    "InnerServer": {"_mangle_endpoint_url", "create_session", "find_servers", "get_endpoints", "stop"},
     "Session": {"_timeout_loop", "activate_session", "close_session", "create_session"},
     "_UaProtocol": {"_process_one_msg", "connection_lost", "connection_made", "data_received"},
 }
@@ -47,6 +47,7 @@ OVERRIDDEN = {
 
 BY_OURSELVES = {
     "BoundServer.start",
+    "BoundServer.stop",
     "TcpAcceptor.start",
     "Processor._process_message",
     "InnerServer.stop",
@@ -72,8 +73,8 @@ SETTINGS = (
 
 def modules() -> Iterator[Any]:
     for package in (uaserver, opcua):
-        for found in pkgutil.iter_modules(package.__path__):
-            yield importlib.import_module(f"{package.__name__}.{found.name}")
+        for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            yield importlib.import_module(found.name)
 
 
 def ours() -> dict[str, type]:
@@ -111,7 +112,7 @@ def private_names() -> set[str]:
     """Names with an underscore that our modules use but nobody of us defines."""
     used: set[str] = set()
     defined: set[str] = set()
-    for path in (file for package in (uaserver, opcua) for file in Path(package.__path__[0]).glob("*.py")):
+    for path in (file for package in (uaserver, opcua) for file in Path(package.__path__[0]).rglob("*.py")):
         for part in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(part, ast.Attribute) and part.attr.startswith("_") and not part.attr.endswith("__"):
                 used.add(part.attr)
@@ -158,6 +159,7 @@ async def test_each_override_is_reached(tmp_path: Path, monkeypatch: pytest.Monk
     async with serving(OPEN, tmp_path) as (server, view):
         async with connected(server) as client:
             await walk(client)
+            await client.find_servers()
             view.plant.set("bus/can0/load", 12.5, 1.0)
             first = await client.create_subscription(50, Listens())
             await first.subscribe_data_change(await node(client, "bus/can0/load"))

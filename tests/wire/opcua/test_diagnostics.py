@@ -37,7 +37,9 @@ async def served(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Serv
         UserTable(name=name, role=role, password_hash=line)
         for name, role in (("anna", "operator"), ("emil", "engineer"))
     ]
-    settings = OpcUaTable(listen="127.0.0.1:0", no_security=True, anonymous="observer", user=users)
+    settings = OpcUaTable(
+        listen="127.0.0.1:0", no_security=True, anonymous="observer", user=users, trust="anybody"
+    )
     async with serving(settings, tmp_path_factory.mktemp("state")) as found:
         yield found
 

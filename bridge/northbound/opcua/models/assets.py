@@ -25,7 +25,7 @@ from bridge.uaserver.address_space import put_behind
 from bridge.uaserver.library import GOOD, ObjectIds, StatusCodes, data_value, status, ua, variant
 from bridge.uaserver.nodesets import Models, NodesetStore, Row, load_models
 
-_FILE: Final = Path(__file__).parent / "nodesets" / "models.json"
+_FILE: Final = Path(__file__).parents[1] / "nodesets" / "models.json"
 _KEPT: Final = 4
 """Drives whose rows are kept once made: clients look at one after the other."""
 

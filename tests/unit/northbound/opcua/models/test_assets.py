@@ -22,7 +22,7 @@ from bridge.uaserver.library import node_id
 from tests.support.opcua_held import standard_space
 
 Ids, Attribute = ua.ObjectIds, ua.AttributeIds
-DEMO = Path(__file__).parents[4] / "bridge/demo/site.toml"
+DEMO = Path(__file__).parents[5] / "bridge/demo/site.toml"
 OWN = 2
 DI_URI = "http://opcfoundation.org/UA/DI/"
 PARTS = (Ids.HasComponent, Ids.HasProperty, Ids.HasAddIn, Ids.HasOrderedComponent)

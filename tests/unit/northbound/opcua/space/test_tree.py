@@ -26,7 +26,7 @@ from tests.support.opcua_held import HeldTree, copy_of, standard_space
 from tests.support.opcua_site import make_plant
 
 NAMESPACE = 2
-DEMO = Path(__file__).parents[4] / "bridge/demo/site.toml"
+DEMO = Path(__file__).parents[5] / "bridge/demo/site.toml"
 VALUE = ua.AttributeIds.Value
 
 

@@ -39,8 +39,9 @@ SETTINGS = OPEN.model_copy(
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def view(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[LocalView]:
-    async with serving(SETTINGS, tmp_path_factory.mktemp("state")) as (server, view):
-        view.server = server
+    folder = tmp_path_factory.mktemp("state")
+    async with serving(SETTINGS, folder) as (server, view):
+        view.server, view.folder = server, folder
         yield view
 
 
@@ -234,6 +235,7 @@ async def test_a_bus_that_was_cut_is_in_the_history_after_a_restart(tmp_path: Pa
         happen(view, cut())
         async with connected(server) as client:
             (before,) = await until(lambda: events(client.nodes.server), "the event")
+    assert (tmp_path / "opcua" / "events.jsonl").exists()
     async with serving(SETTINGS, tmp_path) as (server, view):
         german = Client(server.endpoint_url, timeout=10)
         german.set_locale(["de-AT", "en"])
@@ -280,13 +282,13 @@ async def test_without_hours_no_events_are_kept(tmp_path: Path) -> None:
             await events(client.nodes.server)
         notifies = await client.nodes.server.read_attribute(Attribute.EventNotifier)
         assert notifies.Value.Value == 1
-    assert not (tmp_path / "opcua" / "events.jsonl").exists()
+    assert not list(tmp_path.rglob("events.jsonl"))
 
 
 # black box
 
 
-async def test_a_trip_is_a_file_that_clients_and_spreadsheets_read(client: Client, view: LocalView) -> None:
+async def test_a_trip_is_a_file_that_clients_and_spreadsheets_read(client: Client, view: Any) -> None:
     file = await node(client, "conveyor/fu2/BlackBox/1")
     size = await file.get_child("Size")
     assert await size.read_value() == 0
@@ -301,6 +303,8 @@ async def test_a_trip_is_a_file_that_clients_and_spreadsheets_read(client: Clien
     async with UaFile(file, "r") as opened:
         content = await opened.read()
     assert len(content) == length
+    (written,) = (view.folder / "opcua" / "black_box" / "conveyor" / "fu2").iterdir()
+    assert content == written.read_bytes()
     rows = list(csv.DictReader(content.decode("utf-8-sig").splitlines()))
     told = dict.fromkeys(row["conveyor/fu2/actual/current [A]"] for row in rows)
     assert [one for one in told if one in ("1.5", "9.5")] == ["1.5", "9.5"]

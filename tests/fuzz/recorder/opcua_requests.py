@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 
 from asyncua import ua
 
-from bridge.northbound.opcua.trust_list_files import TrustLists, encoded
+from bridge.northbound.opcua.certificates.trust_list_files import TrustListContents, encoded
 from bridge.trust.files import thumbprint
 from tests.fuzz.rig import APPLICATION_URI
 from tests.fuzz.targets.opcua_channel import ALARM, EVENT, FILE, HANDLE, ITEM, OTHER_HANDLE, SUBSCRIPTION
@@ -303,7 +303,7 @@ def _identities() -> Iterator[Request]:
 def _push() -> Iterator[Request]:
     """What an authority does to certificate and trust."""
     revoked = crl_of(_ROOT, ends=_END)
-    lists = TrustLists((_MADE.certificate,), (), (_ROOT.certificate,), (revoked,))
+    lists = TrustListContents((_MADE.certificate,), (), (_ROOT.certificate,), (revoked,))
     group, kind = (ua.NodeId(), Type.NodeId), (ua.NodeId(), Type.NodeId)
     handle, other = (number(HANDLE), Type.UInt32), (number(OTHER_HANDLE), Type.UInt32)
     yes = (True, Type.Boolean)

@@ -21,6 +21,8 @@ from tests.support.opcua_filters import at, chosen, element
 
 Ids, Type, Op = ua.ObjectIds, ua.VariantType, ua.FilterOperator
 _FU4: Final = "conveyor/fu4"
+_SPARE: Final = "spare/fu1"
+"""Its parameters can be read; fu4 has no channel of its own for them."""
 _BEGIN: Final = datetime(2026, 1, 1, tzinfo=UTC)
 _END: Final = datetime(2099, 1, 1, tzinfo=UTC)
 _ROOT: Final = make(AUTHORITY.but(begins=_BEGIN, ends=_END))
@@ -75,10 +77,10 @@ def _call(where: ua.NodeId, method: ua.NodeId, *given: tuple[object, ua.VariantT
 
 
 def _reads(space: int) -> Iterator[Request]:
-    parameters = [_value(ua.NodeId(f"{_FU4}/parameter/{name}", space)) for name in ("p102", "p105")]
+    parameters = [_value(ua.NodeId(f"{_SPARE}/parameter/{name}", space)) for name in ("p102", "p105")]
     yield Request("Read from the drive", _ask("Read", MaxAge=0.0, NodesToRead=parameters))
-    method = ua.NodeId(f"{_FU4}/ReadParameter", space)
-    refused = _call(ua.NodeId(_FU4, space), method, ("P999", Type.String))
+    method = ua.NodeId(f"{_SPARE}/ReadParameter", space)
+    refused = _call(ua.NodeId(_SPARE, space), method, ("P999", Type.String))
     refused.RequestHeader.ReturnDiagnostics = 0x3FF
     yield Request("Call, with diagnostics", refused)
     summary = "Server_ServerDiagnostics"
@@ -168,7 +170,7 @@ def _items(space: int) -> Iterator[Request]:
     ]
     yield Request("Items of bits and parts", _ask("CreateMonitoredItems", ItemsToCreate=words, **where))
     changed = ua.MonitoredItemModifyRequest(
-        number(ITEM), ua.MonitoringParameters(3, 100.0, Filter=deadband, QueueSize=2, DiscardOldest=False)
+        number(ITEM), ua.MonitoringParameters(3, 100.0, Filter=_filter(), QueueSize=2, DiscardOldest=False)
     )
     yield Request("An item is changed", _ask("ModifyMonitoredItems", ItemsToModify=[changed], **where))
     linked = {"SubscriptionId": number(SUBSCRIPTION), "TriggeringItemId": number(ITEM)}
@@ -276,10 +278,8 @@ def _assets(space: int) -> Iterator[Request]:
     everything.ResultMask = ua.BrowseResultMask.All
     browse = _ask("Browse", RequestedMaxReferencesPerNode=2, NodesToBrowse=[everything])
     yield Request("Browse of an asset", browse)
-    names = (ua.QualifiedName("DeviceHealth", 0), ua.QualifiedName("Identification", 0))
-    elements = [
-        ua.RelativePathElement(ua.NodeId(Ids.HierarchicalReferences), False, True, one) for one in names
-    ]
+    health = ua.QualifiedName("DeviceHealth", space + 1)
+    elements = [ua.RelativePathElement(ua.NodeId(Ids.HierarchicalReferences), False, True, health)]
     path = ua.BrowsePath(asset, ua.RelativePath(elements))
     yield Request("Path from an asset", _ask("TranslateBrowsePathsToNodeIds", BrowsePaths=[path]))
 

@@ -3,26 +3,21 @@ than the door."""
 
 from __future__ import annotations
 
-import contextlib
 from functools import cache
-from itertools import cycle
 from pathlib import Path
 from typing import Final
 
 from asyncua import ua
-from asyncua.crypto import uacrypto
 from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
 from tests.fuzz.rig import ADMIN, PASSWORD, Rig
-from tests.fuzz.targets.opcua_channel import HANDLE, OTHER_HANDLE, Channel, Closed
+from tests.fuzz.targets.opcua_channel import HANDLE, OTHER_HANDLE, Channel
 from tests.support.opcua_peers import Peer, make_peer
 
 _LIST: Final = "ServerConfiguration_CertificateGroups_DefaultApplicationGroup_TrustList"
 _READ, _WRITE = 1, 6
-_MARKERS: Final = cycle(((HANDLE, _READ), (OTHER_HANDLE, _WRITE)))
-"""A list that is written is in the way of what else is done to it: in every other session."""
 
 
 @cache
@@ -39,11 +34,13 @@ def _policy(own: Path) -> SecurityPolicyBasic256Sha256:
 
 
 class AdminChannel(Channel):
-    """The same as ``Channel``; ``send`` is not for it, whose chunks are encrypted."""
+    """The same as ``Channel``; ``send`` is not for it, whose chunks are encrypted. ``writes`` has it write a
+    trust list, which is in the way of all else that is done to that; else it reads one."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, *, writes: bool = False) -> None:
         policy = _policy(rig.folder / "state" / "certificates" / "own" / "own_certificate.der")
         super().__init__(rig.opcua, policy)
+        self._file = (OTHER_HANDLE, _WRITE) if writes else (HANDLE, _READ)
         self._ids = 1000
 
     def _describe(self, create: ua.CreateSessionParameters) -> None:
@@ -54,25 +51,14 @@ class AdminChannel(Channel):
     def _identify(self, made: ua.CreateSessionResult, activate: ua.ActivateSessionParameters) -> None:
         """The channel is encrypted, so that the password need not be."""
         activate.UserIdentityToken = ua.UserNameIdentityToken(UserName=ADMIN, Password=PASSWORD.encode())
-        signed = uacrypto.x509_from_der(made.ServerCertificate), made.ServerNonce
-        challenge = uacrypto.der_from_x509(signed[0]) + signed[1]
+        challenge = made.ServerCertificate + made.ServerNonce
         activate.ClientSignature.Algorithm = self._policy.AsymmetricSignatureURI
         activate.ClientSignature.Signature = self._policy.asymmetric_cryptography.signature(challenge)
 
     def _prepare(self) -> None:
         where, method = (ua.NodeId(getattr(ua.ObjectIds, name)) for name in (_LIST, f"{_LIST}_Open"))
-        marker, mode = next(_MARKERS)
+        marker, mode = self._file
         self._open_file(marker, where, method, mode)
-
-    def leave(self) -> None:
-        """The next session needs the list, which else waits a minute for this one."""
-        with contextlib.suppress(OSError, Closed, ua.UaError):
-            handle = self._known.get(OTHER_HANDLE)
-            if handle:
-                number = ua.Variant(int.from_bytes(handle, "little"), ua.VariantType.UInt32)
-                where, method = (ua.NodeId(getattr(ua.ObjectIds, name)) for name in (_LIST, f"{_LIST}_Close"))
-                self._call(where, method, number)
-        super().leave()
 
     def send_body(self, body: bytes) -> None:
         self._ids += 1

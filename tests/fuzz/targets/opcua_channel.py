@@ -250,6 +250,11 @@ class Channel:
         """Send a request, with what its markers stand for."""
         self.send(chunk(body))
 
+    def answered(self, body: bytes) -> bytes:
+        """Body of the answer to a request that asks for none of what the subscription has to tell."""
+        self.send_body(body)
+        return bytes(self._receive().body())
+
     def _with_known(self, raw: bytes) -> bytes:
         for marker, known in self._known.items():
             raw = raw.replace(marker, known)

@@ -37,6 +37,7 @@ class Thrower:
         self._named = {kind: _by_name(corpus, kind) for kind in ("service", "admin")}
         self._channel: Channel | None = None
         self._admin: AdminChannel | None = None
+        self._admins = 0
         self._thrown = 0
 
     def case(self) -> Case:
@@ -110,7 +111,8 @@ class Thrower:
 
     def _throw_as_admin(self, case: Case) -> None:
         if self._admin is None:
-            self._admin = AdminChannel(self._rig)
+            self._admins += 1
+            self._admin = AdminChannel(self._rig, writes=self._admins % 2 == 0)
             self._admin.hello()
             self._admin.open()
             self._admin.activate()

@@ -122,7 +122,7 @@ class TrustListFiles:
             del self._open[handle]
 
     def leave(self, owner: str) -> None:
-        """The session has ended, or its connection has: what it had open is closed, and nothing of it counts."""
+        """The session has ended, or its connection has: what it had open is closed, and does not count."""
         for handle in [number for number, one in self._open.items() if one.owner == owner]:
             del self._open[handle]
 

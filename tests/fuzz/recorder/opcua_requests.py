@@ -105,6 +105,8 @@ def _bit(space: int, name: str = "fault") -> ua.NodeId:
 
 
 def _writes(space: int) -> Iterator[Request]:
+    drive, take = ua.NodeId(_FU4, space), ua.NodeId(f"{_FU4}/TakeControl", space)
+    yield Request("TakeControl", _call(drive, take, (10_000, Type.UInt32)))
     bits = [
         ua.WriteValue(
             ua.NodeId(f"{_FU4}/command/control_word/{name}", space),

@@ -170,6 +170,13 @@ class TestTrustList:
         assert kept.trusts(own)
         assert (kept.issuers, len(kept.crls)) == ((ROOT.certificate,), 1)
 
+    async def test_whoever_breaks_off_is_in_nobodys_way(self, served: Served, scada: Peer) -> None:
+        async with logged_in(served, scada, "admin", PASSWORD) as client:
+            await good(client, f"{LIST}_Open", ua.Variant(6, Type.Byte))
+        async with logged_in(served, scada, "admin", PASSWORD) as client:
+            handle = handle_(await good(client, f"{LIST}_Open", ua.Variant(1, Type.Byte)))
+            await good(client, f"{LIST}_Close", handle)
+
 
 class TestRenewal:
     async def test_a_certificate_of_an_authority_is_used_and_no_session_ends(

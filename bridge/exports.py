@@ -19,7 +19,7 @@ from bridge.lint import family_dictionaries
 from bridge.lint.checked_bus import view_bus
 from bridge.northbound.modbus.registers import BRIDGE_UNITS, Row
 from bridge.northbound.modbus.units import device_maps, drive_maps, units_of
-from bridge.northbound.opcua.nodeset_export import nodeset_of
+from bridge.northbound.opcua.models.nodeset_export import nodeset_of
 from bridge.northbound.zenoh.keys import KeySpace
 from bridge.project import Project
 from bridge.text import Text

@@ -104,7 +104,7 @@ WAYS: Final = {
     ),
     "A TPDO into an OPC UA node": Way(
         _READ,
-        (*_TO_A_FRONT, Rest("northbound/opcua/data_values.py", "present_value", gives=True)),
+        (*_TO_A_FRONT, Rest("northbound/opcua/space/data_values.py", "present_value", gives=True)),
     ),
     "A TPDO to a zenoh key": Way(
         _READ,
@@ -144,7 +144,7 @@ _IN: Final = {
     "mirror/publisher.py": "takes what was marked",
     "mirror/protocol.py": "encodes it as MessagePack, and decodes it in the other process",
     "mirror/client.py": "stores it in the other process's image",
-    "northbound/opcua/data_values.py": "is the node's value: the reading as a DataValue",
+    "northbound/opcua/space/data_values.py": "is the node's value: the reading as a DataValue",
 }
 _OUT: Final = {
     "northbound/modbus/connection.py": "finds the request's frame in the stream",

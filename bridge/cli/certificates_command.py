@@ -14,10 +14,10 @@ from bridge.base.errors import OperationFailed
 from bridge.cli.bus_runner import AsJson, print_table
 from bridge.cli.terminal import printable
 from bridge.config import OpcUaTable, Site
-from bridge.northbound.opcua.certificates import reason
-from bridge.northbound.opcua.client_trust import client_store
-from bridge.northbound.opcua.own_files import CERTIFICATE, own_folder
-from bridge.northbound.opcua.server_identity import renew as renewed
+from bridge.northbound.opcua.certificates.client_trust import client_store
+from bridge.northbound.opcua.certificates.own_certificate import reason
+from bridge.northbound.opcua.certificates.own_files import CERTIFICATE, own_folder
+from bridge.northbound.opcua.certificates.server_identity import renew as renewed
 from bridge.project import load_project
 from bridge.text import Text, render
 from bridge.trust import TrustStore

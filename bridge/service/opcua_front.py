@@ -10,8 +10,8 @@ from pathlib import Path
 
 from bridge.catalogue import Catalogue
 from bridge.northbound.listening import ListeningSocket
-from bridge.northbound.opcua.alarm_server import AlarmSite
-from bridge.northbound.opcua.nameplates import nameplates_of
+from bridge.northbound.opcua.alarms.alarm_server import AlarmSite
+from bridge.northbound.opcua.models.nameplates import nameplates_of
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.trouble_words import PlantWords
 from bridge.northbound.view import View

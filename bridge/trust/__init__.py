@@ -2,14 +2,14 @@
 
 from bridge.trust.chain import MOST_IN_CHAIN, TrustLists
 from bridge.trust.judge import Purpose, judge
-from bridge.trust.store import Rejected, TrustStore
+from bridge.trust.store import RejectedCertificate, TrustStore
 from bridge.trust.verdict import CertificateFault, Verdict
 
 __all__ = [
     "MOST_IN_CHAIN",
     "CertificateFault",
     "Purpose",
-    "Rejected",
+    "RejectedCertificate",
     "TrustLists",
     "TrustStore",
     "Verdict",

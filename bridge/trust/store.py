@@ -58,7 +58,7 @@ _Mark = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Rejected:
+class RejectedCertificate:
     """Certificate that was refused, and those that came along, as the peer ``sent`` them."""
 
     file: Path
@@ -181,14 +181,14 @@ class TrustStore:
             del self._paces[next(iter(self._paces))]
         return pace.allows(now) and self._pace.allows(now)
 
-    def rejected_ones(self) -> list[Rejected]:
+    def rejected_ones(self) -> list[RejectedCertificate]:
         """Certificates that were refused, the latest first."""
-        found: list[Rejected] = []
+        found: list[RejectedCertificate] = []
         for _, path in sorted(self._rejected_files(), reverse=True)[:MOST_REJECTED]:
             with contextlib.suppress(OSError, *MALFORMED):
                 sent = certificates_in(read_limited(path))
                 if sent:
-                    found.append(Rejected(path, tuple(sent)))
+                    found.append(RejectedCertificate(path, tuple(sent)))
         return found
 
     def _rejected_files(self) -> Iterator[tuple[int, Path]]:
@@ -238,7 +238,7 @@ class TrustStore:
     def _put(self, folder: Path, certificate: x509.Certificate) -> Path:
         return _write(folder / f"{thumbprint(certificate)}{_SUFFIX}", der(certificate))
 
-    def find_rejected(self, prefix: str) -> Rejected:
+    def find_rejected(self, prefix: str) -> RejectedCertificate:
         """Certificate in ``rejected`` whose thumbprint begins so. Raises ``OperationFailed`` for none and for
         several."""
         found = [one for one in self.rejected_ones() if _matches(one.certificate, prefix)]

@@ -10,7 +10,7 @@ from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 
 from bridge.uaserver.arrivals import Arrivals
 from bridge.uaserver.explanations import Explain, Explanation
-from bridge.uaserver.history import EventHistory, ValueHistory
+from bridge.uaserver.history.history import EventHistory, ValueHistory
 from bridge.uaserver.library import ua
 
 

@@ -12,9 +12,9 @@ from cryptography import x509
 from cryptography.hazmat.primitives.asymmetric.rsa import RSAPrivateKey
 from cryptography.hazmat.primitives.serialization import Encoding
 
-from bridge.uaserver.acceptor import TcpAcceptor
+from bridge.uaserver.connections.acceptor import TcpAcceptor
+from bridge.uaserver.connections.security import CheckedPolicy, Trust
 from bridge.uaserver.library import change
-from bridge.uaserver.security import CheckedPolicy, Trust
 from bridge.uaserver.selfdescription import describe
 from bridge.uaserver.session import InnerServer
 

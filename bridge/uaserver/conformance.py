@@ -193,7 +193,7 @@ _ALL: Final = (
             ConformanceUnit("Monitor Items 2", _ROOM),
             ConformanceUnit(
                 "Monitor QueueSize_1",
-                f"{_UNIT}test_items.py::test_a_full_queue_loses_what_the_client_chose_and_says_so",
+                f"{_UNIT}subscriptions/test_items.py::test_a_full_queue_loses_what_the_client_chose_and_says_so",
             ),
             ConformanceUnit(
                 "Monitor Value Change",
@@ -207,7 +207,7 @@ _ALL: Final = (
             ConformanceUnit("Subscription Minimum 1", _ROOM),
             ConformanceUnit(
                 "Subscription Publish Discard Policy",
-                f"{_UNIT}test_publishing.py::"
+                f"{_UNIT}subscriptions/test_publishing.py::"
                 "test_what_is_too_old_or_too_many_or_of_a_lost_connection_is_not_used",
             ),
             ConformanceUnit("Subscription Publish Min 02", _HANDLES),
@@ -296,7 +296,7 @@ _ALL: Final = (
             ConformanceUnit("Monitor Items 500", _ROOM),
             ConformanceUnit(
                 "Monitor MinQueueSize_05",
-                f"{_UNIT}test_items.py::test_the_queue_size_is_revised_to_what_is_used",
+                f"{_UNIT}subscriptions/test_items.py::test_the_queue_size_is_revised_to_what_is_used",
             ),
             ConformanceUnit("Subscription Minimum 05", _ROOM),
             ConformanceUnit("Subscription Publish Min 10", _PUBLISHES),

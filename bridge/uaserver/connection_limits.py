@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.base.admission import ConnectionStage, Deadline, Limits
-from bridge.uaserver.quotas import MOST_SESSIONS, MOST_SESSIONS_OF_ADDRESS
+from bridge.uaserver.subscriptions.quotas import MOST_SESSIONS, MOST_SESSIONS_OF_ADDRESS
 
 _SPARE: Final = 1
 """Connections beside those with a session, for a client to come back to its session on (Part 4 §5.5.2)."""

@@ -25,7 +25,7 @@ from asyncua.common.utils import Buffer, NotEnoughData
 from asyncua.ua import ua_binary
 
 from bridge.uaserver.library import InvalidSignature, StatusCodes, UaError, UaStatusCodeError, ua
-from bridge.uaserver.turns import Turns
+from bridge.uaserver.loop import Stint
 
 MOST_ELEMENTS: Final = 30_000
 """Limit for the elements of all arrays in one message that are decoded one by one, while nobody else has a
@@ -89,7 +89,7 @@ def install() -> None:
 
 async def decoded(kind: type[Any], arrays: Sequence[str], data: Buffer) -> Any:
     """A structure, of which the elements of the ``arrays`` are decoded in turns."""
-    turns, fields_ = Turns(), dict[str, Any]()
+    stint, fields_ = Stint(), dict[str, Any]()
     for name, hint in _hints(kind).items():
         if name not in arrays:
             fields_[name] = _part(hint, kind, data)
@@ -98,7 +98,7 @@ async def decoded(kind: type[Any], arrays: Sequence[str], data: Buffer) -> Any:
         (element,) = get_args(hint)
         for _ in range(_length(data)):
             elements.append(_part(element, kind, data))
-            await turns.pause()
+            await stint.pause()
     return kind(**fields_)
 
 

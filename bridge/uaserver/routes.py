@@ -22,14 +22,15 @@ from bridge.uaserver.browsing import Browser
 from bridge.uaserver.decoding import decoded, first_length
 from bridge.uaserver.encoding import UNSENDABLE, Results
 from bridge.uaserver.explanations import Explain, Explanation, add_explanations
-from bridge.uaserver.historyread import MOST_NODES
+from bridge.uaserver.history.historyread import MOST_NODES
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
-from bridge.uaserver.monitoring import MonitoredItems, loop_time
-from bridge.uaserver.publishing import MOST_BYTES, PublishRequest
+from bridge.uaserver.loop import loop_time
 from bridge.uaserver.services import request_type
 from bridge.uaserver.session import Session
-from bridge.uaserver.subscription import Subscription
-from bridge.uaserver.subscriptions import Subscriptions
+from bridge.uaserver.subscriptions.monitoring import MonitoredItems
+from bridge.uaserver.subscriptions.publishing import MOST_BYTES, PublishRequest
+from bridge.uaserver.subscriptions.subscription import Subscription
+from bridge.uaserver.subscriptions.subscriptions import Subscriptions
 
 MOST_OPERATIONS: Final = 10_000
 MOST_CALLS: Final = 100

@@ -12,12 +12,12 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace, AttributeValue
 
-from bridge.uaserver import historyread
 from bridge.uaserver.address_space import is_empty
 from bridge.uaserver.browsing import MOST_CONTINUATION_POINTS
 from bridge.uaserver.conformance import claimed
-from bridge.uaserver.eventfilter import MOST_FIELDS
-from bridge.uaserver.items import LEAST_SAMPLING_MS, VALUE_QUEUE
+from bridge.uaserver.filters.eventfilter import MOST_FIELDS
+from bridge.uaserver.filters.where import MOST_OPERANDS
+from bridge.uaserver.history import historyread
 from bridge.uaserver.library import (
     AttributeIds,
     ObjectIds,
@@ -29,16 +29,16 @@ from bridge.uaserver.library import (
     ua,
     variant,
 )
-from bridge.uaserver.quotas import (
+from bridge.uaserver.routes import MOST_CALLS, MOST_WRITES
+from bridge.uaserver.serverstatus import HEALTHY, UNKNOWN_TIME
+from bridge.uaserver.subscriptions.items import LEAST_SAMPLING_MS, VALUE_QUEUE
+from bridge.uaserver.subscriptions.quotas import (
     MOST_ITEMS,
     MOST_ITEMS_OF_ADDRESS,
     MOST_OF_SESSION,
     MOST_SESSIONS,
     MOST_SUBSCRIPTIONS,
 )
-from bridge.uaserver.routes import MOST_CALLS, MOST_WRITES
-from bridge.uaserver.serverstatus import HEALTHY, UNKNOWN_TIME
-from bridge.uaserver.where import MOST_OPERANDS
 
 _Type = ua.VariantType
 _STATUS: Final = "Server_ServerStatus_"

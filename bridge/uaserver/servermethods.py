@@ -16,8 +16,8 @@ from bridge.uaserver.library import (
     ua,
     variant,
 )
-from bridge.uaserver.subscription import Subscription, SubscriptionOwner
-from bridge.uaserver.subscriptions import Subscriptions
+from bridge.uaserver.subscriptions.subscription import Subscription, SubscriptionOwner
+from bridge.uaserver.subscriptions.subscriptions import Subscriptions
 
 _SERVER: Final = node_id(ObjectIds.Server)
 _HANDLE: Final = ua.VariantType.UInt32

@@ -26,15 +26,15 @@ from bridge.base.sources import source_of
 from bridge.uaserver.application import NOBODY, ServedApplication, UserIdentity
 from bridge.uaserver.browsing import Browser
 from bridge.uaserver.client_notices import tell
-from bridge.uaserver.condition_calls import METHODS
-from bridge.uaserver.conditions import Conditions
+from bridge.uaserver.conditions.calls import METHODS
+from bridge.uaserver.conditions.conditions import Conditions
 from bridge.uaserver.connection_limits import MOST_CONNECTIONS
 from bridge.uaserver.counts import RequestCounts, ServerCounts
-from bridge.uaserver.diagnosticnodes import DiagnosticNodes
-from bridge.uaserver.diagnostics import SessionFacts
+from bridge.uaserver.diagnostics.diagnosticnodes import DiagnosticNodes
+from bridge.uaserver.diagnostics.diagnostics import SessionFacts
 from bridge.uaserver.encoding import Results
 from bridge.uaserver.explanations import Explain, Explanation
-from bridge.uaserver.historyread import HistoryReader
+from bridge.uaserver.history.historyread import HistoryReader
 from bridge.uaserver.library import (
     AttributeIds,
     ServiceError,
@@ -47,15 +47,15 @@ from bridge.uaserver.library import (
     ua,
     variant,
 )
-from bridge.uaserver.monitoring import loop_time
+from bridge.uaserver.loop import loop_time
 from bridge.uaserver.own_addresses import OwnAddresses
-from bridge.uaserver.publishing import PublishQueue
-from bridge.uaserver.quotas import make_room
 from bridge.uaserver.reading import checked_times, window
 from bridge.uaserver.servermethods import call_server, is_of_server
 from bridge.uaserver.serverstatus import ServerStatus
-from bridge.uaserver.subscription import Subscription
-from bridge.uaserver.subscriptions import Subscriptions
+from bridge.uaserver.subscriptions.publishing import PublishQueue
+from bridge.uaserver.subscriptions.quotas import make_room
+from bridge.uaserver.subscriptions.subscription import Subscription
+from bridge.uaserver.subscriptions.subscriptions import Subscriptions
 from bridge.uaserver.undertakings import Undertakings
 
 _LONGEST_SESSION_MS: Final = 120_000.0
@@ -77,7 +77,7 @@ _NOT_FOR_HIM: Final = data_value(_NOTHING, status(StatusCodes.BadUserAccessDenie
 _NOT_READABLE: Final = data_value(_NOTHING, status(StatusCodes.BadNotReadable))
 
 
-class Connection(Protocol):
+class SessionConnection(Protocol):
     """Connection that a session is activated on."""
 
     def end(self, code: int) -> None:
@@ -113,7 +113,7 @@ class Session(InternalSession):
         """Certificate of the server when the session came to its connection: a client encrypts for it."""
         self.publishing = PublishQueue()
         self.browser = Browser(aspace)
-        self.holder: Connection | None = None
+        self.holder: SessionConnection | None = None
         self.history = HistoryReader(aspace, server.subscriptions.items.event_types)
         """The processor of the connection that it is activated on."""
         self.answer: Results | None = None

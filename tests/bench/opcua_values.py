@@ -17,8 +17,8 @@ from asyncua import Server, ua
 
 from bridge.config import OpcUaTable
 from bridge.image import DataType, Image, Point
+from bridge.northbound.opcua.models.site_space import NAMESPACE
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.northbound.opcua.site_space import NAMESPACE
 from tests.support.opcua_site import LocalView, make_plant
 from tests.support.process import free_port
 

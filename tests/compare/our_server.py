@@ -19,8 +19,8 @@ from asyncua.server.address_space import NodeManagementService
 
 from bridge.northbound.opcua.backend import Backend
 from bridge.uaserver.application import ServedApplication
-from bridge.uaserver.eventfilter import Occurrence
 from bridge.uaserver.explanations import Explain
+from bridge.uaserver.filters.eventfilter import Occurrence
 from bridge.uaserver.library import make, text, variant
 from bridge.uaserver.session import InnerServer
 from tests.compare import space

@@ -7,14 +7,19 @@ from typing import Any, cast
 
 from asyncua import ua
 
-from bridge.uaserver.condition_fields import AlarmContent, ConditionPlace, ConditionWords, common_fields
-from bridge.uaserver.conditions import Condition, Conditions
-from bridge.uaserver.eventfilter import EventFilter
-from bridge.uaserver.items import EventItem, ItemSettings
+from bridge.uaserver.conditions.condition_fields import (
+    AlarmContent,
+    ConditionPlace,
+    ConditionWords,
+    common_fields,
+)
+from bridge.uaserver.conditions.conditions import Condition, Conditions
+from bridge.uaserver.filters.eventfilter import EventFilter
+from bridge.uaserver.filters.where import Where
 from bridge.uaserver.library import StatusCodes, text
-from bridge.uaserver.subscription import Subscription, Terms
-from bridge.uaserver.subscriptions import Subscriptions
-from bridge.uaserver.where import Where
+from bridge.uaserver.subscriptions.items import EventItem, ItemSettings
+from bridge.uaserver.subscriptions.subscription import Subscription, Terms
+from bridge.uaserver.subscriptions.subscriptions import Subscriptions
 from tests.support.opcua_sessions import Session, User
 
 Ids = ua.ObjectIds

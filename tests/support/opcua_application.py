@@ -11,7 +11,7 @@ from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.uaserver.application import LoginAttempt, ServedApplication
 from bridge.uaserver.explanations import Explain, Explanation
-from bridge.uaserver.history import EventHistory, ValueHistory
+from bridge.uaserver.history.history import EventHistory, ValueHistory
 from bridge.uaserver.library import ServiceError
 
 Ids = ua.AttributeIds

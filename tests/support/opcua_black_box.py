@@ -9,11 +9,11 @@ from asyncua import ua
 from asyncua.server.address_space import AttributeValue
 
 from bridge.image import DataType, Point, Quality
-from bridge.northbound.opcua.black_box import Column, Trip
-from bridge.northbound.opcua.black_box_files import BlackBoxFiles
-from bridge.northbound.opcua.file_transfer import FileTransfer
-from bridge.northbound.opcua.nodes import FileNode
-from bridge.northbound.opcua.value_rings import ValueRing
+from bridge.northbound.opcua.history.black_box import Column, Trip
+from bridge.northbound.opcua.history.black_box_files import BlackBoxFiles
+from bridge.northbound.opcua.history.file_transfer import FileTransfer
+from bridge.northbound.opcua.history.value_rings import ValueRing
+from bridge.northbound.opcua.space.nodes import FileNode
 
 Kind = ua.VariantType
 DRIVE = "conveyor/fu1"

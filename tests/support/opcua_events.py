@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from asyncua import ua
 
-from bridge.northbound.opcua.event_log import EventLog
-from bridge.northbound.opcua.event_records import EventCodec, EventRecord, Fields
-from bridge.northbound.opcua.notifiers import Notifiers
-from bridge.uaserver.history import date_time
+from bridge.northbound.opcua.events.event_file import EventLog
+from bridge.northbound.opcua.events.event_records import EventCodec, EventRecord, Fields
+from bridge.northbound.opcua.space.notifiers import Notifiers
+from bridge.uaserver.history.history import date_time
 from bridge.uaserver.languages import Spoken
 
 URIS = ("http://opcfoundation.org/UA/", "urn:host:drivebridge", "urn:drivebridge:points")

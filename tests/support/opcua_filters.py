@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 from asyncua import ua
 
-from bridge.uaserver.eventfilter import Occurrence
+from bridge.uaserver.filters.eventfilter import Occurrence
 
 Ids, Kind, Op = ua.ObjectIds, ua.VariantType, ua.FilterOperator
 SERVER = ua.NodeId(Ids.Server)

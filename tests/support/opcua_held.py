@@ -10,14 +10,14 @@ from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData,
 from asyncua.server.standard_address_space import standard_address_space
 from asyncua.ua.ua_binary import struct_to_binary
 
-from bridge.northbound.opcua.nodes import FileNode, MethodNode, ObjectNode, VariableKind, VariableNode
-from bridge.northbound.opcua.structures import (
+from bridge.northbound.opcua.space.nodes import FileNode, MethodNode, ObjectNode, VariableKind, VariableNode
+from bridge.northbound.opcua.space.structures import (
     point_attributes,
     property_attributes,
     property_nodes,
     value_type,
 )
-from bridge.northbound.opcua.words import named, spoken
+from bridge.northbound.opcua.space.words import named, spoken
 from bridge.text import Text, Words
 from bridge.uaserver.address_space import is_empty
 from bridge.uaserver.library import make, node_id, text

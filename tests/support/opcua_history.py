@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from asyncua import ua
 
-from bridge.uaserver.eventfilter import Occurrence
-from bridge.uaserver.history import Kept, date_time
+from bridge.uaserver.filters.eventfilter import Occurrence
+from bridge.uaserver.history.history import Kept, date_time
 
 Codes = ua.StatusCodes
 

@@ -9,7 +9,7 @@ from asyncua import ua
 from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import extensionobject_from_binary, extensionobject_to_binary
 
-from bridge.uaserver.publishing import PublishQueue
+from bridge.uaserver.subscriptions.publishing import PublishQueue
 
 
 @dataclass

@@ -14,7 +14,7 @@ from bridge.command import Identification, Outcome, Plant, PlantView, Rejection,
 from bridge.command.drive_link import NodeState
 from bridge.command.messages.request import DONE, NODE_ACTIONS, Code, Reply
 from bridge.config import OpcUaTable
-from bridge.northbound.opcua.nameplates import nameplates_of
+from bridge.northbound.opcua.models.nameplates import nameplates_of
 from bridge.northbound.opcua.server import OpcUaServer
 from tests.support import sites
 from tests.support.node_states import node_goes, run_timers

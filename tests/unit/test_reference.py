@@ -27,9 +27,9 @@ from bridge.northbound.modbus.dispatch import EXCEPTIONS
 from bridge.northbound.modbus.pdu import Function
 from bridge.northbound.modbus.registers import DriveMap, RegisterTable, Row
 from bridge.northbound.modbus.units import drive_maps, units_of
-from bridge.northbound.opcua.data_values import OUTCOME_STATUS, QUALITY_STATUS
-from bridge.northbound.opcua.event_types import type_name
-from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
+from bridge.northbound.opcua.events.event_types import type_name
+from bridge.northbound.opcua.space.data_values import OUTCOME_STATUS, QUALITY_STATUS
+from bridge.northbound.opcua.space.nodes import MethodNode, ObjectNode, layout
 from bridge.northbound.zenoh.commands import MALFORMED, METHODS, NODE_METHODS
 from bridge.project import load_project
 from bridge.uaserver.services import SERVICES

@@ -23,7 +23,7 @@ async def test_the_page_draws_the_ways_that_values_take(tmp_path: Path) -> None:
     } == {}
     assert [list(files)[-1] for files in found.values()] == [
         "northbound/modbus/connection.py",
-        "northbound/opcua/data_values.py",
+        "northbound/opcua/space/data_values.py",
         "zenohlink/publishers.py",
         "can/softbus.py",
     ]

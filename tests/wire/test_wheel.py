@@ -70,6 +70,6 @@ def test_nothing_of_the_tests_comes_along(installed: Path) -> None:
 def test_the_models_of_opc_ua_come_along_with_their_licence(installed: Path) -> None:
     folder = installed / "bridge" / "northbound" / "opcua" / "nodesets"
     assert "OPC Foundation MIT License" in (folder / "LICENSE-MIT.txt").read_text()
-    code = "from bridge.northbound.opcua.assets import read_models; print(len(read_models().models))"
+    code = "from bridge.northbound.opcua.models.assets import read_models; print(len(read_models().models))"
     done = call(installed, "-c", code)
     assert (done.stdout, done.stderr) == ("7\n", "")

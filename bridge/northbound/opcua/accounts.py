@@ -9,16 +9,16 @@ from bridge.base.sources import source_of
 from bridge.command.messages.request import Identity, Role, Source
 from bridge.config import OpcUaTable
 from bridge.northbound.logins import PasswordChecks
-from bridge.northbound.opcua.client_trust import utc_now
-from bridge.northbound.opcua.user_certificates import judge_user, user_certificates
+from bridge.northbound.opcua.certificates.client_trust import utc_now
+from bridge.northbound.opcua.certificates.user_certificates import judge_user, user_certificates
 from bridge.northbound.passwords import ANONYMOUS, check_users
 from bridge.trust import TrustLists
 from bridge.trust.chain import named
 from bridge.trust.files import der
 from bridge.uaserver.application import LoginAttempt
 from bridge.uaserver.client_notices import tell
+from bridge.uaserver.connections.security import read_password, read_user_certificate
 from bridge.uaserver.library import ObjectIds, ServiceError, StatusCodes, get, node_id, ua
-from bridge.uaserver.security import read_password, read_user_certificate
 
 _LONGEST_NAME: Final = 64
 _LONGEST_PASSWORD: Final = 1024

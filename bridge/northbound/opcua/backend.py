@@ -11,21 +11,21 @@ from bridge.base import clock
 from bridge.command.messages.freshness import Inflow
 from bridge.command.messages.request import Role
 from bridge.northbound.opcua.accounts import Accounts
-from bridge.northbound.opcua.alarm_rights import LEAST_ROLE
-from bridge.northbound.opcua.file_transfer import READING, FileTransfer, file_method
-from bridge.northbound.opcua.methods import Caller
-from bridge.northbound.opcua.permissions import ROLE_NODES
-from bridge.northbound.opcua.plant_history import PlantHistory
-from bridge.northbound.opcua.read_through import ReadThrough
-from bridge.northbound.opcua.server_configuration import ServerConfiguration
-from bridge.northbound.opcua.session_user import SessionUser
-from bridge.northbound.opcua.writes import Writer
+from bridge.northbound.opcua.alarms.alarm_rights import LEAST_ROLE
+from bridge.northbound.opcua.certificates.server_configuration import ServerConfiguration
+from bridge.northbound.opcua.history.file_transfer import READING, FileTransfer, file_method
+from bridge.northbound.opcua.history.plant_history import PlantHistory
+from bridge.northbound.opcua.requests.methods import Caller
+from bridge.northbound.opcua.requests.read_through import ReadThrough
+from bridge.northbound.opcua.requests.session_user import SessionUser
+from bridge.northbound.opcua.requests.writes import Writer
+from bridge.northbound.opcua.space.permissions import ROLE_NODES
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.uaserver.application import LoginAttempt, ServedApplication
-from bridge.uaserver.condition_calls import METHODS
+from bridge.uaserver.conditions.calls import METHODS
 from bridge.uaserver.explanations import Explain, Explanation
-from bridge.uaserver.history import EventHistory, ValueHistory
+from bridge.uaserver.history.history import EventHistory, ValueHistory
 from bridge.uaserver.library import get, node_id, ua
 
 

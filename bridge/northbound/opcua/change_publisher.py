@@ -10,9 +10,9 @@ from bridge.base import clock
 from bridge.base.guard import Guard
 from bridge.base.publishing_clock import next_publish
 from bridge.image import Image
-from bridge.northbound.opcua.events import EventSender
-from bridge.northbound.opcua.point_values import AllWatched, WatchedVariable
+from bridge.northbound.opcua.events.events import EventSender
 from bridge.northbound.opcua.service_level import ServiceLevel
+from bridge.northbound.opcua.space.point_values import AllWatched, WatchedVariable
 
 _TAKE: Final = 500
 _TURN_S: Final = 0.001

@@ -10,10 +10,10 @@ from pathlib import Path
 from bridge.base.errors import FileFaults
 from bridge.config import OpcUaTable
 from bridge.northbound.certificatefiles import check_validity, placed
-from bridge.northbound.opcua.client_trust import client_store
-from bridge.northbound.opcua.own_files import own_folder
-from bridge.northbound.opcua.server_identity import server_identity
-from bridge.northbound.opcua.user_certificates import user_certificates
+from bridge.northbound.opcua.certificates.client_trust import client_store
+from bridge.northbound.opcua.certificates.own_files import own_folder
+from bridge.northbound.opcua.certificates.server_identity import server_identity
+from bridge.northbound.opcua.certificates.user_certificates import user_certificates
 from bridge.northbound.passwords import check_users
 from bridge.text import Text
 

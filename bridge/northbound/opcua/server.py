@@ -18,42 +18,42 @@ from bridge.base import clock
 from bridge.base.errors import OperationFailed
 from bridge.config import OpcUaTable
 from bridge.northbound.listening import listen, until_deaf
-from bridge.northbound.opcua import server_configuration
 from bridge.northbound.opcua.accounts import Accounts, security_policies
-from bridge.northbound.opcua.alarm_server import AlarmSite, of_certificate, serve_alarms
-from bridge.northbound.opcua.alarms import AlarmTask
-from bridge.northbound.opcua.assets import read_models
+from bridge.northbound.opcua.alarms.alarm_server import AlarmSite, of_certificate, serve_alarms
+from bridge.northbound.opcua.alarms.alarms import AlarmTask
 from bridge.northbound.opcua.backend import Backend
-from bridge.northbound.opcua.certificates import OwnCertificate
+from bridge.northbound.opcua.certificates import server_configuration
+from bridge.northbound.opcua.certificates.client_trust import ClientTrust, client_store
+from bridge.northbound.opcua.certificates.own_certificate import OwnCertificate
+from bridge.northbound.opcua.certificates.own_files import own_folder
+from bridge.northbound.opcua.certificates.own_renewal import OwnRenewal
+from bridge.northbound.opcua.certificates.ownnames import names_of, reached_by
+from bridge.northbound.opcua.certificates.renewal_watch import RenewalWatch
+from bridge.northbound.opcua.certificates.server_configuration import ServerConfiguration
+from bridge.northbound.opcua.certificates.server_identity import ServerIdentity, server_identity
 from bridge.northbound.opcua.change_publisher import Publisher
-from bridge.northbound.opcua.client_trust import ClientTrust, client_store
-from bridge.northbound.opcua.event_keeper import EventKeeper
-from bridge.northbound.opcua.event_log import EventLog
-from bridge.northbound.opcua.event_records import EventCodec
-from bridge.northbound.opcua.events import EventSender
-from bridge.northbound.opcua.methods import Caller
-from bridge.northbound.opcua.nameplates import Nameplate
-from bridge.northbound.opcua.nodes import layout
-from bridge.northbound.opcua.notifiers import Notifiers
-from bridge.northbound.opcua.outcome_texts import spoken
-from bridge.northbound.opcua.own_files import own_folder
-from bridge.northbound.opcua.own_renewal import OwnRenewal
-from bridge.northbound.opcua.own_watch import OwnWatch
-from bridge.northbound.opcua.ownnames import names_of, reached_by
-from bridge.northbound.opcua.plant_history import PlantHistory
-from bridge.northbound.opcua.read_through import ReadThrough
-from bridge.northbound.opcua.server_configuration import ServerConfiguration
-from bridge.northbound.opcua.server_identity import ServerIdentity, server_identity
+from bridge.northbound.opcua.events.event_file import EventLog
+from bridge.northbound.opcua.events.event_keeper import EventKeeper
+from bridge.northbound.opcua.events.event_records import EventCodec
+from bridge.northbound.opcua.events.events import EventSender
+from bridge.northbound.opcua.history.plant_history import PlantHistory
+from bridge.northbound.opcua.history.value_rings import ValueRings
+from bridge.northbound.opcua.models.assets import read_models
+from bridge.northbound.opcua.models.nameplates import Nameplate
+from bridge.northbound.opcua.models.site_space import NAMESPACE, fill
+from bridge.northbound.opcua.requests.methods import Caller
+from bridge.northbound.opcua.requests.outcome_texts import spoken
+from bridge.northbound.opcua.requests.read_through import ReadThrough
+from bridge.northbound.opcua.requests.writes import Writer
 from bridge.northbound.opcua.service_level import ServiceLevel
-from bridge.northbound.opcua.site_space import NAMESPACE, fill
-from bridge.northbound.opcua.value_rings import ValueRings
-from bridge.northbound.opcua.writes import Writer
+from bridge.northbound.opcua.space.nodes import layout
+from bridge.northbound.opcua.space.notifiers import Notifiers
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
 from bridge.text import LANGUAGES, Text
 from bridge.uaserver import decoding
-from bridge.uaserver.acceptor import WINDOW
 from bridge.uaserver.bound import BoundServer
+from bridge.uaserver.connections.acceptor import WINDOW
 from bridge.uaserver.library import ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.own_addresses import OwnAddresses
@@ -284,7 +284,7 @@ class OpcUaServer:
         await server.start()
         publisher = Publisher(image, tree.watched, events, past, ServiceLevel(image, inner.status))
         self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
-        watch = OwnWatch(self._settings, self._folder, own.application_uri)
+        watch = RenewalWatch(self._settings, self._folder, own.application_uri)
         self._renewals = asyncio.create_task(watch.run(take_up), name="opcua renewals")
         self._follower = asyncio.create_task(alarms.run(), name="opcua alarms")
         if self._settings.discovery_server:

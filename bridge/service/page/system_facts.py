@@ -20,7 +20,7 @@ from bridge import __version__
 from bridge.base.errors import BridgeError, Fault, FileFaults
 from bridge.config import ListeningTable, Site
 from bridge.lint import Severity, lint
-from bridge.northbound.opcua.own_files import CERTIFICATES, own_pair
+from bridge.northbound.opcua.certificates.own_files import CERTIFICATES, own_pair
 from bridge.northbound.page.system import CertificateFacts, UnreadablePart
 from bridge.project import Project, load_project
 from bridge.text import Text, as_json

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from bridge.base.errors import OperationFailed
 from bridge.cli.app import make_app
 from bridge.config import OpcUaTable
-from bridge.northbound.opcua.own_files import CERTIFICATE, own_folder
-from bridge.northbound.opcua.server_identity import server_identity
+from bridge.northbound.opcua.certificates.own_files import CERTIFICATE, own_folder
+from bridge.northbound.opcua.certificates.server_identity import server_identity
 from bridge.trust import TrustStore
 from bridge.trust.files import thumbprint
 from tests.support import sites

@@ -16,7 +16,7 @@ from bridge.command import Action, Command, Identity, Outcome, Request, Role, So
 from bridge.command.messages.request import SetTimeout, TakeControl, Write, WriteParameter
 from bridge.config import load_site
 from bridge.image import Quality, Reading, Value
-from bridge.northbound.opcua.nodes import MethodNode, ObjectNode, layout
+from bridge.northbound.opcua.space.nodes import MethodNode, ObjectNode, layout
 from tests.support import sites
 from tests.support.bench import Bench
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block

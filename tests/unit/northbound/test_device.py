@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bridge.command import Action, Identity, Outcome, Role, Source
-from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.space.nodes import layout
 from bridge.northbound.zenoh.commands import Commands
 from bridge.northbound.zenoh.keys import KeySpace
 from tests.support.bench import Bench

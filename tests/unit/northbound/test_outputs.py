@@ -12,7 +12,7 @@ from bridge.northbound.modbus.device_unit import DeviceUnit
 from bridge.northbound.modbus.pdu import ExceptionCode, MaskWrite, ModbusException
 from bridge.northbound.modbus.registers import ACKNOWLEDGE, KEEP_ALIVE, STOP, RegisterTable, Words32
 from bridge.northbound.modbus.units import device_maps
-from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.space.nodes import layout
 from bridge.northbound.zenoh.commands import BadCommand, Commands
 from tests.support.bench import PLC, Bench
 from tests.support.devices import IO_BLOCK, OUTPUTS, device_bench, io_block

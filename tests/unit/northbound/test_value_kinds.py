@@ -11,7 +11,7 @@ import pytest
 from bridge.bustools.decode import Decoder
 from bridge.canopen.frame import Frame
 from bridge.northbound.modbus.registers import DriveMap, RegisterTable
-from bridge.northbound.opcua.nodes import ObjectNode, VariableKind, VariableNode, layout
+from bridge.northbound.opcua.space.nodes import ObjectNode, VariableKind, VariableNode, layout
 from bridge.northbound.zenoh.keys import KeySpace
 from tests.support.bench import PLC, Bench
 from tests.support.invented import NAME, command, spin_bench, spindle

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from bridge.command import Code, Identity, Outcome, Plant, Request, Source, Write
 from bridge.command.drive_link import NodeState
 from bridge.image import Value
-from bridge.northbound.opcua.data_values import point_value
+from bridge.northbound.opcua.space.data_values import point_value
 from bridge.northbound.zenoh.commands import BadCommand, Commands
 from tests.support import sites
 from tests.support.node_states import node_goes

@@ -15,7 +15,7 @@ from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.base.errors import BridgeError, FileFaults, Unavailable
 from bridge.config import load_site
-from bridge.northbound.opcua.selfsigned import new_key, self_signed
+from bridge.northbound.opcua.certificates.selfsigned import new_key, self_signed
 from bridge.service.preflight import check_files
 from tests.support import sites
 

@@ -23,13 +23,13 @@ from bridge.condition.plant_layout import MOVES_BY
 from bridge.config import NodeTable, Reaction
 from bridge.drive import DriveState
 from bridge.mapping import family_names, load_family
-from bridge.northbound.opcua.nodes import DEVICE_GROUPS
-from bridge.northbound.opcua.nodes import GROUPS as GROUP_NAMES
+from bridge.northbound.opcua.space.nodes import DEVICE_GROUPS
+from bridge.northbound.opcua.space.nodes import GROUPS as GROUP_NAMES
 from bridge.northbound.trouble_words import CONDITION_WORDS
 from bridge.project import load_project
 from bridge.text import LANGUAGES, Text
 from bridge.text.templates import parse, source, templates
-from bridge.uaserver.condition_fields import STATES
+from bridge.uaserver.conditions.condition_fields import STATES
 
 
 def names() -> set[str]:

@@ -11,7 +11,7 @@ from asyncua import Client, ua
 
 from bridge.uaserver import decoding
 from bridge.uaserver.bound import BoundServer
-from bridge.uaserver.security import Refusal
+from bridge.uaserver.connections.security import Refused
 from bridge.uaserver.session import InnerServer
 from tests.support.opcua_application import Served, User, add_variable
 
@@ -19,7 +19,7 @@ WORD = ua.NodeId("word", 1)
 
 
 class AllTrusted:
-    def refusal(self, sent: bytes, source: str, application_uri: str | None = None) -> Refusal | None:
+    def refusal(self, sent: bytes, source: str, application_uri: str | None = None) -> Refused | None:
         return None
 
 

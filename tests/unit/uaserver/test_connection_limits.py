@@ -11,7 +11,7 @@ from bridge.uaserver.connection_limits import (
     MOST_WAITING,
     limits,
 )
-from bridge.uaserver.quotas import MOST_SESSIONS, MOST_SESSIONS_OF_ADDRESS
+from bridge.uaserver.subscriptions.quotas import MOST_SESSIONS, MOST_SESSIONS_OF_ADDRESS
 
 
 def test_every_session_has_a_connection_and_there_is_one_to_come_back_on() -> None:

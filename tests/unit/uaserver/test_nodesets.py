@@ -10,7 +10,7 @@ from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 from asyncua.ua.ua_binary import variant_to_binary
 
-from bridge.northbound.opcua.assets import read_models
+from bridge.northbound.opcua.models.assets import read_models
 from bridge.uaserver.address_space import is_empty, put_behind
 from bridge.uaserver.hierarchy import related, subtypes, supertypes
 from bridge.uaserver.library import node_id

@@ -7,7 +7,7 @@ from asyncua import ua
 from asyncua.server.address_space import AddressSpace
 
 from bridge.uaserver.servermethods import call_server, is_of_server
-from bridge.uaserver.subscriptions import Subscriptions
+from bridge.uaserver.subscriptions.subscriptions import Subscriptions
 from tests.support.opcua_sessions import Session
 
 Codes, Ids = ua.StatusCodes, ua.ObjectIds

@@ -20,12 +20,12 @@ from asyncua import Client, ua
 
 from bridge.command import Action
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua import alarm_server
-from bridge.northbound.opcua.alarm_server import AlarmSite
+from bridge.northbound.opcua.alarms import alarm_server
+from bridge.northbound.opcua.alarms.alarm_server import AlarmSite
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.text import Text, as_json
-from bridge.uaserver.condition_fields import AlarmContent, ConditionPlace, common_fields
-from bridge.uaserver.conditions import Condition, Conditions
+from bridge.uaserver.conditions.condition_fields import AlarmContent, ConditionPlace, common_fields
+from bridge.uaserver.conditions.conditions import Condition, Conditions
 from tests.support.opcua_alarms import (
     Follower,
     alarm_of,

@@ -16,9 +16,9 @@ from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.command import Role
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua.certificates import OwnCertificate
-from bridge.northbound.opcua.own_files import own_folder, put_pair
-from bridge.northbound.opcua.server_identity import renew
+from bridge.northbound.opcua.certificates.own_certificate import OwnCertificate
+from bridge.northbound.opcua.certificates.own_files import own_folder, put_pair
+from bridge.northbound.opcua.certificates.server_identity import renew
 from bridge.trust import CertificateFault, TrustStore
 from bridge.trust.files import thumbprint
 from tests.support.certificates import CLIENT, CLIENT_URI, DAY, NOW, Case, Made, cases, make, rsa_key

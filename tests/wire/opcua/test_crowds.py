@@ -14,8 +14,9 @@ from asyncua import Client, ua
 from bridge.config import OpcUaTable, UserTable
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.passwords import hash_password
-from bridge.uaserver import connection_limits, monitoring, quotas
+from bridge.uaserver import connection_limits
 from bridge.uaserver.connection_limits import DEADLINE_S, ConnectionStage
+from bridge.uaserver.subscriptions import monitoring, quotas
 from tests.support.opcua_site import OPEN, break_off, connected, serving
 from tests.support.quiet import quiet_log
 

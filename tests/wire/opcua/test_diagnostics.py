@@ -12,7 +12,7 @@ import pytest_asyncio
 from asyncua import Client, ua
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.uaserver.diagnostics import SecurityDiagnostics
+from bridge.uaserver.diagnostics.diagnostics import SecurityDiagnostics
 from bridge.uaserver.session import Session
 from tests.support.opcua_peers import PASSWORD, Served, logged_in, make_peer
 from tests.support.opcua_raw import ask, item, monitored, published, sessions, subscribed, values

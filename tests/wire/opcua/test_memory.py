@@ -13,8 +13,9 @@ import pytest
 from asyncua import Client, ua
 
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.uaserver import acceptor, connection_limits
-from bridge.uaserver.transport import MOST_BEFORE_SESSION
+from bridge.uaserver import connection_limits
+from bridge.uaserver.connections import acceptor
+from bridge.uaserver.connections.transport import MOST_BEFORE_SESSION
 from tests.support.opcua_site import OPEN, LocalView, break_off, connected, serving
 from tests.support.quiet import quiet_log
 from tests.support.zenoh_peer import until

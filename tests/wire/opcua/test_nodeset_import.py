@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from asyncua import Server, ua
 
-from bridge.northbound.opcua.assets import read_models
+from bridge.northbound.opcua.models.assets import read_models
 from bridge.uaserver.address_space import put_behind
 from bridge.uaserver.nodesets import NodesetStore, NoInstances
 from tests.support import sites

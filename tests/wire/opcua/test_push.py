@@ -12,7 +12,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua.trust_list_files import TrustLists, decoded, encoded
+from bridge.northbound.opcua.certificates.trust_list_files import TrustLists, decoded, encoded
 from bridge.trust import TrustStore
 from bridge.trust.files import thumbprint
 from tests.support.certificates import AUTHORITY, CLIENT, crl_of, make, signed

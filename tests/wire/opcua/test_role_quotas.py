@@ -10,7 +10,7 @@ import pytest
 from asyncua import Client, ua
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.uaserver import quotas
+from bridge.uaserver.subscriptions import quotas
 from tests.support.opcua_peers import PASSWORD, Served, logged_in
 from tests.support.opcua_site import connected, serving
 from tests.support.passwords import cheap_hash

@@ -11,10 +11,11 @@ import pytest
 from asyncua import Client, ua
 
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.uaserver import connection_limits, quotas
+from bridge.uaserver import connection_limits
 from bridge.uaserver.routes import ROUTES
 from bridge.uaserver.session import Session
 from bridge.uaserver.states import REFUSALS, Need, RequestSession
+from bridge.uaserver.subscriptions import quotas
 from tests.support.opcua_raw import ask, item, monitored, sessions, told
 from tests.support.opcua_services import (
     LOAD,

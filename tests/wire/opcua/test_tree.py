@@ -10,9 +10,9 @@ from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_to_binary
 
 from bridge.config.point_patterns import HISTORY_POINTS
-from bridge.northbound.opcua.nodes import layout
+from bridge.northbound.opcua.history.value_rings import chosen
 from bridge.northbound.opcua.server import OpcUaServer
-from bridge.northbound.opcua.value_rings import chosen
+from bridge.northbound.opcua.space.nodes import layout
 from tests.support.opcua_held import HeldTree, Seen, as_told, copy_of, standard_space
 from tests.support.opcua_site import OPEN, LocalView, connected, namespace
 
@@ -40,7 +40,7 @@ async def look(client: Client, ids: Sequence[ua.NodeId], points: set[ua.NodeId])
         for where, result in zip(
             some, await client.uaclient.browse(ua.BrowseParameters(NodesToBrowse=asked)), strict=True
         ):
-            # Alarms stand beside the tree: tests/unit/northbound/opcua/test_alarm_nodes.py.
+            # Alarms stand beside the tree: tests/unit/northbound/opcua/alarms/test_alarm_nodes.py.
             of_points = [one for one in result.References if not str(one.NodeId.Identifier).endswith("Alarm")]
             seen[where] = [struct_to_binary(one) for one in of_points], {}
         wanted = [ua.ReadValueId(one, kind) for one in some for kind in KINDS]

@@ -10,7 +10,7 @@ from cryptography.hazmat.primitives.asymmetric.rsa import generate_private_key
 
 from bridge.command.messages.request import Identity, Role, Source
 from bridge.northbound.opcua.backend import Backend
-from bridge.northbound.opcua.session_user import SessionUser
+from bridge.northbound.opcua.requests.session_user import SessionUser
 from bridge.northbound.pulse import Pulse
 from bridge.uaserver.application import NOBODY, LoginAttempt
 

@@ -10,7 +10,7 @@ from typing import Any
 from asyncua import ua
 
 from bridge.northbound.opcua.change_publisher import Publisher
-from bridge.northbound.opcua.point_values import WatchedVariable
+from bridge.northbound.opcua.space.point_values import WatchedVariable
 from tests.support.zenoh_peer import until
 
 WATCHERS = 1_000

@@ -1,0 +1,1 @@
+"""Alarms: a condition for each place where the plant can have a trouble."""

@@ -1,0 +1,1 @@
+"""Certificates: the server's own, those of its clients, and how both are changed while it runs."""

@@ -1,0 +1,1 @@
+"""Events of the plant as OPC UA events, told and kept."""

@@ -1,0 +1,1 @@
+"""Past values, black boxes of trips, and the files they are read by."""

@@ -1,0 +1,1 @@
+"""Requests of clients: writes, methods and reads that go to the drives."""

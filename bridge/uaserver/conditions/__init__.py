@@ -1,0 +1,1 @@
+"""Conditions (OPC 10000-9): their states, their methods, their fields."""

@@ -1,0 +1,1 @@
+"""Connections: who is let in, their channels, and their messages."""

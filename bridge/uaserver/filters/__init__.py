@@ -1,0 +1,1 @@
+"""Filters of monitored items: what of changes and events a client wants."""

@@ -2,8 +2,8 @@
 
 broken_plant.py SITE PORT
 Serves SITE, whose buses are virtual, with its fronts, until a signal ends it as it ends ``drivebridge run``.
-Each datagram that comes to the UDP port PORT of loopback is the name of one of ``Plant``'s methods, and what it
-is done to, a bus or a node: by default the first one, can0 and a SK TU4-CAO with the number 5.
+Each datagram that comes to the UDP port PORT of loopback is the name of one of ``Plant``'s methods, and what
+it is done to, a bus or a node: by default can0, and the first node, a SK TU4-CAO.
 """
 
 from __future__ import annotations

@@ -38,6 +38,14 @@ async def outcome(work: Any) -> str:
     return "Good"
 
 
+async def until(fits: Callable[[], bool], seconds: float) -> None:
+    """Wait until it fits, without an error where it never does."""
+    for _ in range(int(seconds / 0.02)):
+        if fits():
+            return
+        await asyncio.sleep(0.02)
+
+
 async def prepared(steps: Steps, certificate: str, locale: str = "en") -> Client:
     """A client with a certificate of the folder, as an encrypted channel needs it."""
     client = Client(steps.url, timeout=10, watchdog_intervall=10)
@@ -106,7 +114,7 @@ class Session:
         return code_of(code)
 
     async def call(self, where: str | ua.NodeId, method: str | int, *given: ua.Variant) -> list[Any]:
-        """The code and what the method gives; ``method`` is a name in ``where``, or a number of namespace 0."""
+        """Code and what the method gives; ``method`` is a name in ``where``, or a number in namespace 0."""
         owner = where if isinstance(where, ua.NodeId) else self.id(where)
         named = ua.NodeId(method) if isinstance(method, int) else self.id(f"{where}/{method}")
         request = ua.CallMethodRequest(ObjectId=owner, MethodId=named, InputArguments=list(given))

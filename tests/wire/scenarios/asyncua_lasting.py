@@ -19,6 +19,7 @@ from tests.wire.scenarios.asyncua_client import (
     logged_in,
     outcome,
     prepared,
+    until,
 )
 from tests.wire.scenarios.steps import Steps
 
@@ -220,14 +221,11 @@ async def end_is_announced(steps: Steps) -> None:
     anna = await Session.of(client)
     subscription = await client.create_subscription(50, Handler())
     await subscription.subscribe_data_change([client.get_node(ua.NodeId(one)) for one in followed])
-    while len(seen) < len(followed):
-        await asyncio.sleep(0.05)
+    await until(lambda: len(seen) == len(followed), 10)
     steps.step("service level", ("level", 255) in seen, True)
     seen.clear()
     steps.say(waiting="end")
-    async with asyncio.timeout(120):
-        while ("level", 0) not in seen or not any(what == "reason" for what, _ in seen):
-            await asyncio.sleep(0.02)
+    await until(lambda: ("level", 0) in seen and any(what == "reason" for what, _ in seen), 120)
     first = dict(reversed(seen))
     steps.step("state", first["state"], ua.ServerState.Shutdown)
     steps.step("seconds till shutdown", first["seconds"], 2)

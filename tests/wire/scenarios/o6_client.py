@@ -112,7 +112,7 @@ class Session:
         return code_of(self.client.write(self.id(name), value))
 
     def call(self, where: str, method: str, *given: object) -> list[Any]:
-        """The code and what the method gives; ``method`` is a name in ``where``, or a NodeId of namespace 0."""
+        """Code and what the method gives; ``method`` is a name in ``where``, or a NodeId of namespace 0."""
         named = method if method.startswith("i=") else self.id(f"{where}/{method}")
         code, *outputs = self.client.call(self.id(where), named, list(given))
         return [code_of(code), *map(plain, outputs)]

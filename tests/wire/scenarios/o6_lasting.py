@@ -9,14 +9,12 @@ import o6
 
 from tests.support.certificates import CLIENT_URI
 from tests.wire.scenarios.o6_client import (
-    POLICY,
     Session,
     Types,
     Waiting,
     logged_in,
     outcome,
     plain,
-    prepared,
 )
 from tests.wire.scenarios.steps import Steps
 

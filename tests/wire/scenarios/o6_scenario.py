@@ -1,8 +1,8 @@
 """The scenario of open62541's client: o6_scenario.py LETTER FOLDER URL COMMANDS.
 
-What this client does not have: it sends neither Republish nor TransferSubscriptions, and what it calls a transfer
-of its session ends before it has one; its languages are those of the time when it connects; its filters of events
-name no fields of other namespaces, which are read from the alarm instead.
+What this client does not have: it sends neither Republish nor TransferSubscriptions, and what it calls a
+transfer of its session ends before it has one; its languages are those of the time when it connects; its
+filters of events name no fields of other namespaces, which are read from the alarm instead.
 """
 
 from __future__ import annotations
@@ -15,9 +15,7 @@ import o6
 
 from tests.wire.scenarios.o6_client import (
     Session,
-    Types,
     Waiting,
-    code_of,
     logged_in,
     outcome,
     plain,
@@ -29,8 +27,8 @@ from tests.wire.scenarios.steps import Steps
 REFUSED = "BadUserAccessDenied"
 DONE = ("en", "done")
 EVENTS = (
-    "SELECT /EventId, /SourceName, /Message, /Severity, /Retain, /ActiveState/Id, /AckedState, /AckedState/Id,"
-    " /ConfirmedState/Id, /Comment, /ClientUserId, /EventType"
+    "SELECT /EventId, /SourceName, /Message, /Severity, /Retain, /ActiveState/Id, /AckedState,"
+    " /AckedState/Id, /ConfirmedState/Id, /Comment, /ClientUserId, /EventType"
 )
 
 
@@ -95,8 +93,7 @@ def users(steps: Steps) -> None:
 def model(steps: Steps, session: Session) -> None:
     """The drive by published types alone, without a name of ours."""
     client = session.client
-    uris = ("DI", "Powertrain")
-    di, powertrain = (session.spaces.index(f"http://opcfoundation.org/UA/{one}/") for one in uris)
+    di = session.spaces.index("http://opcfoundation.org/UA/DI/")
     (devices,) = session.targets("i=85", f"{di}:DeviceSet")
     names = [str(session.client.read(one.nodeId, attr="displayName").text) for one in client.browse(devices)]
     own = [f"{node}/fu{number}" for node in (steps.first, steps.second) for number in (1, 2, 3, 4)]

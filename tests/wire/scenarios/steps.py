@@ -8,8 +8,8 @@ from pathlib import Path
 
 
 class Steps:
-    """``letter`` is the client's own part of the plant: nodes a1 and a2 on can0, or b1 and b2 on can1. ``folder``
-    holds the certificates, ``url`` is the server's, ``commands`` the port by which things break."""
+    """``letter`` is the client's own part of the plant: nodes a1 and a2 on can0, or b1 and b2 on can1.
+    ``folder`` has the certificates, ``url`` is the server's, ``commands`` the port by which things break."""
 
     def __init__(self, letter: str, folder: str, url: str, commands: str) -> None:
         self.first, self.second = f"{letter}1", f"{letter}2"

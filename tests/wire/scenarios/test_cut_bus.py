@@ -1,5 +1,5 @@
-"""A bus cut under 40 drives: one alarm with its cause and what it explains, in both languages, gone when the bus is
-back, and in the history after a restart of the service."""
+"""A bus that is cut under 40 drives: one alarm with its cause and what it explains, in both languages, gone
+when the bus is back, and in the history after a restart of the service."""
 
 from __future__ import annotations
 
@@ -25,15 +25,17 @@ PLACE = "bus/can0"
 BUS_SETTLED_S = 40.0
 """Where this machine was too slow meanwhile, that explains the silence for its first 20 s."""
 CAUSE = {
-    "de": "Alle 10 Knoten, die da sein müssten, schweigen: es liegt an dem, was sie gemeinsam haben, und nicht an"
-    " jedem einzelnen.",
-    "en": "All 10 nodes that should be there are silent, so what they share is to blame and not each of them.",
+    "de": "Alle 10 Knoten, die da sein müssten, schweigen: es liegt an dem, was sie gemeinsam haben, und"
+    " nicht an jedem einzelnen.",
+    "en": "All 10 nodes that should be there are silent, so what they share is to blame and not each of"
+    " them.",
 }
 MESSAGE = {"de": f"Kein Knoten antwortet. {CAUSE['de']}", "en": f"No node answers. {CAUSE['en']}"}
 REMEDY = {
-    "de": "CAN-Kabel an der Box, beide Abschlusswiderstände (je 120 Ω), die Versorgung des Busses und die Bitrate"
-    " prüfen.",
-    "en": "Check the CAN cable at the box, both terminators (120 Ω each), the supply of the bus and the bit rate.",
+    "de": "CAN-Kabel an der Box, beide Abschlusswiderstände (je 120 Ω), die Versorgung des Busses und die"
+    " Bitrate prüfen.",
+    "en": "Check the CAN cable at the box, both terminators (120 Ω each), the supply of the bus and the bit"
+    " rate.",
 }
 
 
@@ -71,7 +73,11 @@ async def _cut_and_mended(plant: Plant, steps: Steps) -> list[bytes]:
         plant.tell("cut_cable", "can0")
         raised = await _seen(follower, plant, "de")
         await _seen(other, plant, "en")
-        assert (raised["SourceName"], raised["Severity"], raised["Code"]) == ("can0", 800, "condition.bus_silent")
+        assert (raised["SourceName"], raised["Severity"], raised["Code"]) == (
+            "can0",
+            800,
+            "condition.bus_silent",
+        )
         assert sorted(raised["Explains"]) == sorted([*DRIVES, *NODES])
         session = await Session.of(german)
         active = [one for one in (*DRIVES, *NODES) if await session.value(f"{one}/Alarm/ActiveState/Id")]

@@ -1,7 +1,7 @@
 """Days of three OPC UA clients that we did not write, at one server, step by step.
 
-The scripts run beside each other, each on a part of the plant that is its own; then the server is ended, which is
-announced to all of them.
+The scripts run beside each other, each on a part of the plant that is its own; then the server is ended,
+which is announced to all of them.
 """
 
 from __future__ import annotations

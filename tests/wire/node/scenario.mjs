@@ -139,7 +139,7 @@ const FIELDS = ["EventId", "EventType", "SourceName", "Message", "Severity", "Re
   "AckedState.Id", "ConfirmedState.Id", "Comment", "ClientUserId"];
 
 async function alarms(operator) {
-  const drive = `${first}/fu2`;
+  const drive = `${first}/fu1`;
   const alarm = id(`${drive}/Alarm`);
   const { session } = operator;
   const subscription = await session.createSubscription2({
@@ -159,7 +159,7 @@ async function alarms(operator) {
     }
     throw new Error(`nothing told of ${source}`);
   };
-  await breakPlant(`fail_drive ${first} fu2`);
+  await breakPlant(`fail_drive ${first}`);
   const raised = await event(drive, (one) => one["ActiveState.Id"]);
   step("alarm", [raised.SourceName, raised.Severity, raised.Retain]);
   step("its message", text(raised.Message));
@@ -221,12 +221,14 @@ async function history({ session }, began) {
     }),
     nodesToRead: [{ nodeId: "i=2253" }], timestampsToReturn: TimestampsToReturn.Both,
   }));
-  const said = past.results[0].historyData.events.map((one) => one.eventFields.map(({ value }) => value.text ?? value));
-  step("events of the past", said.filter(([source]) => source === `${first}/fu2`).map(([, message]) => message).slice(0, 2));
+  const said = past.results[0].historyData.events
+    .map((one) => one.eventFields.map(({ value }) => value.text ?? value))
+    .filter(([source, message]) => source === `${first}/fu1` && message.includes("berstrom"));
+  step("events of the past", [...new Set(said.map(([, message]) => message))]);
 }
 
 async function blackBox(operator) {
-  const file = `${first}/fu2/BlackBox/1`;
+  const file = `${first}/fu1/BlackBox/1`;
   const size = Number((await operator.until(`${file}/Size`, (value) => value[1] > 0))[1]);
   step("open for writing", await operator.call(file, "i=11580", [DataType.Byte, 2]));
   const [code, handle] = await operator.call(file, "i=11580", [DataType.Byte, 1]);

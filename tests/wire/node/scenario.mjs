@@ -160,7 +160,8 @@ async function alarms(operator) {
     throw new Error(`nothing told of ${source}`);
   };
   await breakPlant(`fail_drive ${first}`);
-  const raised = await event(drive, (one) => one["ActiveState.Id"]);
+  // Until its number has been read there is only the emergency's.
+  const raised = await event(drive, (one) => one["ActiveState.Id"] && one.Message.text.includes("E003/3.0"));
   step("alarm", [raised.SourceName, raised.Severity, raised.Retain]);
   step("its message", text(raised.Message));
   step("its cause", (await operator.value(`${drive}/Alarm/Cause`)).text.split(",")[0]);

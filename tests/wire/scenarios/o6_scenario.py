@@ -202,7 +202,8 @@ def alarms(steps: Steps, anna: Session) -> None:
         return {name.removeprefix("/"): plain(value) for name, value in found.items()}
 
     steps.break_plant("fail_drive", steps.first)
-    raised = told(drive, ActiveState_Id=True)
+    # Until its number has been read there is only the emergency's.
+    raised = told(drive, ActiveState_Id=True, Message=("de", "Störung E003/3.0. Überstrom Wechselrichter."))
     steps.step("alarm", (raised["SourceName"], raised["Severity"], raised["Retain"]), (drive, 800, True))
     steps.step("its message", raised["Message"], ("de", "Störung E003/3.0. Überstrom Wechselrichter."))
     cause, remedy = (anna.value(f"{alarm}/{name}")[1].partition(",")[0] for name in ("Cause", "Remedy"))

@@ -48,6 +48,7 @@ async def _seen(follower: Follower, plant: Plant, locale: str) -> Mapping[str, A
 
 
 @pytest.mark.landing
+@pytest.mark.timeout(300)
 def test_a_bus_that_is_cut_under_forty_drives_is_one_alarm(tmp_path: Path) -> None:
     port, began = free_port(), datetime.now(UTC)
     scenario_plant.lay_out(tmp_path)

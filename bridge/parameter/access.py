@@ -131,22 +131,19 @@ class DriveParameters:
 
     # writing
 
-    def write(
-        self, entry: ParameterEntry, value: Value, now: float, gate: Gate, expected: Value | None = None
-    ) -> Writes:
+    def write(self, entry: ParameterEntry, value: Value, now: float, gate: Gate) -> Writes:
         """Write ``value`` where the drive does not hold it yet, and read it back; a command is written and
-        has been given when the drive answers. ``gate`` lets in what may be written. With ``expected`` nothing
-        is written where the drive, asked just before, holds anything else, or cannot be asked."""
+        has been given when the drive answers. ``gate`` lets in what may be written."""
         self.check_writable(entry)
         self._pass(entry, gate)
         definition = entry.definition
         blind = definition is not None and (definition.command or not definition.readable)
         before: bytes | None = None
         if not blind:
-            before, time = yield from self._fetch(entry, now, FRESH_S if expected is None else 0.0)
+            before, time = yield from self._fetch(entry, now, FRESH_S if gate.expected is None else 0.0)
             now = max(now, time)
-        if expected is not None:
-            _check_expected(entry, expected, before)
+        if gate.expected is not None:
+            _check_expected(entry, gate.expected, before)
         data = encode_value(entry, value, before)
         if before is not None and matches(entry, before, data):
             return ParameterWritten(

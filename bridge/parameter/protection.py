@@ -12,6 +12,7 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from typing import Final
 
+from bridge.image import Value
 from bridge.mapping.alias_places import Alias, aliases
 from bridge.mapping.aliases import COMMUNICATION
 from bridge.mapping.entry_types import said_of
@@ -38,12 +39,14 @@ class Gate:
 
     ``is_moving`` is asked before a write is queued and again when its turn has come: whoever owns the drive
     may enable it in between. ``asks`` comes right before the write, and raises ``ParameterError`` where there
-    is to be none: for whoever has to ask the drive whether it moves.
+    is to be none: for whoever has to ask the drive whether it moves. With ``expected`` nothing is written
+    where the drive, asked just before, holds anything else, or cannot be asked.
     """
 
     is_engineer: bool
     is_moving: Callable[[], bool]
     asks: Asks | None = None
+    expected: Value | None = None
 
 
 class Protection:

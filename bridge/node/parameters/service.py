@@ -186,7 +186,7 @@ class NodeParameters:
             conclude(_no(Code.BUSY, why))
         else:
             self._writing.add(key)
-            steps = access.write(entry, command.value, now, gate, command.expected)
+            steps = access.write(entry, command.value, now, replace(gate, expected=command.expected))
             self._run(steps, drive, partial(self._on_written, request, drive, entry, conclude))
 
     def _save(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from dataclasses import replace
 from typing import TypeVar
 
 import pytest
@@ -65,7 +66,7 @@ class Drive:
         return self.data
 
     def writes(self, value: Value, one: ParameterEntry = OWN, expected: Value | None = None):
-        return self.run(self.access.write(one, value, self.now, ENGINEER_AT_REST, expected))
+        return self.run(self.access.write(one, value, self.now, replace(ENGINEER_AT_REST, expected=expected)))
 
     def reads(self, max_age_s: float = 0.0, one: ParameterEntry = OWN):
         return self.run(self.access.read(one, self.now, max_age_s))

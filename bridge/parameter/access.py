@@ -131,17 +131,22 @@ class DriveParameters:
 
     # writing
 
-    def write(self, entry: ParameterEntry, value: Value, now: float, gate: Gate) -> Writes:
+    def write(
+        self, entry: ParameterEntry, value: Value, now: float, gate: Gate, expected: Value | None = None
+    ) -> Writes:
         """Write ``value`` where the drive does not hold it yet, and read it back; a command is written and
-        has been given when the drive answers. ``gate`` lets in what may be written."""
+        has been given when the drive answers. ``gate`` lets in what may be written. With ``expected`` nothing
+        is written where the drive, asked just before, holds anything else, or cannot be asked."""
         self.check_writable(entry)
         self._pass(entry, gate)
         definition = entry.definition
         blind = definition is not None and (definition.command or not definition.readable)
         before: bytes | None = None
         if not blind:
-            before, time = yield from self._fetch(entry, now, FRESH_S)
+            before, time = yield from self._fetch(entry, now, FRESH_S if expected is None else 0.0)
             now = max(now, time)
+        if expected is not None:
+            _check_expected(entry, expected, before)
         data = encode_value(entry, value, before)
         if before is not None and matches(entry, before, data):
             return ParameterWritten(
@@ -315,6 +320,16 @@ class DriveParameters:
             said = Text.of("parameter.of_advised", owner=entry.name, what=failure.said, hints=hints)
         why = Why.REFUSED if failure.by_drive else Why.NO_ANSWER
         return ParameterError(why, said, failure.abort_code)
+
+
+def _check_expected(entry: ParameterEntry, expected: Value, held: bytes | None) -> None:
+    if held is None:
+        said = Text.of("parameter.expected_unread", parameter=entry.name)
+        raise ParameterError(Why.WRITE_ONLY, said)
+    if not matches(entry, held, encode_value(entry, expected, held)):
+        found = shown(entry, decode(entry, held))
+        said = Text.of("parameter.not_expected", parameter=entry.name, value=found)
+        raise ParameterError(Why.OTHER_VALUE, said)
 
 
 def _address(entry: ParameterEntry) -> str:

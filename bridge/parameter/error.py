@@ -21,6 +21,8 @@ class Why(Enum):
     NO_ANSWER = "no answer"
     NOT_TAKEN = "not taken"
     """The drive has accepted a value and holds another one."""
+    OTHER_VALUE = "other value"
+    """It does not hold what the client expects, and was not written."""
     NOT_CONFIGURED = "not configured"
 
 

@@ -4,34 +4,35 @@ from __future__ import annotations
 
 import asyncio
 import gc
-from collections.abc import Coroutine, Mapping
+from collections.abc import Coroutine, Mapping, Sequence
 from contextlib import AsyncExitStack
 from pathlib import Path
 
 from bridge.catalogue import Catalogue
+from bridge.config import Site
+from bridge.mapping import Family
+from bridge.mapping.site_families import load_site_and_families
 from bridge.northbound.listening import ListeningSocket
 from bridge.northbound.opcua.alarms.alarm_server import AlarmSite
 from bridge.northbound.opcua.models.nameplates import nameplates_of
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.trouble_words import PlantWords
 from bridge.northbound.view import View
-from bridge.project import Project, load_project
 from bridge.service.fault_texts import german_faults
 from bridge.service.front_process import on_end
 from bridge.service.mirrored import required, serve_mirrored
 
 
-def alarm_site_of(project: Project) -> AlarmSite:
+def alarm_site_of(site: Site, families: Mapping[str, Family]) -> AlarmSite:
     """Fronts of the site, and what its drives add to the words of their alarms."""
-    site = project.site
     drives = {
-        f"{node.name}/{project.families[node.mapping_key].leaf_of(drive)}": (node.mapping_key, drive)
+        f"{node.name}/{families[node.mapping_key].leaf_of(drive)}": (node.mapping_key, drive)
         for bus in site.bus
         for node in bus.node
         for drive in node.drive
     }
     tables = {"modbus": site.modbus, "opcua": site.opcua, "zenoh": site.zenoh, "page": site.page}
-    german = german_faults(project.families)
+    german = german_faults(families)
 
     def fault_in(drive: str, number: str, language: str) -> Mapping[str, str]:
         if language != "de" or drive not in drives:
@@ -42,14 +43,20 @@ def alarm_site_of(project: Project) -> AlarmSite:
     return AlarmSite(words, tuple(name for name, table in tables.items() if table is not None))
 
 
+def _described(file: Path, folders: Sequence[Path], modules: Sequence[str]) -> Family:
+    """Family of a device description; what reads them is imported where a site has one."""
+    from bridge.derive import describe
+
+    return describe(file, folders, modules)
+
+
 def run_opcua(path: Path, signs: int | None, listening: int | None) -> Coroutine[None, None, None]:
     """The OPC UA front of the site file at ``path``, as ``RunFront`` says."""
-    project = load_project(path)
-    site = project.site
+    site, families = load_site_and_families(path, _described)
     settings = required(site.opcua, "opcua")
-    nameplates = nameplates_of(Catalogue.of(site, project.families))
+    nameplates = nameplates_of(Catalogue.of(site, families))
 
-    alarm_site = alarm_site_of(project)
+    alarm_site = alarm_site_of(site, families)
 
     async def open_server(mirror: View, stack: AsyncExitStack) -> OpcUaServer:
         # Nothing of what is built here is garbage, and looking for it takes a quarter of the time.

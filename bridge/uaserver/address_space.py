@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
@@ -21,9 +21,18 @@ class Watcher(Protocol):
 Watchers = dict[int, Watcher]
 """Watchers of one attribute, by handle."""
 
+_WRITE_FULL_ARRAY_ONLY: Final = 1 << 10
+"""Bit of AccessLevelEx."""
+
 
 def constant(value: object, kind: ua.VariantType) -> AttributeValue:
     return AttributeValue(data_value(variant(value, kind)))
+
+
+def access_level_ex(access: int) -> int:
+    """AccessLevelEx of a variable with this AccessLevel (Part 3 §8.58): reads and writes are atomic, and no
+    part of an array is written."""
+    return access | _WRITE_FULL_ARRAY_ONLY
 
 
 def is_empty(held: AttributeValue) -> bool:

@@ -14,7 +14,7 @@ from typing import Any, Final, Protocol, cast
 import msgspec
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
-from bridge.uaserver.address_space import constant
+from bridge.uaserver.address_space import access_level_ex, constant
 from bridge.uaserver.hierarchy import reference_to
 from bridge.uaserver.library import (
     AttributeIds,
@@ -53,6 +53,7 @@ _ATTRIBUTE_TYPES: Final = {
     AttributeIds.ValueRank: _Type.Int32,
     AttributeIds.AccessLevel: _Type.Byte,
     AttributeIds.UserAccessLevel: _Type.Byte,
+    AttributeIds.AccessLevelEx: _Type.UInt32,
     AttributeIds.Historizing: _Type.Boolean,
     AttributeIds.Executable: _Type.Boolean,
     AttributeIds.UserExecutable: _Type.Boolean,
@@ -246,6 +247,7 @@ class NodesetStore:
                     **self._data_type(row),
                     AttributeIds.AccessLevel: row.access,
                     AttributeIds.UserAccessLevel: row.access,
+                    AttributeIds.AccessLevelEx: access_level_ex(row.access),
                     AttributeIds.Historizing: False,
                 }
             case ua.NodeClass.VariableType:

@@ -12,7 +12,7 @@ from typing import Final
 
 from asyncua.server.address_space import AddressSpace, AttributeValue
 
-from bridge.uaserver.address_space import is_empty
+from bridge.uaserver.address_space import access_level_ex, constant, is_empty
 from bridge.uaserver.browsing import MOST_CONTINUATION_POINTS
 from bridge.uaserver.conformance import claimed
 from bridge.uaserver.filters.eventfilter import MOST_FIELDS
@@ -128,3 +128,7 @@ def _settle(attributes: dict[AttributeIds, AttributeValue]) -> None:
             attributes[attribute].value = refused
         else:
             del attributes[attribute]
+    access = attributes.get(AttributeIds.AccessLevel)
+    if access and access.value and access.value.Value:
+        extended = access_level_ex(access.value.Value.Value)
+        attributes[AttributeIds.AccessLevelEx] = constant(extended, _Type.UInt32)

@@ -84,7 +84,8 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
         ),
         Service(
             "HistoryRead",
-            "raw, at times and events, see [History](#history); anything else BadHistoryOperationUnsupported",
+            "raw, at times and events, see [History](opcua-history.md); anything else "
+            "BadHistoryOperationUnsupported",
         ),
         Service("Write", "see [Writing](#writing); with an `indexRange` BadWriteNotSupported"),
         _no("HistoryUpdate", "history is only read", StatusCodes.BadHistoryOperationUnsupported),
@@ -92,7 +93,7 @@ SERVICES: Final[Mapping[str, tuple[Service, ...]]] = {
     "Method": (
         Service(
             "Call",
-            "the [methods](#methods-of-a-drive) of drives, nodes, buses and [alarms](#alarms), "
+            "the [methods](#methods-of-a-drive) of drives, nodes, buses and [alarms](opcua-alarms.md), "
             "GetMonitoredItems and ResendData; all others are BadMethodInvalid",
         ),
     ),

@@ -18,6 +18,7 @@ from asyncua import ua
 from asyncua.server.address_space import NodeManagementService
 
 from bridge.northbound.opcua.backend import Backend
+from bridge.uaserver.address_space import access_level_ex, constant
 from bridge.uaserver.application import ServedApplication
 from bridge.uaserver.explanations import Explain
 from bridge.uaserver.filters.eventfilter import Occurrence
@@ -83,6 +84,7 @@ class _Application(ServedApplication[Any]):
 
 class _Builder:
     def __init__(self, inner: InnerServer) -> None:
+        self._space = inner.aspace
         self._management = NodeManagementService(inner.aspace)
 
     def build(self) -> None:
@@ -169,6 +171,10 @@ class _Builder:
         )
         (result,) = self._management.add_nodes([item])
         result.StatusCode.check()
+        if isinstance(attributes, ua.VariableAttributes):
+            extended = constant(access_level_ex(attributes.AccessLevel), ua.VariantType.UInt32)
+            made = self._space[ua.NodeId(where, 1)]
+            made.attributes[ua.AttributeIds.AccessLevelEx] = extended
 
 
 def _arguments(named: dict[str, str]) -> ua.Variant:

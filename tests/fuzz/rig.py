@@ -22,6 +22,9 @@ from tests.support.process import REPOSITORY, Process, free_port, running, until
 STRANGER: Final = "127.0.0.9"
 """Address of the thrower, as far as a protocol can tell."""
 GOOD, PASSWORD = "good", "good-password"
+ADMIN: Final = "admin"
+"""A user with the same password, whom the thrower has."""
+APPLICATION_URI: Final = "urn:fuzz:drivebridge"
 GOOD_NODE: Final = 5
 GOOD_RPDOS: Final = {0x205: "fu1", 0x305: "fu2", 0x405: "fu3"}
 SPARE: Final = 9
@@ -117,9 +120,22 @@ def _bus() -> str:
 
 def write_site(folder: Path, modbus: int, opcua: int, zenoh: int) -> Path:
     """The site as ``folder/site.toml``."""
-    user = f'[[opcua.user]]\nname = "{GOOD}"\nrole = "operator"\npassword_hash = "{cheap_hash(PASSWORD)}"\n'
+    line = cheap_hash(PASSWORD)
+    users = "".join(
+        f'[[opcua.user]]\nname = "{name}"\nrole = "{role}"\npassword_hash = "{line}"\n'
+        for name, role in ((GOOD, "operator"), (ADMIN, "admin"))
+    )
+    # The administrator who is thrown about may empty the trust list, and goes on.
+    opcua_table = f'{sites.opcua(opcua)}application_uri = "{APPLICATION_URI}"\ntrust = "anybody"\n'
     zenoh_table = f"{sites.zenoh(zenoh)}accept_put = true\n"
-    return sites.write(folder, _bus(), sites.modbus(modbus), sites.opcua(opcua), user, zenoh_table)
+    return sites.write(folder, _bus(), sites.modbus(modbus), opcua_table, users, zenoh_table)
+
+
+def write_black_box(folder: Path) -> None:
+    """A trip of fu1 that was before the bridge began."""
+    path = folder / "state" / "opcua" / "black_box" / "conveyor" / "fu1" / "2026-01-01T12-00-00.000000Z.csv"
+    path.parent.mkdir(parents=True)
+    path.write_text("time,s,actual/frequency\r\n" + "2026-01-01T12:00:00Z,0.0,25.0\r\n" * 200)
 
 
 @contextmanager
@@ -127,6 +143,7 @@ def running_rig(folder: Path) -> Iterator[Rig]:
     """The bridge with all its nodes operational and the good clients' drives turning."""
     ports = free_port(), free_port(), free_port()
     path = write_site(folder, *ports)
+    write_black_box(folder)
     here = REPOSITORY / "tests" / "fuzz"
     bridge = [sys.executable, str(here / "wired_bridge.py"), str(folder), "run", str(path)]
     good = [sys.executable, str(here / "good.py"), str(folder / "exchanges"), *map(str, ports)]

@@ -10,10 +10,16 @@ from pathlib import Path
 from typing import Final
 
 import pytest
+from asyncua import ua
+from asyncua.common.utils import Buffer
+from asyncua.ua.ua_binary import struct_from_binary
 
+from tests.fuzz.case import load
 from tests.fuzz.judge import Judge
 from tests.fuzz.rig import Rig, running_rig
 from tests.fuzz.run import fuzz
+from tests.fuzz.targets.opcua_admin import AdminChannel
+from tests.fuzz.targets.opcua_channel import Channel, type_name
 from tests.support.nightly import examples
 
 CASES: Final = (
@@ -23,6 +29,23 @@ CASES: Final = (
 """Number of cases that a machine of two cores throws in 20 s each by night; by day the first of them."""
 SEED: Final = 13
 """The same each time: a test suite that finds something new each day is no test of a change."""
+CARRIED_OUT: Final = (
+    "Read from the drive",
+    "TakeControl",
+    "Items for events",
+    "An item is changed",
+    "History, raw",
+    "History, at times",
+    "History, events",
+    "Acknowledge",
+    "TimedShelve",
+    "ConditionRefresh2",
+    "Read of a black box",
+    "GetMonitoredItems",
+    "ServerConfiguration_CreateSigningRequest",
+    "TrustList_AddCertificate",
+)
+"""What changed messages begin with has to get far: these are not refused as they are."""
 LIMIT_S: Final = 300.0
 MOST_LOOKS: Final = 10
 """More than a good client's own patience."""
@@ -35,6 +58,24 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     folder: Path = tmp_path_factory.mktemp("fuzz")
     with running_rig(folder) as rig:
         yield rig
+
+
+@pytest.mark.timeout(LIMIT_S)
+def test_what_is_changed_is_good_before(rig: Rig) -> None:
+    """Before anything else is thrown: an alarm is acknowledged once."""
+    recorded = {one.what: one.case for one in load("opcua").recorded}
+    codes: dict[str, str] = {}
+    for what in CARRIED_OUT:
+        case = recorded[what]
+        channel = AdminChannel(rig) if case.kind == "admin" else Channel(rig.opcua)
+        channel.hello()
+        channel.open()
+        channel.activate()
+        body = channel.answered(case.parts[0])
+        answer = struct_from_binary(getattr(ua, type_name(body)), Buffer(body))
+        codes[what] = getattr(answer.Results[0], "StatusCode", answer.Results[0]).name
+        channel.leave()
+    assert codes == dict.fromkeys(CARRIED_OUT, "Good")
 
 
 @pytest.mark.landing(2)

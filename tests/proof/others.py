@@ -271,7 +271,7 @@ def kill_front_and_keep_it_down(rig: Rig) -> float:
 
 
 def _own_key(rig: Rig) -> Path:
-    return rig.disk.folder / "state" / "opcua" / "own_key.pem"
+    return rig.disk.folder / "state" / "certificates" / "own" / "own_key.pem"
 
 
 def let_front_up(rig: Rig) -> None:

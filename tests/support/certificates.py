@@ -179,6 +179,9 @@ def _cases() -> Iterator[tuple[str, Case]]:
     server = CLIENT.but(extended=(ExtendedKeyUsageOID.SERVER_AUTH,))
     yield "a server's", _alone(make(server), fault.USE)
     yield "silent on its use", _alone(make(CLIENT.but(usages=None, extended=None)), None)
+    # As Ignition makes them for itself.
+    both = CLIENT.but(is_ca=True, usages=(*_APPLICATION, "key_cert_sign"))
+    yield "an authority's as well", _alone(make(both), None)
     yield from _issued(fault)
 
 

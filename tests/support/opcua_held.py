@@ -23,6 +23,13 @@ from bridge.uaserver.address_space import is_empty
 from bridge.uaserver.library import make, node_id, text
 
 Ids = ua.ObjectIds
+_UNKNOWN = (
+    ua.AttributeIds.RolePermissions,
+    ua.AttributeIds.UserRolePermissions,
+    ua.AttributeIds.AccessRestrictions,
+    ua.AttributeIds.AccessLevelEx,
+)
+"""Attributes that asyncua's services do not make."""
 _CHANGED = (Ids.ObjectsFolder, Ids.Server)
 _TYPES = {
     VariableKind.PLAIN: Ids.BaseDataVariableType,
@@ -74,13 +81,15 @@ class HeldTree:
 
     def seen(self, where: ua.NodeId, space: AddressSpace | None = None) -> Seen:
         """Node as clients see it here or in another ``space``, without times and values of points, and
-        without what asyncua leaves empty."""
+        without what asyncua leaves empty or does not know."""
         space = space or self.space
         node = space[where]
         kinds = [
             kind
             for kind, held in node.attributes.items()
-            if (kind != ua.AttributeIds.Value or where not in self.points) and not is_empty(held)
+            if kind not in _UNKNOWN
+            and (kind != ua.AttributeIds.Value or where not in self.points)
+            and not is_empty(held)
         ]
         values = {int(kind): space.read_attribute_value(where, kind) for kind in kinds}
         references = [struct_to_binary(one) for one in node.references]

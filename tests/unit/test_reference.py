@@ -213,7 +213,7 @@ def call(method: MethodNode) -> str:
 
 
 def test_the_events_are_those_that_are_sent() -> None:
-    rows = page("reference/opcua.md").table("Events")
+    rows = page("reference/opcua-alarms.md").table("Events")
     assert [(row["type"], row["kind"]) for row in rows] == [
         (type_name(kind), kind.value) for kind in EventKind
     ]

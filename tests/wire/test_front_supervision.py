@@ -274,7 +274,7 @@ def test_ready_is_who_serves_and_a_front_that_fails_later_is_in_the_status_line(
     tmp_path: Path, ports: tuple[int, int], notices: Notices
 ) -> None:
     path = start(tmp_path, ports)
-    key = tmp_path / "state" / "opcua" / "own_key.pem"
+    key = tmp_path / "state" / "certificates" / "own" / "own_key.pem"
     with seen_and_notified(tmp_path, path) as run:
         notices.until("READY=1")
         assert starts(run) == 1, "OPC UA is served"

@@ -21,6 +21,8 @@ from tests.support.process import Process, drivebridge, free_port, only_demo, un
 
 BACK_S = 5.0
 NOISE_S = 5.0
+KEPT_S = 3.0
+"""Until the state of the alarms is in its file."""
 """A machine that is busy with other things."""
 KEEP_ALIVE, UNIT = 10, 1
 STATE = "conveyor/fu1/supervision/watchdog_state"
@@ -117,8 +119,12 @@ async def test_a_trip_is_in_the_history_after_a_restart_of_front_and_service(
             assert not (await plc.write_registers(0, words, device_id=UNIT)).isError()
         bridge.wait_output("was silent for 2000 ms")
         plc.close()
-        time.sleep(0.5)  # noqa: ASYNC251 - nothing else runs in this loop
         before, table = await past()
+        while not any("Its controller fell silent" in message for message in before):
+            await asyncio.sleep(0.2)
+            before, table = await past()
+        # A front that is killed before the alarm is in its file tells it again.
+        await asyncio.sleep(KEPT_S)
         assert any(silent in message for message in before), before
         rows = list(csv.DictReader(table.decode("utf-8-sig").splitlines()))
         assert float(rows[-1]["conveyor/fu1/actual/frequency [Hz]"]) > 0

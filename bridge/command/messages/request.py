@@ -136,6 +136,7 @@ class Code(StrEnum):
     UNKNOWN_PARAMETER = "unknown_parameter"
     WRITE_ONLY = "write_only"
     BUSY = "busy"
+    OTHER_VALUE = "other_value"
     TOO_OFTEN = "too_often"
     REFUSED_BY_DRIVE = "refused_by_drive"
 
@@ -218,12 +219,14 @@ class ReadParameter:
 
 @dataclass(frozen=True, slots=True)
 class WriteParameter:
-    """Writing of a parameter, named as in ``ReadParameter``; of a raw write ``value`` is the bytes."""
+    """Writing of a parameter, named as in ``ReadParameter``; of a raw write ``value`` is the bytes. Where it
+    does not hold ``expected``, if that is given, nothing is written."""
 
     action: ClassVar[Action] = Action.WRITE_PARAMETER
     parameter: str
     value: Value
     raw: bool = False
+    expected: Value | None = None
 
 
 @dataclass(frozen=True, slots=True)

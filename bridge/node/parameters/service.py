@@ -60,6 +60,7 @@ _CODES: Final = {
     Why.REFUSED: Code.REFUSED_BY_DRIVE,
     Why.NO_ANSWER: Code.TIMED_OUT,
     Why.NOT_TAKEN: Code.REFUSED_BY_DRIVE,
+    Why.OTHER_VALUE: Code.OTHER_VALUE,
     Why.NOT_CONFIGURED: Code.NOT_CONFIGURED,
 }
 _ANSWERS: Final = frozenset((NodeState.OPERATIONAL, NodeState.STOPPED, NodeState.CONFIG_ERROR))
@@ -185,7 +186,7 @@ class NodeParameters:
             conclude(_no(Code.BUSY, why))
         else:
             self._writing.add(key)
-            steps = access.write(entry, command.value, now, gate)
+            steps = access.write(entry, command.value, now, gate, command.expected)
             self._run(steps, drive, partial(self._on_written, request, drive, entry, conclude))
 
     def _save(

@@ -39,6 +39,7 @@ _SDO_CODES: Final = {
     Code.NOT_ALLOWED: 0x0800_0021,
     Code.TOO_OFTEN: 0x0800_0020,
     Code.BUSY: abort.BUSY,
+    Code.OTHER_VALUE: 0x0800_0022,
 }
 """SDO abort codes for refusals of the bridge itself."""
 _CODES: Final = {

@@ -66,6 +66,7 @@ EXCEPTIONS: Final = {
     Code.UNKNOWN_PARAMETER: ExceptionCode.ILLEGAL_ADDRESS,
     Code.WRITE_ONLY: ExceptionCode.ILLEGAL_ADDRESS,
     Code.BUSY: ExceptionCode.BUSY,
+    Code.OTHER_VALUE: ExceptionCode.DEVICE_FAILURE,
     Code.TOO_OFTEN: ExceptionCode.ILLEGAL_FUNCTION,
     Code.REFUSED_BY_DRIVE: ExceptionCode.DEVICE_FAILURE,
 }

@@ -134,6 +134,7 @@ class Backend(ServedApplication[SessionUser]):
     def on_connection(self, user: SessionUser, *, is_there: bool, has_others: bool) -> None:
         if not is_there:
             self._transfer.leave(user.identity.connection)
+            self._configuration.leave(user.identity.connection)
         self._view.on_connection(user.identity, is_there=is_there, has_others=has_others)
 
     def on_refused(self) -> None:

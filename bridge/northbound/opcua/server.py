@@ -62,6 +62,8 @@ from bridge.uaserver.session import InnerServer
 
 _PRODUCT: Final = "urn:drivebridge"
 _MB: Final = 1_000_000
+_KEPT: Final = "opcua"
+"""Folder in ``state_dir`` of what is kept of alarms and of the past."""
 
 _log = logging.getLogger(__name__)
 
@@ -69,8 +71,8 @@ _log = logging.getLogger(__name__)
 class OpcUaServer:
     """Serves ``view`` as the contract's OPC UA section says.
 
-    ``state_dir`` is the site's; certificates are in its folder ``certificates``, the state of the alarms is
-    in ``opcua``. ``nameplates`` are those of the drives. ``bound`` is a listening socket where somebody else
+    ``state_dir`` is the site's; certificates are in its folder ``certificates``, alarms and the past in
+    ``opcua``. ``nameplates`` are those of the drives. ``bound`` is a listening socket where somebody else
     holds the port.
     """
 
@@ -88,6 +90,7 @@ class OpcUaServer:
         self._settings = settings
         self._state_dir = state_dir
         self._folder = state_dir
+        self._kept = state_dir / _KEPT
         self._site_name = site_name
         self._nameplates = nameplates or {}
         self._alarm_site = alarm_site or AlarmSite()
@@ -242,9 +245,7 @@ class OpcUaServer:
         tree = site.tree
         notifiers = Notifiers(tree.notifiers)
         keeper = self._keeper(EventCodec(await server.get_namespace_array()), notifiers)
-        past = self._past = PlantHistory(
-            kept, image, epoch_ns, tree, rings, keeper, self._folder / "black_box"
-        )
+        past = self._past = PlantHistory(kept, image, epoch_ns, tree, rings, keeper, self._kept / "black_box")
         await past.start()
         self._view.on_event(past.on_event)
         resets = self._settings.acknowledge_resets
@@ -254,7 +255,7 @@ class OpcUaServer:
             self._view,
             self._alarm_site,
             own.certificate,
-            self._state_dir / "opcua",
+            self._kept,
             keeper,
             resets=resets,
         )
@@ -334,7 +335,7 @@ class OpcUaServer:
             return None
         most_bytes = kept.events_mb * _MB
         log = EventLog(codec, notifiers, kept.event_hours, most_bytes)
-        return EventKeeper(log, self._folder, most_bytes)
+        return EventKeeper(log, self._kept, most_bytes)
 
     def _tell(self) -> None:
         settings = self._settings

@@ -18,7 +18,7 @@ from typing import Any, Final
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
 from bridge.base.guard import Guard
-from bridge.uaserver.address_space import Watchers, put_behind
+from bridge.uaserver.address_space import Watchers, access_level_ex, put_behind
 from bridge.uaserver.diagnostics.diagnostics import (
     security_diagnostics,
     session_diagnostics,
@@ -224,6 +224,7 @@ def _attributes(shape: Shape) -> dict[AttributeIds, tuple[Any, ua.VariantType]]:
         AttributeIds.ValueRank: (1 if shape.content.is_array else -1, _Type.Int32),
         AttributeIds.AccessLevel: (1, _Type.Byte),
         AttributeIds.UserAccessLevel: (1, _Type.Byte),
+        AttributeIds.AccessLevelEx: (access_level_ex(1), _Type.UInt32),
         AttributeIds.MinimumSamplingInterval: (_LOOK_EVERY_S * 1000, _Type.Double),
         AttributeIds.Historizing: (False, _Type.Boolean),
     }

@@ -17,6 +17,7 @@ from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import get_safe_type_hints, struct_from_binary
 
 from tests.fuzz.case import Case, Recorded, save
+from tests.fuzz.recorder.opcua_requests import requests
 from tests.fuzz.recorder.proxy import Link, Proxy, recording
 from tests.fuzz.rig import Rig
 from tests.fuzz.targets.opcua_channel import HEAD, SESSION, SUBSCRIPTION, type_name
@@ -38,7 +39,10 @@ def record(rig: Rig) -> list[Path]:
         command = ["node", str(_NODE_CLIENT), f"opc.tcp://127.0.0.1:{proxy.port}"]
         subprocess.run(command, check=True, timeout=60, capture_output=True)
         by_node = _noted(proxy)
+    with recording(rig.opcua) as proxy:
+        scada = asyncio.run(_scada(proxy))
     return [
+        save("opcua", "asyncua-scada", "what SCADA systems and an authority's tools ask", scada),
         save("opcua", "asyncua", "a walk through all services that a client may call", by_asyncua),
         save("opcua", "node-opcua", "tests/wire/node/client.mjs", by_node),
     ]
@@ -91,6 +95,24 @@ def _known(link: Link) -> dict[bytes, bytes]:
             made = struct_from_binary(ua.CreateSubscriptionResponse, Buffer(body))
             known[struct.pack("<I", made.Parameters.SubscriptionId)] = SUBSCRIPTION
     return known
+
+
+async def _scada(proxy: Proxy) -> list[Recorded]:
+    """Each of the requests once."""
+    recorded: list[Recorded] = []
+    client = Client(f"opc.tcp://127.0.0.1:{proxy.port}", timeout=10)
+    await client.connect()
+    (link,) = proxy.links
+    for what, request, kind in requests(await client.get_namespace_index("urn:drivebridge:points")):
+        before = len(link.sent)
+        await _try(client.uaclient.protocol.send_request(request))
+        known = {token: marker for token, marker in _known(link).items() if marker == SESSION}
+        for message in _messages(link.sent[before:]):
+            name, case = _case(message, known)
+            if name == type(request).__name__:
+                recorded.append(Recorded(what, Case(kind, case.parts)))
+    await client.disconnect()
+    return recorded
 
 
 # a walk

@@ -64,8 +64,8 @@ class Drive:
             return b""
         return self.data
 
-    def writes(self, value: Value, one: ParameterEntry = OWN):
-        return self.run(self.access.write(one, value, self.now, ENGINEER_AT_REST))
+    def writes(self, value: Value, one: ParameterEntry = OWN, expected: Value | None = None):
+        return self.run(self.access.write(one, value, self.now, ENGINEER_AT_REST, expected))
 
     def reads(self, max_age_s: float = 0.0, one: ParameterEntry = OWN):
         return self.run(self.access.read(one, self.now, max_age_s))
@@ -135,6 +135,34 @@ def test_a_refusal_is_the_last_word_and_nothing_is_read_back() -> None:
 def test_what_its_access_does_not_allow_costs_no_transfer(access: str, call: str, reason: Why) -> None:
     drive, one = Drive(), entry(access=access)
     assert why(lambda: drive.writes(9, one) if call == "write" else drive.reads(0.0, one)) is reason
+    assert drive.done == []
+
+
+def test_what_holds_the_expected_value_is_written() -> None:
+    drive = Drive(5)
+    assert drive.writes(7, expected=5).reading.value == 7
+    assert drive.data == b"\x07\x00"
+
+
+@pytest.mark.parametrize("expected", [4, 6, -5, 7])
+def test_what_holds_another_value_than_expected_is_not_written(expected: int) -> None:
+    """Also where it holds already what was to be written: somebody else has written it."""
+    drive = Drive(5)
+    for value in (7, 5):
+        assert why(lambda value=value: drive.writes(value, expected=expected)) is Why.OTHER_VALUE
+    assert drive.done == [None, None], "read, and nothing more"
+
+
+def test_what_is_expected_is_compared_with_what_the_drive_holds_now() -> None:
+    drive = Drive(5)
+    drive.reads()
+    drive.data = b"\x06\x00"
+    assert why(lambda: drive.writes(7, expected=5)) is Why.OTHER_VALUE
+
+
+def test_what_cannot_be_read_cannot_hold_what_is_expected() -> None:
+    drive = Drive(5)
+    assert why(lambda: drive.writes(1, entry(command=True), expected=5)) is Why.WRITE_ONLY
     assert drive.done == []
 
 

@@ -14,7 +14,7 @@ HOLD = 'on_expiry = "hold"\n'
 def test_alarms_know_the_fronts_the_reactions_and_the_faults_in_german(tmp_path: Path) -> None:
     node = sites.node(sites.drive("fu1", "lease", 1000, HOLD), sites.drive("fu2", "opcua", 0))
     project = load_project(sites.write(tmp_path, sites.bus(node), sites.opcua(), sites.modbus()))
-    found = alarm_site_of(project)
+    found = alarm_site_of(project.site, project.families)
     assert found.fronts == ("modbus", "opcua")
     assert found.words.on_expiry == {"conveyor/fu1": "hold", "conveyor/fu2": "disable_voltage"}
     german = found.words.fault_in("conveyor/fu1", "E003/3.0", "de")

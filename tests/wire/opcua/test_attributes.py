@@ -106,3 +106,21 @@ async def test_a_drive_is_found_once_by_its_path(client: Client) -> None:
         [ua.BrowsePath(ua.NodeId(Ids.ObjectsFolder), path)]
     )
     assert [target.TargetId for target in result.Targets] == [ua.NodeId("conveyor/fu1", own)]
+
+
+@pytest.mark.landing
+async def test_every_variable_is_read_and_written_whole(served: Served, client: Client) -> None:
+    """Part 3 §8.58: neither NonatomicRead nor NonatomicWrite, but WriteFullArrayOnly."""
+    (session,) = sessions(served[0])
+    seen: list[tuple[int, int]] = []
+    for where in walked(session.aspace):
+        both = (
+            session._read(ua.ReadValueId(NodeId=where, AttributeId=attribute), NEITHER)  # pyright: ignore
+            for attribute in (Attribute.AccessLevel, Attribute.AccessLevelEx)
+        )
+        access, extended = both
+        if access.StatusCode.is_good():
+            seen.append((access.Value.Value, extended.Value.Value))
+            assert extended.Value.VariantType is ua.VariantType.UInt32
+    assert len(seen) > 3000
+    assert [one for one in seen if one[1] != one[0] | 1 << 10] == []

@@ -39,8 +39,9 @@ SETTINGS = OPEN.model_copy(
 
 @pytest_asyncio.fixture(scope="module", loop_scope="module")
 async def view(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[LocalView]:
-    async with serving(SETTINGS, tmp_path_factory.mktemp("state")) as (server, view):
-        view.server = server
+    folder = tmp_path_factory.mktemp("state")
+    async with serving(SETTINGS, folder) as (server, view):
+        view.server, view.folder = server, folder
         yield view
 
 
@@ -228,12 +229,18 @@ async def test_events_of_the_past_are_those_of_their_objects(client: Client, vie
     assert notifies.Value.Value == 5
 
 
+def kept_events(state_dir: Path) -> list[Path]:
+    """Wherever they are."""
+    return list(state_dir.rglob("events.jsonl"))
+
+
 async def test_a_bus_that_was_cut_is_in_the_history_after_a_restart(tmp_path: Path) -> None:
     """In the language of who reads it, though it happened in another run."""
     async with serving(SETTINGS, tmp_path) as (server, view):
         happen(view, cut())
         async with connected(server) as client:
             (before,) = await until(lambda: events(client.nodes.server), "the event")
+    assert kept_events(tmp_path) == [tmp_path / "opcua" / "events.jsonl"]
     async with serving(SETTINGS, tmp_path) as (server, view):
         german = Client(server.endpoint_url, timeout=10)
         german.set_locale(["de-AT", "en"])
@@ -280,13 +287,17 @@ async def test_without_hours_no_events_are_kept(tmp_path: Path) -> None:
             await events(client.nodes.server)
         notifies = await client.nodes.server.read_attribute(Attribute.EventNotifier)
         assert notifies.Value.Value == 1
-    assert not (tmp_path / "opcua" / "events.jsonl").exists()
+    assert not kept_events(tmp_path)
 
 
 # black box
 
 
-async def test_a_trip_is_a_file_that_clients_and_spreadsheets_read(client: Client, view: LocalView) -> None:
+def black_boxes(state_dir: Path, drive: str) -> list[Path]:
+    return list((state_dir / "opcua" / "black_box" / drive).iterdir())
+
+
+async def test_a_trip_is_a_file_that_clients_and_spreadsheets_read(client: Client, view: Any) -> None:
     file = await node(client, "conveyor/fu2/BlackBox/1")
     size = await file.get_child("Size")
     assert await size.read_value() == 0
@@ -301,6 +312,7 @@ async def test_a_trip_is_a_file_that_clients_and_spreadsheets_read(client: Clien
     async with UaFile(file, "r") as opened:
         content = await opened.read()
     assert len(content) == length
+    assert [one.read_bytes() for one in black_boxes(view.folder, "conveyor/fu2")] == [content]
     rows = list(csv.DictReader(content.decode("utf-8-sig").splitlines()))
     told = dict.fromkeys(row["conveyor/fu2/actual/current [A]"] for row in rows)
     assert [one for one in told if one in ("1.5", "9.5")] == ["1.5", "9.5"]

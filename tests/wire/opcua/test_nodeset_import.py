@@ -33,6 +33,7 @@ METHODS = [
     "KeepAlive",
     "ReadParameter",
     "WriteParameter",
+    "WriteParameterIf",
     "SaveParameters",
 ]
 

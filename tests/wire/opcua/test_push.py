@@ -12,7 +12,7 @@ from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.config import OpcUaTable, UserTable
-from bridge.northbound.opcua.certificates.trust_list_files import TrustLists, decoded, encoded
+from bridge.northbound.opcua.certificates.trust_list_files import TrustListContents, decoded, encoded
 from bridge.trust import TrustStore
 from bridge.trust.files import thumbprint
 from tests.support.certificates import AUTHORITY, CLIENT, crl_of, make, signed
@@ -146,7 +146,7 @@ class TestTrustList:
 
     async def test_it_is_read_and_replaced_as_a_file(self, served: Served, scada: Peer, home: Path) -> None:
         own = x509.load_der_x509_certificate(scada.certificate)
-        lists = TrustLists((own,), (), (ROOT.certificate,), (crl_of(ROOT),))
+        lists = TrustListContents((own,), (), (ROOT.certificate,), (crl_of(ROOT),))
         async with logged_in(served, scada, "admin", PASSWORD) as client:
             handle = handle_(await good(client, f"{LIST}_Open", ua.Variant(6, Type.Byte)))
             content = encoded(lists, 15)
@@ -169,6 +169,13 @@ class TestTrustList:
         kept = TrustStore(home / "certificates").lists()
         assert kept.trusts(own)
         assert (kept.issuers, len(kept.crls)) == ((ROOT.certificate,), 1)
+
+    async def test_whoever_breaks_off_is_in_nobodys_way(self, served: Served, scada: Peer) -> None:
+        async with logged_in(served, scada, "admin", PASSWORD) as client:
+            await good(client, f"{LIST}_Open", ua.Variant(6, Type.Byte))
+        async with logged_in(served, scada, "admin", PASSWORD) as client:
+            handle = handle_(await good(client, f"{LIST}_Open", ua.Variant(1, Type.Byte)))
+            await good(client, f"{LIST}_Close", handle)
 
 
 class TestRenewal:

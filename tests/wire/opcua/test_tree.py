@@ -26,9 +26,10 @@ KINDS = set(ua.AttributeIds) - {
     ua.AttributeIds.UserAccessLevel,
     ua.AttributeIds.UserExecutable,
     ua.AttributeIds.UserRolePermissions,
-    # Not made by asyncua: test_security.py.
+    # Not made by asyncua: test_security.py, test_attributes.py.
     ua.AttributeIds.RolePermissions,
     ua.AttributeIds.AccessRestrictions,
+    ua.AttributeIds.AccessLevelEx,
 }
 
 

@@ -94,6 +94,7 @@ class ServerConfiguration:
         self._files = TrustListFiles()
         # One after the other: each may take a moment in a thread.
         self._turn = asyncio.Lock()
+        self._leaving: set[asyncio.Task[None]] = set()
 
     def has(self, where: ua.NodeId) -> bool:
         """True for one of its methods."""
@@ -133,6 +134,16 @@ class ServerConfiguration:
             return make(ua.CallMethodResult, StatusCode=status(StatusCodes.BadResourceUnavailable))
         output = [variant(result, method.output)] if method.output is not None else []
         return make(ua.CallMethodResult, InputArgumentResults=faults, OutputArguments=output)
+
+    def leave(self, session: str) -> None:
+        """The session has ended, or its connection has."""
+        task = asyncio.get_running_loop().create_task(self._leave(session))
+        self._leaving.add(task)
+        task.add_done_callback(self._leaving.discard)
+
+    async def _leave(self, session: str) -> None:
+        async with self._turn:
+            self._files.leave(session)
 
     # the certificate; all below run in a thread, one at a time
 

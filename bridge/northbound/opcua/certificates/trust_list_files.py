@@ -121,6 +121,11 @@ class TrustListFiles:
         for handle in [number for number, one in self._open.items() if now - one.used_at > _IDLE_S]:
             del self._open[handle]
 
+    def leave(self, owner: str) -> None:
+        """The session has ended, or its connection has: what it had open is closed, and does not count."""
+        for handle in [number for number, one in self._open.items() if one.owner == owner]:
+            del self._open[handle]
+
     def read(self, owner: str, handle: int, length: int, now: float) -> bytes:
         one = self._of(owner, handle, now)
         if one.is_written:

@@ -13,6 +13,7 @@ from bridge.command.messages.request import (
     PARAMETER_ACTIONS,
     Action,
     Code,
+    Command,
     Identity,
     Outcome,
     Request,
@@ -28,7 +29,7 @@ from bridge.northbound.opcua.space.data_values import (
     plain_variant,
     rejection,
 )
-from bridge.northbound.opcua.space.nodes import OUTCOME, Argument, ArgumentType, MethodNode
+from bridge.northbound.opcua.space.nodes import EXPECTED, OUTCOME, Argument, ArgumentType, MethodNode
 from bridge.northbound.view import View
 from bridge.uaserver.explanations import Explain, Explanation
 from bridge.uaserver.hierarchy import related
@@ -45,8 +46,14 @@ from bridge.uaserver.library import (
 )
 
 _DIRECTIONS: Final = (-1, 0, 1)
-_AT_FAULT: Final = {Code.UNKNOWN_PARAMETER: 0, Code.READ_ONLY: 0, Code.WRITE_ONLY: 0, Code.OUT_OF_RANGE: 1}
-"""Position of the argument at fault in a parameter method, by outcome code."""
+_AT_FAULT: Final = {
+    Code.UNKNOWN_PARAMETER: "name",
+    Code.READ_ONLY: "name",
+    Code.WRITE_ONLY: "name",
+    Code.OUT_OF_RANGE: "value",
+    Code.OTHER_VALUE: "expected",
+}
+"""Argument at fault in a parameter method, by outcome code."""
 
 
 class Caller:
@@ -89,12 +96,13 @@ class Caller:
                 faults[place] = int(error.code)
         if any(faults):
             return self._rejected(identity, call, StatusCodes.BadInvalidArgument, faults)
-        outcome = await ask(self._view, Request(identity, method.target, command_of(method.action, *values)))
+        outcome = await ask(self._view, Request(identity, method.target, _command(method, values)))
         if not outcome.ok:
             explain(explanation(outcome))
-        place = _AT_FAULT.get(outcome.code) if method.action in PARAMETER_ACTIONS else None
-        if place is not None and place < len(faults):
-            faults[place] = outcome_status(outcome).value
+        wrong = _AT_FAULT.get(outcome.code) if method.action in PARAMETER_ACTIONS else None
+        names = [argument.name for argument in method.arguments]
+        if wrong in names:
+            faults[names.index(wrong)] = outcome_status(outcome).value
             return call_result(StatusCodes.BadInvalidArgument, faults)
         return call_result(outcome_status(outcome).value, results=_results(method, outcome))
 
@@ -133,6 +141,13 @@ def _results(method: MethodNode, outcome: Outcome) -> list[ua.Variant]:
     if OUTCOME in method.results:
         return [variant(outcome_text(outcome), ua.VariantType.LocalizedText)]
     return [] if outcome.value is None else [plain_variant(outcome.value)]
+
+
+def _command(method: MethodNode, values: Sequence[Value]) -> Command:
+    """The command that a method is called for."""
+    named = dict(zip((argument.name for argument in method.arguments), values, strict=True))
+    conditions = {name: named.pop(name) for name in (EXPECTED.name,) if name in named}
+    return command_of(method.action, *named.values(), **conditions)
 
 
 def _argument(method: MethodNode, argument: Argument, given: ua.Variant) -> Value:

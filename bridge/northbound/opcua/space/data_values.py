@@ -47,6 +47,7 @@ OUTCOME_STATUS: Final = {
     Code.UNKNOWN_PARAMETER: StatusCodes.BadNodeIdUnknown,
     Code.WRITE_ONLY: StatusCodes.BadNotReadable,
     Code.BUSY: StatusCodes.BadResourceUnavailable,
+    Code.OTHER_VALUE: StatusCodes.BadInvalidState,
     Code.TOO_OFTEN: StatusCodes.BadRequestNotAllowed,
     Code.REFUSED_BY_DRIVE: StatusCodes.BadDeviceFailure,
 }

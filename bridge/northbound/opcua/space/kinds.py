@@ -28,12 +28,13 @@ from bridge.northbound.opcua.space.structures import (
 )
 from bridge.northbound.opcua.space.words import named, spoken
 from bridge.text import Words
-from bridge.uaserver.address_space import constant, is_empty
+from bridge.uaserver.address_space import access_level_ex, constant, is_empty
 from bridge.uaserver.hierarchy import reference_to
 from bridge.uaserver.library import (
     AttributeIds,
     ObjectIds,
     change,
+    get,
     make,
     node_id,
     text,
@@ -188,5 +189,8 @@ def node_attributes(
     if refused:
         raise ValueError(f"OPC UA: no {node_class.name} can have {wanted}")
     made = space[_ANY].attributes
+    if isinstance(wanted, ua.VariableAttributes):
+        extended = access_level_ex(get(wanted, "AccessLevel"))
+        made[AttributeIds.AccessLevelEx] = constant(extended, ua.VariantType.UInt32)
     # The values of points are where they are; of all else that is empty there is nothing.
     return {kind: held for kind, held in made.items() if kind == AttributeIds.Value or not is_empty(held)}

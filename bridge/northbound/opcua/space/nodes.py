@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
-from typing import Final
+from typing import Final, NamedTuple
 
 from bridge.command.messages.request import Action
 from bridge.image import Point
@@ -172,54 +172,73 @@ _TTL: Final = Argument("ttl_ms", ArgumentType.UINT32, Text.of("method.ttl"))
 
 _PARAMETER: Final = Argument("name", ArgumentType.STRING, Text.of("method.parameter"))
 _VALUE: Final = Argument("value", ArgumentType.ANY, Text.of("method.value"))
+EXPECTED: Final = Argument("expected", ArgumentType.ANY, Text.of("method.expected"))
 
 OUTCOME: Final = Argument("outcome", ArgumentType.TEXT, Text.of("method.outcome"))
 """Output argument of each method that has no other."""
 
-_Methods = Sequence[tuple[Action, tuple[Argument, ...], tuple[Argument, ...], Text]]
+
+class _Method(NamedTuple):
+    """``name`` is its BrowseName where that does not follow from the action."""
+
+    action: Action
+    arguments: tuple[Argument, ...]
+    results: tuple[Argument, ...]
+    description: Text
+    name: str = ""
+
+
+_Methods = Sequence[_Method]
 
 _PARAMETER_METHODS: Final[_Methods] = (
-    (Action.READ_PARAMETER, (_PARAMETER,), (_VALUE,), Text.of("method.read_parameter")),
-    (Action.WRITE_PARAMETER, (_PARAMETER, _VALUE), (), Text.of("method.write_parameter")),
-    (Action.SAVE_PARAMETERS, (), (), Text.of("method.save_parameters")),
+    _Method(Action.READ_PARAMETER, (_PARAMETER,), (_VALUE,), Text.of("method.read_parameter")),
+    _Method(Action.WRITE_PARAMETER, (_PARAMETER, _VALUE), (), Text.of("method.write_parameter")),
+    _Method(
+        Action.WRITE_PARAMETER,
+        (_PARAMETER, EXPECTED, _VALUE),
+        (),
+        Text.of("method.write_parameter_if"),
+        "WriteParameterIf",
+    ),
+    _Method(Action.SAVE_PARAMETERS, (), (), Text.of("method.save_parameters")),
 )
 _DRIVE_METHODS: Final[_Methods] = (
-    (Action.START, (_DIRECTION,), (), Text.of("method.start")),
-    (Action.STOP, (), (), Text.of("method.stop")),
-    (Action.QUICK_STOP, (), (), Text.of("method.quick_stop")),
-    (Action.DISABLE_VOLTAGE, (), (), Text.of("method.disable_voltage")),
-    (Action.RESET_FAULT, (), (), Text.of("method.reset_fault")),
-    (Action.TAKE_CONTROL, (_TTL,), (), Text.of("method.take_control")),
-    (Action.RELEASE_CONTROL, (), (), Text.of("method.release_control")),
-    (Action.KEEP_ALIVE, (), (), Text.of("method.keep_alive")),
+    _Method(Action.START, (_DIRECTION,), (), Text.of("method.start")),
+    _Method(Action.STOP, (), (), Text.of("method.stop")),
+    _Method(Action.QUICK_STOP, (), (), Text.of("method.quick_stop")),
+    _Method(Action.DISABLE_VOLTAGE, (), (), Text.of("method.disable_voltage")),
+    _Method(Action.RESET_FAULT, (), (), Text.of("method.reset_fault")),
+    _Method(Action.TAKE_CONTROL, (_TTL,), (), Text.of("method.take_control")),
+    _Method(Action.RELEASE_CONTROL, (), (), Text.of("method.release_control")),
+    _Method(Action.KEEP_ALIVE, (), (), Text.of("method.keep_alive")),
     *_PARAMETER_METHODS,
 )
 _NODE_METHODS: Final[_Methods] = (
-    (Action.RESET, (), (), Text.of("method.reset")),
-    (Action.RESET_COMMUNICATION, (), (), Text.of("method.reset_communication")),
-    (Action.START_NODE, (), (), Text.of("method.start_node")),
-    (Action.STOP_NODE, (), (), Text.of("method.stop_node")),
-    (Action.ENTER_PRE_OPERATIONAL, (), (), Text.of("method.enter_pre_operational")),
-    (Action.ENABLE, (), (), Text.of("method.enable")),
-    (Action.DISABLE, (), (), Text.of("method.disable")),
+    _Method(Action.RESET, (), (), Text.of("method.reset")),
+    _Method(Action.RESET_COMMUNICATION, (), (), Text.of("method.reset_communication")),
+    _Method(Action.START_NODE, (), (), Text.of("method.start_node")),
+    _Method(Action.STOP_NODE, (), (), Text.of("method.stop_node")),
+    _Method(Action.ENTER_PRE_OPERATIONAL, (), (), Text.of("method.enter_pre_operational")),
+    _Method(Action.ENABLE, (), (), Text.of("method.enable")),
+    _Method(Action.DISABLE, (), (), Text.of("method.disable")),
 )
 _DEVICE_METHODS: Final[_Methods] = (*_NODE_METHODS, *_PARAMETER_METHODS)
 """Methods of a node that is no drive."""
 _OUTPUT_METHODS: Final[_Methods] = (
-    (Action.STOP, (), (), Text.of("method.outputs_stop")),
-    (Action.RESET_FAULT, (), (), Text.of("method.outputs_reset_fault")),
-    (Action.TAKE_CONTROL, (_TTL,), (), Text.of("method.outputs_take_control")),
-    (Action.RELEASE_CONTROL, (), (), Text.of("method.outputs_release_control")),
-    (Action.KEEP_ALIVE, (), (), Text.of("method.outputs_keep_alive")),
+    _Method(Action.STOP, (), (), Text.of("method.outputs_stop")),
+    _Method(Action.RESET_FAULT, (), (), Text.of("method.outputs_reset_fault")),
+    _Method(Action.TAKE_CONTROL, (_TTL,), (), Text.of("method.outputs_take_control")),
+    _Method(Action.RELEASE_CONTROL, (), (), Text.of("method.outputs_release_control")),
+    _Method(Action.KEEP_ALIVE, (), (), Text.of("method.outputs_keep_alive")),
     *_DEVICE_METHODS,
 )
 """Methods of a node that is no drive and has outputs."""
 _BUS_METHODS: Final[_Methods] = (
-    (Action.RESET, (), (), Text.of("method.bus_reset")),
-    (Action.RESET_COMMUNICATION, (), (), Text.of("method.bus_reset_communication")),
-    (Action.START_NODE, (), (), Text.of("method.bus_start_node")),
-    (Action.STOP_NODE, (), (), Text.of("method.bus_stop_node")),
-    (Action.ENTER_PRE_OPERATIONAL, (), (), Text.of("method.bus_enter_pre_operational")),
+    _Method(Action.RESET, (), (), Text.of("method.bus_reset")),
+    _Method(Action.RESET_COMMUNICATION, (), (), Text.of("method.bus_reset_communication")),
+    _Method(Action.START_NODE, (), (), Text.of("method.bus_start_node")),
+    _Method(Action.STOP_NODE, (), (), Text.of("method.bus_stop_node")),
+    _Method(Action.ENTER_PRE_OPERATIONAL, (), (), Text.of("method.bus_enter_pre_operational")),
 )
 
 
@@ -301,17 +320,18 @@ def _add_black_boxes(drive: ObjectNode, count: int) -> None:
 
 
 def _methods(target: str, table: _Methods) -> tuple[MethodNode, ...]:
+    named = [(one.name or pascal_case(one.action.value), one) for one in table]
     return tuple(
         MethodNode(
-            f"{target}/{pascal_case(action.value)}",
-            pascal_case(action.value),
-            action,
+            f"{target}/{name}",
+            name,
+            one.action,
             target,
-            description,
-            arguments,
-            results or (OUTCOME,),
+            one.description,
+            one.arguments,
+            one.results or (OUTCOME,),
         )
-        for action, arguments, results, description in table
+        for name, one in named
     )
 
 

@@ -52,7 +52,7 @@ async def test_a_hello_that_takes_no_answer_is_refused() -> None:
     async with serving(application) as url:
         told = await answer(url, b"HELF" + struct.pack("<I", 8 + len(body)) + body)
     assert error_of(told[told.index(b"ERRF") :]) == ua.StatusCodes.BadConnectionRejected
-    assert (application.refused, application.broken) == (1, 0)
+    assert (application.refusals, application.broken) == (1, 0)
 
 
 @pytest.mark.landing

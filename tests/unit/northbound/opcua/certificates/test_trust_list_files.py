@@ -90,6 +90,15 @@ def test_nobody_has_anothers_file(files: TrustListFiles) -> None:
         assert refused(act, "s2", handle, *more, 0.0) == StatusCodes.BadInvalidArgument
 
 
+def test_what_a_session_has_open_is_closed_with_it(files: TrustListFiles) -> None:
+    files.open("s2", READ, b"", 0.0)
+    handle = files.open("s1", WRITE, b"", 0.0)
+    files.leave("s1")
+    assert refused(files.write, "s1", handle, b"x", 0.0) == StatusCodes.BadInvalidArgument
+    assert not files.is_written
+    assert len(files) == 1
+
+
 def test_who_goes_away_blocks_nobody_for_long_and_holds_little(
     files: TrustListFiles, monkeypatch: pytest.MonkeyPatch
 ) -> None:

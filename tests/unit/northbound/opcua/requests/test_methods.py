@@ -8,7 +8,7 @@ import pytest
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 
-from bridge.command.messages.request import Code, Identity, Outcome, Role, Source
+from bridge.command.messages.request import Code, Identity, Outcome, Role, Source, WriteParameter
 from bridge.northbound.opcua.requests.methods import Caller
 from bridge.northbound.opcua.space.nodes import MethodNode, ObjectNode, layout
 from bridge.text import Text
@@ -131,6 +131,17 @@ async def test_the_argument_that_an_outcome_is_about_is_named(rig: Rig) -> None:
     result = await rig.call(f"{DRIVE}/WriteParameter", name, value)
     assert result.StatusCode.value == Codes.BadInvalidArgument
     assert [one.value for one in result.InputArgumentResults] == [Codes.Good, Codes.BadOutOfRange]
+
+
+async def test_a_parameter_is_written_if_it_holds_what_is_expected(rig: Rig) -> None:
+    given = ua.Variant("P102"), ua.Variant(2.0, Kind.Double), ua.Variant(3.0, Kind.Double)
+    result = await rig.call(f"{DRIVE}/WriteParameterIf", *given)
+    assert result.StatusCode.value == Codes.Good
+    (request,) = rig.view.requests
+    assert request.command == WriteParameter("P102", 3.0, expected=2.0)
+    rig.view.outcome = Outcome(Code.OTHER_VALUE)
+    result = await rig.call(f"{DRIVE}/WriteParameterIf", *given)
+    assert [one.value for one in result.InputArgumentResults] == [0, Codes.BadInvalidState, 0]
 
 
 async def test_a_parameter_that_was_read_is_the_result(rig: Rig) -> None:

@@ -91,6 +91,7 @@ def test_drives_and_nodes_have_their_methods(trees: tuple[ObjectNode, ...]) -> N
         "KeepAlive",
         "ReadParameter",
         "WriteParameter",
+        "WriteParameterIf",
         "SaveParameters",
     ]
     node = find(trees, "conveyor").methods

@@ -295,7 +295,7 @@ class TestWhatIsHeld:
         drive = of_two - of_one
         points = [point for point in two.points if point.name.startswith("conveyor/fu2/")]
         bits = [bit for point in points for bit in point.bits if bit]
-        methods = 11
+        methods = 12
         assert drive["VariableNode"] == len(points) + len(bits)
         assert drive["_TreeNode"] == len(points) + len(bits) + drive["ObjectNode"] + methods
         # What the server refers to it with, as to all that sends events.

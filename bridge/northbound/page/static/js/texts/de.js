@@ -223,6 +223,7 @@ export const de = {
   "outcome.unknown_parameter": "diesen Parameter gibt es nicht",
   "outcome.write_only": "er ist nur schreibbar",
   "outcome.busy": "gerade beschäftigt; noch einmal versuchen",
+  "outcome.other_value": "anderer Wert als erwartet",
   "outcome.too_often": "zu oft geschrieben für das EEPROM",
   "outcome.refused_by_drive": "der Antrieb hat abgelehnt",
 

@@ -223,6 +223,7 @@ export const en = {
   "outcome.unknown_parameter": "there is no such parameter",
   "outcome.write_only": "it can only be written",
   "outcome.busy": "it is busy just now; try again",
+  "outcome.other_value": "another value than expected",
   "outcome.too_often": "it is written too often for its EEPROM",
   "outcome.refused_by_drive": "the drive refused it",
 

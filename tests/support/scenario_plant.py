@@ -46,17 +46,17 @@ class Plant:
         self.process.signal(signal.SIGTERM)
 
 
-def nodes_of(bus: int, first_id: int, count: int) -> str:
+def nodes_of(bus: int, first_id: int, count: int, supervision_ms: int = 1000) -> str:
     """A bus with nodes a1, a2 … of four drives each (b1, b2 … on can1), all of them commanded by OPC UA."""
     drives = [
         sites.drive(f"fu{number}", "opcua", 0, f"{sites.ACCEPTED}\n{sites.SCALED}") for number in range(1, 5)
     ]
     names = [f"{chr(ord('a') + bus)}{number}" for number in range(1, count + 1)]
     nodes = [
-        sites.node(*drives, name=name, node_id=first_id + place, more="supervision_ms = 1000")
+        sites.node(*drives, name=name, node_id=first_id + place, more=f"supervision_ms = {supervision_ms}")
         for place, name in enumerate(names)
     ]
-    return sites.bus(*nodes, name=f"can{bus}", more="deadman_ms = 1000")
+    return sites.bus(*nodes, name=f"can{bus}", more="bitrate = 1000000\ndeadman_ms = 1000")
 
 
 def users(folder: Path) -> str:

@@ -22,7 +22,8 @@ from tests.wire.scenarios.steps import Steps
 NODES = [f"a{number}" for number in range(1, 11)]
 DRIVES = [f"{node}/fu{number}" for node in NODES for number in range(1, 5)]
 PLACE = "bus/can0"
-BUS_SETTLED_S = 40.0
+SUPERVISION_MS = 300
+SETTLED_S = 40.0
 """Where this machine was too slow meanwhile, that explains the silence for its first 20 s."""
 CAUSE = {
     "de": "Alle 10 Knoten, die da sein müssten, schweigen: es liegt an dem, was sie gemeinsam haben, und"
@@ -40,7 +41,7 @@ REMEDY = {
 
 
 async def _seen(follower: Follower, plant: Plant, locale: str) -> Mapping[str, Any]:
-    raised = await follower.until(of(PLACE), is_active, seconds=BUS_SETTLED_S)
+    raised = await follower.until(of(PLACE), is_active, seconds=SETTLED_S)
     assert raised["Message"] == ua.LocalizedText(MESSAGE[locale], locale)
     assert raised["Cause"] == ua.LocalizedText(CAUSE[locale], locale)
     assert raised["Remedy"] == ua.LocalizedText(REMEDY[locale], locale)
@@ -52,7 +53,9 @@ async def _seen(follower: Follower, plant: Plant, locale: str) -> Mapping[str, A
 def test_a_bus_that_is_cut_under_forty_drives_is_one_alarm(tmp_path: Path) -> None:
     port, began = free_port(), datetime.now(UTC)
     scenario_plant.lay_out(tmp_path)
-    site = scenario_plant.write_site(tmp_path, port, [scenario_plant.nodes_of(0, 11, len(NODES))])
+    site = scenario_plant.write_site(
+        tmp_path, port, [scenario_plant.nodes_of(0, 11, len(NODES), SUPERVISION_MS)]
+    )
     with scenario_plant.serving(site, port, len(NODES)) as plant:
         told = asyncio.run(_cut_and_mended(plant, _steps(tmp_path, plant)))
     with scenario_plant.serving(site, port, len(NODES)) as plant:
@@ -81,12 +84,16 @@ async def _cut_and_mended(plant: Plant, steps: Steps) -> list[bytes]:
         )
         assert sorted(raised["Explains"]) == sorted([*DRIVES, *NODES])
         session = await Session.of(german)
-        active = [one for one in (*DRIVES, *NODES) if await session.value(f"{one}/Alarm/ActiveState/Id")]
+        places = [f"{one}/Alarm/ActiveState/Id" for one in (*DRIVES, *NODES)]
+        active = [one for one in places if await session.until(one, lambda is_active: not is_active)]
         assert active == [], "one alarm"
         plant.tell("mend_cable", "can0")
-        over = await follower.until(of(PLACE), is_over, seconds=BUS_SETTLED_S)
+        over = await follower.until(of(PLACE), is_over, seconds=SETTLED_S)
         assert over["Message"].Text == f"vorbei: {MESSAGE['de']}"
-        assert not [one for one in follower.events if one["SourceName"] in DRIVES and one["ActiveState/Id"]]
+        # A drive may be missed for a moment before the bus is.
+        since = follower.events[follower.events.index(raised) :]
+        others = [one for one in since if one["SourceName"] in DRIVES and one["ActiveState/Id"]]
+        assert [(one["SourceName"], one["Code"]) for one in others] == []
         return [raised["EventId"], over["EventId"]]
 
 

@@ -112,12 +112,13 @@ class CauseRule:
 
 
 _UNHEARD: Final = frozenset(("drive_lost", "drive_stale", "drive_not_as_configured"))
-_SILENT_NODE: Final = frozenset(("node_lost", "node_absent", "node_booting", *_UNHEARD))
+SILENT_NODE: Final = frozenset(("node_lost", "node_absent", "node_booting", *_UNHEARD))
+"""Kinds of troubles that a silent node or bus explains, which may be found out later than they."""
 _NOTICED_MS: Final = 5000.0
 """The longest time between two notices of one break: nodes are missed by their own supervision times."""
 _BACK_MS: Final = 60_000.0
 """Longest time in ms for nodes to boot and to report their faults when their bus is back."""
-_OF_BUS: Final = frozenset(("bus_silent", "bus_errors", "held", *_SILENT_NODE))
+_OF_BUS: Final = frozenset(("bus_silent", "bus_errors", "held", *SILENT_NODE))
 _LEFT: Final = frozenset((BUS_FAULT,))
 _OF_CONTROLLER: Final = frozenset(("controller_silent", "controllers_silent"))
 

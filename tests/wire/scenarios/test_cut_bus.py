@@ -74,6 +74,7 @@ async def _cut_and_mended(plant: Plant, steps: Steps) -> list[bytes]:
         following(german) as follower,
         following(english) as other,
     ):
+        before = len(follower.events)
         plant.tell("cut_cable", "can0")
         raised = await _seen(follower, plant, "de")
         await _seen(other, plant, "en")
@@ -90,9 +91,9 @@ async def _cut_and_mended(plant: Plant, steps: Steps) -> list[bytes]:
         plant.tell("mend_cable", "can0")
         over = await follower.until(of(PLACE), is_over, seconds=SETTLED_S)
         assert over["Message"].Text == f"vorbei: {MESSAGE['de']}"
-        # A drive may be missed for a moment before the bus is.
-        since = follower.events[follower.events.index(raised) :]
-        others = [one for one in since if one["SourceName"] in DRIVES and one["ActiveState/Id"]]
+        others = [
+            one for one in follower.events[before:] if one["SourceName"] in DRIVES and one["ActiveState/Id"]
+        ]
         assert [(one["SourceName"], one["Code"]) for one in others] == []
         return [raised["EventId"], over["EventId"]]
 

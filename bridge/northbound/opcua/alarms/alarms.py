@@ -18,6 +18,7 @@ import msgspec
 
 from bridge.base.guard import Guard
 from bridge.base.publishing_clock import next_publish
+from bridge.condition.causes import SILENT_NODE
 from bridge.condition.told import MOST
 from bridge.northbound.opcua.alarms.alarm_contents import AlarmContents
 from bridge.northbound.opcua.alarms.alarm_file import AlarmFile, is_worth_keeping, kept_alarm, state_of
@@ -33,6 +34,9 @@ so although nothing is told of it yet."""
 _LONGEST_SETTLE_S: Final = 120.0
 _UPDATE_S: Final = 1.0
 """Least time between two events of an alarm that only says something else."""
+_CAUSE_MS: Final = 2000.0
+"""Age in ms at which what is not heard is told: by then it is known whether its node or its bus is silent,
+which explains it. Process data are missed before a node is."""
 _SAVE_AFTER_S: Final = 2.0
 _SAVE_AFTER_CALL_S: Final = 0.1
 _LONG_AGO: Final = -1e9
@@ -201,6 +205,9 @@ class Alarms:
     def _raise(self, alarm: Alarm, trouble: Trouble) -> None:
         name, now = alarm.place.id, self._clock()
         before = self._speaking.get(name)
+        if before is None and self._may_have_a_cause(trouble):
+            self._pending = True
+            return
         is_same = before is not None and before.is_for(trouble)
         if before is not None and is_same:
             if before.trouble == trouble and not before.is_restored:
@@ -211,6 +218,9 @@ class Alarms:
         self._speaking[name] = _Speaking(trouble, now, is_restored=False)
         content = self._contents.of(trouble, alarm.place)
         self._conditions.raised(alarm.condition, content, anew=not is_same)
+
+    def _may_have_a_cause(self, trouble: Trouble) -> bool:
+        return trouble["kind"] in SILENT_NODE and self._now_ms() - trouble["since"] < _CAUSE_MS
 
     def _clear(self, name: str) -> None:
         if self._speaking[name].is_restored and not self._is_settled:

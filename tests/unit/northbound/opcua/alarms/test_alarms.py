@@ -159,6 +159,25 @@ def test_a_cut_bus_under_forty_drives_is_one_alarm_and_gone_when_it_is_back(benc
     assert bench.told() == [(BUS, False)]
 
 
+def test_drives_that_are_missed_before_their_bus_raise_no_alarm(bench: Bench) -> None:
+    """Deadlines of process data run out before nodes are supervised."""
+    for drive in DRIVES:
+        bench.plant.set(f"{drive}/status/state", 0, Quality.LOST)
+    bench.later(1.0)
+    assert bench.told() == []
+    bench.nodes_go(LOST)
+    bench.later()
+    assert bench.told() == [(BUS, True)]
+
+
+def test_a_drive_alone_that_is_not_heard_is_an_alarm_soon_after(bench: Bench) -> None:
+    bench.plant.set("n1/fu1/status/state", 0, Quality.LOST)
+    bench.later(1.0)
+    assert bench.told() == []
+    bench.later(2.0)
+    assert bench.told() == [("n1/fu1/Alarm", True)]
+
+
 def test_independent_troubles_are_alarms_of_their_own(bench: Bench) -> None:
     for node in ("n3", "n7"):
         bench.plant.set(f"{node}/node/state", LOST)

@@ -308,7 +308,13 @@ async def test_each_place_has_its_alarm_and_the_server_hears_of_all(served: Serv
     """And the certificate, which this server has made for years."""
     places = ["bus/can0", "n4", "bridge", *(one for one in many_drives() if one.startswith("n4/"))]
     async with followed(served) as follower:
-        tell(view, *(trouble("node_lost", place, since=time.time_ns(), how="heartbeat") for place in places))
+        tell(
+            view,
+            *(
+                trouble("node_lost", place, since=time.time_ns() // 1_000_000, how="heartbeat")
+                for place in places
+            ),
+        )
         for place in places:
             await follower.until(of(place), is_active)
         expires = ua.NodeId("bridge/CertificateAlarm/ExpirationDate", follower.space)

@@ -34,9 +34,9 @@ so although nothing is told of it yet."""
 _LONGEST_SETTLE_S: Final = 120.0
 _UPDATE_S: Final = 1.0
 """Least time between two events of an alarm that only says something else."""
-_CAUSE_MS: Final = 2000.0
-"""Age in ms at which what is not heard is told: by then it is known whether its node or its bus is silent,
-which explains it. Process data are missed before a node is."""
+_CAUSE_S: Final = 2.0
+"""Age in seconds at which what is not heard is told: by then it is known whether its node or its bus is
+silent, which explains it. Process data are missed before a node is."""
 _SAVE_AFTER_S: Final = 2.0
 _SAVE_AFTER_CALL_S: Final = 0.1
 _LONG_AGO: Final = -1e9
@@ -104,6 +104,8 @@ class Alarms:
         self._expires = expires
         self._check_at = clock()
         self._speaking: dict[str, _Speaking] = {}
+        self._unheard: dict[str, float] = {}
+        """Times since which places are not heard, by their alarms' ids."""
         self._pending = True
         self._settling_since = clock()
         self._was_dead = False
@@ -175,6 +177,7 @@ class Alarms:
         for trouble in shown:
             for alarm, told in self._targets(trouble):
                 worst.setdefault(alarm.place.id, (alarm, told))
+        self._unheard = {name: since for name, since in self._unheard.items() if name in worst}
         for alarm, trouble in worst.values():
             self._raise(alarm, trouble)
         # Of the rest nothing is known while the bus process does not answer, or tells only the worst.
@@ -205,7 +208,7 @@ class Alarms:
     def _raise(self, alarm: Alarm, trouble: Trouble) -> None:
         name, now = alarm.place.id, self._clock()
         before = self._speaking.get(name)
-        if before is None and self._may_have_a_cause(trouble):
+        if before is None and self._may_have_a_cause(name, trouble):
             self._pending = True
             return
         is_same = before is not None and before.is_for(trouble)
@@ -219,8 +222,11 @@ class Alarms:
         content = self._contents.of(trouble, alarm.place)
         self._conditions.raised(alarm.condition, content, anew=not is_same)
 
-    def _may_have_a_cause(self, trouble: Trouble) -> bool:
-        return trouble["kind"] in SILENT_NODE and self._now_ms() - trouble["since"] < _CAUSE_MS
+    def _may_have_a_cause(self, name: str, trouble: Trouble) -> bool:
+        if trouble["kind"] not in SILENT_NODE:
+            return False
+        now = self._clock()
+        return now - self._unheard.setdefault(name, now) < _CAUSE_S
 
     def _clear(self, name: str) -> None:
         if self._speaking[name].is_restored and not self._is_settled:

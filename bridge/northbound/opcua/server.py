@@ -6,11 +6,12 @@ import asyncio
 import gc
 import logging
 import socket
-from collections.abc import Mapping
+from collections.abc import Coroutine, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+from asyncua.server.address_space import AddressSpace
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 import bridge
@@ -40,13 +41,13 @@ from bridge.northbound.opcua.history.plant_history import PlantHistory
 from bridge.northbound.opcua.history.value_rings import ValueRings
 from bridge.northbound.opcua.models.assets import read_models
 from bridge.northbound.opcua.models.nameplates import Nameplate
-from bridge.northbound.opcua.models.site_space import NAMESPACE, fill
+from bridge.northbound.opcua.models.site_space import NAMESPACE, SiteSpace, fill
 from bridge.northbound.opcua.requests.methods import Caller
 from bridge.northbound.opcua.requests.outcome_texts import spoken
 from bridge.northbound.opcua.requests.read_through import ReadThrough
 from bridge.northbound.opcua.requests.writes import Writer
 from bridge.northbound.opcua.service_level import ServiceLevel
-from bridge.northbound.opcua.space.nodes import layout
+from bridge.northbound.opcua.space.nodes import ObjectNode, layout
 from bridge.northbound.opcua.space.notifiers import Notifiers
 from bridge.northbound.pulse import Pulse
 from bridge.northbound.view import View
@@ -66,6 +67,8 @@ _KEPT: Final = "opcua"
 """Folder in ``state_dir`` of what is kept of alarms and of the past."""
 
 _log = logging.getLogger(__name__)
+
+_Running = Coroutine[Any, Any, None]
 
 
 class OpcUaServer:
@@ -216,32 +219,13 @@ class OpcUaServer:
     ) -> None:
         quieten()
         decoding.install()
-        inner = InnerServer(no_security=self._settings.no_security)
-        inner.locales = LANGUAGES
-        inner.addresses = OwnAddresses(
-            names_of(self._settings.listen, self._settings.names), self._settings.endpoints
-        )
-        inner.certificate, inner.private_key = own.certificate, own.private_key
+        inner = self._inner_server(own)
         server = BoundServer(inner, bound, trusted)
         await self._describe(server, own.application_uri, users)
-        models = await asyncio.to_thread(read_models)
-        # The points' comes first, as it always has.
-        uris = [NAMESPACE, *models.namespaces]
-        indexes = {uri: await server.register_namespace(uri) for uri in uris}
         image, epoch_ns = self._view.image, self._view.epoch_ns
         kept = self._settings.history
         rings = ValueRings(image, epoch_ns, kept)
-        site = fill(
-            inner.aspace,
-            models,
-            indexes,
-            image,
-            epoch_ns,
-            layout(image.points, rings.rings, kept.black_boxes),
-            self._nameplates,
-            keeps_events=kept.event_hours > 0,
-            with_draft=self._settings.powertrain_draft,
-        )
+        site = await self._fill(server, inner.aspace, layout(image.points, rings.rings, kept.black_boxes))
         tree = site.tree
         notifiers = Notifiers(tree.notifiers)
         keeper = self._keeper(EventCodec(await server.get_namespace_array()), notifiers)
@@ -284,14 +268,45 @@ class OpcUaServer:
         self._server, self._inner = server, inner
         await server.start()
         publisher = Publisher(image, tree.watched, events, past, ServiceLevel(image, inner.status))
-        self._publisher = asyncio.create_task(publisher.run(), name="opcua publisher")
         watch = RenewalWatch(self._settings, self._folder, own.application_uri)
-        self._renewals = asyncio.create_task(watch.run(take_up), name="opcua renewals")
-        self._follower = asyncio.create_task(alarms.run(), name="opcua alarms")
+        self._begin(publisher.run(), watch.run(take_up), alarms.run())
         if self._settings.discovery_server:
             self._register(self._settings.discovery_server, own, server.name)
         # What is there now lives as long as the process: no collection need look at it again.
         gc.freeze()
+
+    async def _fill(self, server: BoundServer, space: AddressSpace, trees: Sequence[ObjectNode]) -> SiteSpace:
+        """Fill ``space`` with the models and with ``trees``."""
+        models = await asyncio.to_thread(read_models)
+        # The points' comes first, as it always has.
+        uris = [NAMESPACE, *models.namespaces]
+        indexes = {uri: await server.register_namespace(uri) for uri in uris}
+        return fill(
+            space,
+            models,
+            indexes,
+            self._view.image,
+            self._view.epoch_ns,
+            trees,
+            self._nameplates,
+            keeps_events=self._settings.history.event_hours > 0,
+            with_draft=self._settings.powertrain_draft,
+        )
+
+    def _inner_server(self, own: ServerIdentity) -> InnerServer:
+        inner = InnerServer(no_security=self._settings.no_security)
+        inner.locales = LANGUAGES
+        inner.addresses = OwnAddresses(
+            names_of(self._settings.listen, self._settings.names), self._settings.endpoints
+        )
+        inner.certificate, inner.private_key = own.certificate, own.private_key
+        return inner
+
+    def _begin(self, publishing: _Running, renewing: _Running, following: _Running) -> None:
+        """Begin what runs beside the clients' requests."""
+        self._publisher = asyncio.create_task(publishing, name="opcua publisher")
+        self._renewals = asyncio.create_task(renewing, name="opcua renewals")
+        self._follower = asyncio.create_task(following, name="opcua alarms")
 
     @property
     def _own_files(self) -> Path | None:

@@ -28,8 +28,10 @@ from bridge.uaserver.library import InvalidSignature, StatusCodes, UaError, UaSt
 from bridge.uaserver.loop import Stint
 
 MOST_ELEMENTS: Final = 30_000
-"""Limit for the elements of all arrays in one message that are decoded one by one, while nobody else has a
-turn; a thousand take about 10 ms. Ten thousand operations with arrays of two fit in."""
+"""Limit for the elements of all arrays in one message that are decoded one by one. Ten thousand operations
+with arrays of two fit in."""
+MOST_AT_ONCE: Final = 3_000
+"""Limit for those that are decoded while nobody else has a turn; a thousand take about 10 ms."""
 MOST_BEFORE_SESSION: Final = 1_000
 """Limit for the messages that open a session, which name a few."""
 
@@ -55,9 +57,17 @@ _Decode = Callable[[Any], Any]
 
 @dataclass(slots=True)
 class _Budget:
-    """Number of array elements that may still be decoded."""
+    """Number of array elements that may still be decoded: of the message, and before others have a turn."""
 
     left: int
+    at_once: int
+
+    def take(self, elements: int, *, in_turns: bool = False) -> None:
+        """Raises UaStatusCodeError where there are not so many."""
+        self.left -= elements
+        self.at_once -= 0 if in_turns else elements
+        if self.left < 0 or self.at_once < 0:
+            raise UaStatusCodeError(StatusCodes.BadEncodingLimitsExceeded)
 
 
 _budget: ContextVar[_Budget | None] = ContextVar("decoding_budget", default=None)
@@ -66,7 +76,7 @@ _budget: ContextVar[_Budget | None] = ContextVar("decoding_budget", default=None
 
 def begin(most: int) -> None:
     """A message begins: from here on this task decodes no more than ``most`` elements of arrays."""
-    _budget.set(_Budget(most))
+    _budget.set(_Budget(most, MOST_AT_ONCE))
 
 
 def install() -> None:
@@ -97,9 +107,17 @@ async def decoded(kind: type[Any], arrays: Sequence[str], data: Buffer) -> Any:
         elements = fields_[name] = list[Any]()
         (element,) = get_args(hint)
         for _ in range(_length(data)):
+            _begin_turn()
             elements.append(_part(element, kind, data))
             await stint.pause()
+        _begin_turn()
     return kind(**fields_)
+
+
+def _begin_turn() -> None:
+    budget = _budget.get()
+    if budget:
+        budget.at_once = MOST_AT_ONCE
 
 
 @functools.cache
@@ -112,15 +130,14 @@ def _part(hint: Any, kind: type[Any], data: Buffer) -> Any:
 
 
 def _length(data: Buffer) -> int:
-    """Length of an array, which is no longer than what is left of the message, and of the budget."""
+    """Length of an array that is decoded in turns: no longer than what is left of the message, and of the
+    budget."""
     (length,) = _LENGTH.unpack(data.read(_LENGTH.size))
     if length < -1 or length > len(data):
         raise NotEnoughData(f"an array of {length} elements in {len(data)} bytes")
     budget = _budget.get()
     if budget and length > 0:
-        budget.left -= length
-        if budget.left < 0:
-            raise UaStatusCodeError(StatusCodes.BadEncodingLimitsExceeded)
+        budget.take(length, in_turns=True)
     return length
 
 
@@ -179,9 +196,7 @@ def _bounded(make: Callable[[Any], _Decode]) -> Callable[[Any], _Decode]:
                 raise NotEnoughData(f"an array of {length} elements in {len(data) - _LENGTH.size} bytes")
             budget = _budget.get()
             if budget and not is_quick and length > 0:
-                budget.left -= length
-                if budget.left < 0:
-                    raise UaStatusCodeError(StatusCodes.BadEncodingLimitsExceeded)
+                budget.take(length)
             # A null array is an empty one to every service; asyncua has None for it.
             return decode(data) or []
 

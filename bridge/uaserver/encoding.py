@@ -49,11 +49,13 @@ class Results:
 
 
 def encode(response: Any) -> bytes:
-    """A response. One with ``Results`` has nothing behind them but its DiagnosticInfos."""
-    results = getattr(response, "Results", None)
+    """A response. One with ``Results``, its own or its parameters', has nothing behind them but its
+    DiagnosticInfos."""
+    holder = getattr(response, "Parameters", response)
+    results = getattr(holder, "Results", None)
     if not isinstance(results, Results):
         return struct_to_binary(response)
-    infos, response.Results, response.DiagnosticInfos = response.DiagnosticInfos, [], []
+    infos, holder.Results, holder.DiagnosticInfos = holder.DiagnosticInfos, [], []
     head = struct_to_binary(response)[: -2 * _LENGTH.size]
     told = (_LENGTH.pack(len(infos)), *map(struct_to_binary, infos))
     return b"".join((head, _LENGTH.pack(results.count), results.encoded, *told))

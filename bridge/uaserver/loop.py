@@ -15,12 +15,13 @@ class Stint:
     def __init__(self) -> None:
         self._ends_at = time.perf_counter() + _TURN_S
 
-    async def pause(self) -> None:
-        """Let others have their turn where this one is over."""
+    async def pause(self) -> bool:
+        """Let others have their turn where this one is over; whether they had it."""
         if time.perf_counter() < self._ends_at:
-            return
+            return False
         await asyncio.sleep(0)
         self._ends_at = time.perf_counter() + _TURN_S
+        return True
 
 
 def loop_time() -> float:

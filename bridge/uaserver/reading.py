@@ -20,6 +20,7 @@ from bridge.uaserver.library import (
 
 _SOURCE: Final = (ua.TimestampsToReturn.Source, ua.TimestampsToReturn.Both)
 _SERVER: Final = (ua.TimestampsToReturn.Server, ua.TimestampsToReturn.Both)
+_BOOLEANS: Final = (False, True)
 _NO_DATA: Final = status(StatusCodes.BadIndexRangeNoData)
 _NOTHING: Final = variant(None, ua.VariantType.Null)
 
@@ -49,15 +50,23 @@ class Window:
         return data_value(value.Value, value.StatusCode, source, server)
 
 
+_WHOLE: Final = {(source, server): Window((), source, server) for source in _BOOLEANS for server in _BOOLEANS}
+
+
 def window(wanted: ua.ReadValueId, times: ua.TimestampsToReturn) -> Window:
     """Raises ServiceError for a range that is none."""
     try:
         found = ranges.parse(get(wanted, "IndexRange"))
     except ValueError:
         raise ServiceError(StatusCodes.BadIndexRangeInvalid) from None
+    return window_of(found, get(wanted, "AttributeId"), times)
+
+
+def window_of(found: ranges.Ranges, attribute: AttributeIds, times: ua.TimestampsToReturn) -> Window:
     # Part 4 §7.11: only values have a source time.
-    source = times in _SOURCE and get(wanted, "AttributeId") == AttributeIds.Value
-    return Window(found, source, times in _SERVER)
+    source = times in _SOURCE and attribute == AttributeIds.Value
+    server = times in _SERVER
+    return Window(found, source, server) if found else _WHOLE[source, server]
 
 
 def checked_times(params: object) -> ua.TimestampsToReturn:

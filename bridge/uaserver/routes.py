@@ -102,7 +102,7 @@ class Route:
         response = get(ua, f"{self.name}Response")()
         if self.answer:
             *above, field = self.answer.split(".")
-            if self.answer == "Results" and self.explain is None and not isinstance(result, Results):
+            if field == "Results" and self.explain is None and not isinstance(result, Results):
                 result = await _encoded(session, result)
             change(get(response, above[0]) if above else response, **{field: result})
         if explained:
@@ -166,8 +166,6 @@ def _cancel(session: Session, params: Any) -> ua.CancelResult:
 
 def _publish(session: Session, params: ua.PublishParameters, request: ServiceRequest) -> None:
     acknowledged: list[ua.SubscriptionAcknowledgement] = get(params, "SubscriptionAcknowledgements") or []
-    if len(acknowledged) > MOST_OPERATIONS:
-        raise ServiceError(StatusCodes.BadTooManyOperations)
 
     def answer(result: ua.PublishResult) -> None:
         try:

@@ -34,6 +34,7 @@ from bridge.uaserver.diagnostics.diagnosticnodes import DiagnosticNodes
 from bridge.uaserver.diagnostics.diagnostics import SessionFacts
 from bridge.uaserver.encoding import Results
 from bridge.uaserver.explanations import Explain, Explanation
+from bridge.uaserver.garbage import GarbageCollector
 from bridge.uaserver.history.historyread import HistoryReader
 from bridge.uaserver.library import (
     AttributeIds,
@@ -50,7 +51,7 @@ from bridge.uaserver.library import (
 from bridge.uaserver.loop import loop_time
 from bridge.uaserver.own_addresses import OwnAddresses
 from bridge.uaserver.reading import checked_times, window
-from bridge.uaserver.servermethods import call_server, is_of_server
+from bridge.uaserver.servermethods import SERVER_METHODS, ServerCalls
 from bridge.uaserver.serverstatus import ServerStatus
 from bridge.uaserver.subscriptions.publishing import PublishQueue
 from bridge.uaserver.subscriptions.quotas import make_room
@@ -235,20 +236,18 @@ class Session(InternalSession):
             looked_at = window(wanted, times)
         except ServiceError as error:
             return data_value(_NOTHING, status(int(error.code)))
-        value = self.aspace.read_attribute_value(get(wanted, "NodeId"), get(wanted, "AttributeId"))
-        return looked_at.timed(looked_at.part(self.seen(wanted, value)))
+        where, attribute = get(wanted, "NodeId"), get(wanted, "AttributeId")
+        value = self.aspace.read_attribute_value(where, attribute)
+        return looked_at.timed(looked_at.part(self.seen(where, attribute, value)))
 
-    def looks_alike(self, wanted: ua.ReadValueId) -> bool:
+    def looks_alike(self, where: ua.NodeId, attribute: AttributeIds) -> bool:
         """Whether everybody sees the same of it: its values as they are."""
-        attribute = get(wanted, "AttributeId")
         if attribute == AttributeIds.Value:
-            where = get(wanted, "NodeId")
             return self._is_readable(where) and not self._server.diagnostics.is_about_someone(where)
         return attribute not in _BY_USER
 
-    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
+    def seen(self, where: ua.NodeId, attribute: AttributeIds, value: ua.DataValue) -> ua.DataValue:
         """``value`` as this user may see it."""
-        where, attribute = get(wanted, "NodeId"), get(wanted, "AttributeId")
         if attribute == AttributeIds.Value:
             if self._is_hidden(where):
                 return _NOT_FOR_HIM
@@ -280,12 +279,17 @@ class Session(InternalSession):
     ) -> list[ua.CallMethodResult]:
         """One result for each of ``calls``, in their order: methods of conditions and of the Server object
         are this server's own, all others the application's."""
-        conditions = self._server.conditions
+        conditions, turns = self._server.conditions, asyncio.Lock()
+        own_calls = ServerCalls(self.subscriptions, self)
 
         async def call_one(place: int, one: ua.CallMethodRequest) -> ua.CallMethodResult:
-            if is_of_server(one):
-                return call_server(self.subscriptions, self, one)
-            if conditions is not None and get(one, "MethodId") in METHODS:
+            method = get(one, "MethodId")
+            if method in SERVER_METHODS or (conditions is not None and method in METHODS):
+                async with turns:  # one each time that the loop goes round: they do their work at once
+                    await asyncio.sleep(0)
+            if method in SERVER_METHODS:
+                return own_calls.call(one)
+            if conditions is not None and method in METHODS:
                 return await conditions.call(self, one)
             (result,) = await self.application.call(self.identity, [one], lambda _, why: explain(place, why))
             return result
@@ -293,7 +297,7 @@ class Session(InternalSession):
         return list(await asyncio.gather(*(call_one(place, one) for place, one in enumerate(calls))))
 
     async def subscribe(self, params: ua.CreateSubscriptionParameters) -> ua.CreateSubscriptionResult:
-        self.subscriptions.drop_left_behind()
+        await self.subscriptions.drop_left_behind()
         await make_room(self, self._server.sessions, self.subscriptions.subscriptions)
         return self.subscriptions.create(self, params)
 
@@ -322,8 +326,9 @@ class Session(InternalSession):
             return
         self._tell(is_there=False)
         self.publishing.close(loop_time())
-        self.subscriptions.end(self, delete=delete_subs)
         await super().close_session(delete_subs=False)
+        self._server.garbage.note_end()
+        await self.subscriptions.end(self, delete=delete_subs)
 
 
 def _granted(value: ua.DataValue, roles: Sequence[ua.NodeId]) -> ua.DataValue:
@@ -363,6 +368,7 @@ class InnerServer(InternalServer):
         # asyncua only looks through it for the subscriptions of a session.
         self.subscription_service = cast("SubscriptionService", self.subscriptions)
         self.diagnostics = DiagnosticNodes(self.aspace, self)
+        self.garbage = GarbageCollector()
 
     @property
     def counts(self) -> ServerCounts:
@@ -409,6 +415,7 @@ class InnerServer(InternalServer):
         return [one for one in self._external_sessions.values() if isinstance(one, Session)]
 
     async def stop(self) -> None:
+        self.garbage.end()
         # asyncua waits for its clock's next tick, up to a second.
         task, self.time_task = self.time_task, None
         if task:

@@ -39,10 +39,10 @@ class Session:
     publishing: PublishQueue = field(default_factory=PublishQueue)
     is_gone: bool = False
 
-    def looks_alike(self, wanted: ua.ReadValueId) -> bool:
+    def looks_alike(self, where: ua.NodeId, attribute: ua.AttributeIds) -> bool:
         return True
 
-    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
+    def seen(self, where: ua.NodeId, attribute: ua.AttributeIds, value: ua.DataValue) -> ua.DataValue:
         return value
 
 

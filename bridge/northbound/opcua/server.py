@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import logging
 import socket
 from collections.abc import Coroutine, Mapping, Sequence
@@ -272,8 +271,7 @@ class OpcUaServer:
         self._begin(publisher.run(), watch.run(take_up), alarms.run())
         if self._settings.discovery_server:
             self._register(self._settings.discovery_server, own, server.name)
-        # What is there now lives as long as the process: no collection need look at it again.
-        gc.freeze()
+        inner.garbage.begin()
 
     async def _fill(self, server: BoundServer, space: AddressSpace, trees: Sequence[ObjectNode]) -> SiteSpace:
         """Fill ``space`` with the models and with ``trees``."""

@@ -50,6 +50,9 @@ class ChangeFilter:
         return last.Value != now.Value and not (_is_nan(before) and _is_nan(after))
 
 
+EVERY_CHANGE: Final = ChangeFilter()
+
+
 def _is_beyond(deadband: float, before: list[object], after: list[object]) -> bool:
     """Whether an element has changed by more; one alone is enough (Part 8 §7.2)."""
     if len(before) != len(after):
@@ -83,7 +86,7 @@ def is_none(asked: object) -> bool:
 def change_filter(asked: object, space: AddressSpace, node: NodeData, attribute: int) -> ChangeFilter:
     """``asked`` for this attribute of ``node``. Raises ServiceError for a filter that it cannot have."""
     if is_none(asked):
-        return ChangeFilter()
+        return EVERY_CHANGE
     if isinstance(asked, ua.EventFilter):
         raise ServiceError(StatusCodes.BadFilterNotAllowed)
     if not isinstance(asked, DataChangeFilter):

@@ -1,6 +1,7 @@
 """Monitored items: what is sampled, what of it is reported, and the queue of each (OPC 10000-4 §5.13.1).
 
-They are told what has changed and when, and keep no time themselves.
+They are told what has changed and when, and keep no time themselves. There are tens of thousands of them,
+each of as few objects as can be: a collection of garbage looks at every one.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from bridge.uaserver.filters.changefilter import ChangeFilter
 from bridge.uaserver.filters.eventfilter import EventFilter, Occurrence
 from bridge.uaserver.filters.where import Fields
 from bridge.uaserver.library import (
+    AttributeIds,
     ObjectIds,
     data_value,
     get,
@@ -80,18 +82,20 @@ def event_settings(asked: ua.MonitoringParameters) -> ItemSettings:
 
 @dataclass(slots=True, eq=False)
 class ValueItem:
-    """Watches one attribute of ``target``. ``share`` is what it is counted as, ``handle`` that of asyncua's
-    callback for changes."""
+    """Watches one ``attribute`` of ``node``. ``source`` is whom it is counted for, ``handle`` that of
+    asyncua's callback for changes."""
 
     number: int
-    target: ua.ReadValueId
+    node: ua.NodeId
+    attribute: AttributeIds
     window: Window
     settings: ItemSettings
     filter: ChangeFilter
     mode: ua.MonitoringMode
-    share: Hashable = None
+    source: str = ""
     handle: int = 0
-    queue: deque[ua.DataValue] = field(default_factory=deque["ua.DataValue"])
+    queue: list[ua.DataValue] | None = None
+    """None where it would be empty."""
     _last: ua.DataValue | None = None
     _held: ua.DataValue | None = None
     _due: float = -math.inf
@@ -101,13 +105,18 @@ class ValueItem:
     """Number of values that a full queue has lost and nobody has counted yet."""
 
     @property
+    def share(self) -> Hashable:
+        """What it is counted as."""
+        return self.source, self.node, self.attribute
+
+    @property
     def has_something(self) -> bool:
-        return bool(self.queue)
+        return self.queue is not None
 
     @property
     def has_report(self) -> bool:
         """Whether the next in the queue is to be told."""
-        return self._released > 0 or (self.mode == Monitoring.Reporting and self.has_something)
+        return self._released > 0 or (self.mode == Monitoring.Reporting and self.queue is not None)
 
     @property
     def is_holding(self) -> bool:
@@ -143,60 +152,67 @@ class ValueItem:
         return True
 
     def _append(self, value: ua.DataValue) -> None:
-        size = self.settings.queue_size
-        if len(self.queue) < size:
-            self.queue.append(value)
+        queue, size = self.queue, self.settings.queue_size
+        if queue is None:
+            self.queue = [value]
+            return
+        if len(queue) < size:
+            queue.append(value)
             return
         # With a queue of one, what is replaced is not lost (Part 4 §5.13.1.5).
         self.lost += size > 1
         if size == 1:
-            self.queue[0] = value
+            queue[0] = value
         elif self.settings.discard_oldest:
-            self._pop()
-            self.queue.append(value)
-            self.queue[0] = _overflown(self.queue[0])
+            self._pop(queue)
+            queue.append(value)
+            queue[0] = _overflown(queue[0])
         else:
-            self.queue[-1] = _overflown(value)
+            queue[-1] = _overflown(value)
 
-    def _pop(self) -> ua.DataValue:
+    def _pop(self, queue: list[ua.DataValue]) -> ua.DataValue:
         self._released = max(0, self._released - 1)
-        return self.queue.popleft()
+        return queue.pop(0)
 
     def release(self) -> None:
         """A triggering item has triggered: what is queued is told once."""
         if self.mode == Monitoring.Sampling:
-            self._released = len(self.queue)
+            self._released = len(self.queue or ())
 
     def repeat(self) -> None:
         """Have something to tell: what is queued, or what was told last."""
-        if not self.queue and self._last is not None and self.mode != Monitoring.Disabled:
-            self.queue.append(self._last)
+        if self.queue is None and self._last is not None and self.mode != Monitoring.Disabled:
+            self.queue = [self._last]
 
     def set_mode(self, mode: ua.MonitoringMode) -> None:
         if Monitoring.Disabled in (mode, self.mode):
-            self.queue.clear()
-            self._last = self._held = None
+            self.queue = self._last = self._held = None
             self._due = -math.inf
         self._released = 0
         self.mode = mode
 
     def modify(self, settings: ItemSettings, filter_: ChangeFilter, window: Window) -> None:
-        lost = len(self.queue) - settings.queue_size
+        queue = self.queue or []
+        lost = len(queue) - settings.queue_size
         self.settings, self.filter, self.window = settings, filter_, window
         self._due = -math.inf
         if lost <= 0:
             return
-        kept = list(self.queue)[lost:] if settings.discard_oldest else list(self.queue)[:-lost]
+        kept = queue[lost:] if settings.discard_oldest else queue[:-lost]
         if len(kept) > 1:
             place = 0 if settings.discard_oldest else -1
             kept[place] = _overflown(kept[place])
-        self.queue = deque(kept)
+        self.queue = kept
         gone = lost if settings.discard_oldest else 0
         self._released = min(max(0, self._released - gone), len(kept))
 
     def take(self) -> ua.DataValue:
-        """The next in the queue, which is taken off it."""
-        return self.window.timed(self._pop())
+        """The next in the queue, which is taken off it. Raises IndexError where there is none."""
+        queue = self.queue or []
+        value = self._pop(queue)
+        if not queue:
+            self.queue = None
+        return self.window.timed(value)
 
 
 def _overflown(value: ua.DataValue) -> ua.DataValue:

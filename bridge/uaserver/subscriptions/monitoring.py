@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections import Counter
 from collections.abc import Awaitable, Callable, Hashable, Sequence
 from contextlib import suppress
@@ -28,7 +27,7 @@ from bridge.uaserver.library import (
     ua,
 )
 from bridge.uaserver.loop import Stint, loop_time
-from bridge.uaserver.reading import checked_times, window
+from bridge.uaserver.reading import checked_times, window, window_of
 from bridge.uaserver.subscriptions.items import (
     EventItem,
     Item,
@@ -40,7 +39,6 @@ from bridge.uaserver.subscriptions.items import (
 from bridge.uaserver.subscriptions.quotas import MOST_ON_ONE, EventItemQuota
 from bridge.uaserver.subscriptions.subscription import Subscription
 
-_BATCH: Final = 50
 _SUBSCRIBE_TO_EVENTS: Final = 1
 
 _T = TypeVar("_T")
@@ -72,10 +70,9 @@ class MonitoredItems:
         subscription; ServiceError where that has been deleted meanwhile."""
         times = checked_times(params)
         found, left = find(), room()
-        results: list[ua.MonitoredItemCreateResult] = []
-        for place, wanted in enumerate(get(params, "ItemsToCreate")):
-            if place and place % _BATCH == 0:
-                await asyncio.sleep(0)
+        stint, results = Stint(), list[ua.MonitoredItemCreateResult]()
+        for wanted in get(params, "ItemsToCreate"):
+            if await stint.pause():
                 found, left = find(), room()
             result = self._create(found, wanted, times, left)
             while _is_too_many(result) and await make_room():
@@ -137,8 +134,8 @@ class MonitoredItems:
         target: ua.ReadValueId = get(wanted, "ItemToMonitor")
         asked: ua.MonitoringParameters = get(wanted, "RequestedParameters")
         attribute: AttributeIds = get(target, "AttributeId")
-        share = source_of(subscription.owner.address), node.nodeid, attribute
-        if self._watching[share] >= MOST_ON_ONE:
+        source = source_of(subscription.owner.address)
+        if self._watching[source, node.nodeid, attribute] >= MOST_ON_ONE:
             raise ServiceError(StatusCodes.BadTooManyMonitoredItems)
         looked_at = window(target, times)
         if looked_at.ranges:
@@ -147,24 +144,24 @@ class MonitoredItems:
                 raise ServiceError(StatusCodes.BadIndexRangeNoData)
         return ValueItem(
             next(self._numbers),
-            target,
+            node.nodeid,
+            attribute,
             looked_at,
             value_settings(asked, subscription.terms.interval_ms),
             change_filter(get(asked, "Filter"), self._space, node, attribute),
             get(wanted, "MonitoringMode"),
-            share,
+            source,
         )
 
     def _watch(self, subscription: Subscription, item: ValueItem) -> None:
         """Have the item told of every change, and of what there is now."""
-        where = get(item.target, "NodeId"), get(item.target, "AttributeId")
         watcher = _ItemWatcher(subscription, item)
-        _, item.handle = get(self._space, "add_datachange_callback")(*where, watcher)
+        _, item.handle = get(self._space, "add_datachange_callback")(item.node, item.attribute, watcher)
         self._watching[item.share] += 1
         self._look(subscription, item)
 
     def _look(self, subscription: Subscription, item: ValueItem) -> None:
-        value = self._space.read_attribute_value(get(item.target, "NodeId"), get(item.target, "AttributeId"))
+        value = self._space.read_attribute_value(item.node, item.attribute)
         _ItemWatcher(subscription, item).told(value, loop_time())
 
     async def modify(
@@ -192,12 +189,10 @@ class MonitoredItems:
                 self._event_items.change(item.share, event_weight(settings, filter_) - item.weight)
                 item.modify(settings, filter_)
             else:
-                node = self._space[get(item.target, "NodeId")]
-                filter_ = change_filter(
-                    get(asked, "Filter"), self._space, node, get(item.target, "AttributeId")
-                )
+                node = self._space[item.node]
+                filter_ = change_filter(get(asked, "Filter"), self._space, node, item.attribute)
                 settings = value_settings(asked, subscription.terms.interval_ms)
-                item.modify(settings, filter_, window(item.target, times))
+                item.modify(settings, filter_, window_of(item.window.ranges, item.attribute, times))
         except ServiceError as error:
             return _faulty(ua.MonitoredItemModifyResult(), error)
         return _agreed(ua.MonitoredItemModifyResult(), item)
@@ -215,9 +210,9 @@ class MonitoredItems:
                 self._look(found, item)
             found.noticed(item)
 
-        return await _codes(set_one, get(params, "MonitoredItemIds"))
+        return await codes(set_one, get(params, "MonitoredItemIds"))
 
-    def set_triggering(
+    async def set_triggering(
         self, found: Subscription, params: ua.SetTriggeringParameters
     ) -> ua.SetTriggeringResult:
         """Raises ServiceError for a triggering item that is not there."""
@@ -232,8 +227,8 @@ class MonitoredItems:
         # Part 4 §5.13.5.2: what is to be removed comes first.
         return make(
             ua.SetTriggeringResult,
-            RemoveResults=[code_of(remove, number) for number in get(params, "LinksToRemove") or ()],
-            AddResults=[code_of(add, number) for number in get(params, "LinksToAdd") or ()],
+            RemoveResults=await codes(remove, get(params, "LinksToRemove") or ()),
+            AddResults=await codes(add, get(params, "LinksToAdd") or ()),
         )
 
     async def delete(
@@ -242,7 +237,7 @@ class MonitoredItems:
         def delete_one(number: int) -> None:
             self.drop(found, _item(found, number))
 
-        return await _codes(delete_one, get(params, "MonitoredItemIds"))
+        return await codes(delete_one, get(params, "MonitoredItemIds"))
 
     def drop(self, subscription: Subscription, item: Item) -> None:
         subscription.drop(item)
@@ -256,6 +251,14 @@ class MonitoredItems:
             if not self._watching[item.share]:
                 del self._watching[item.share]
 
+    async def drop_all(self, subscription: Subscription) -> None:
+        """Drop the items of a subscription that has ended, in turns."""
+        stint = Stint()
+        for item in list(subscription.items.values()):
+            if item.number in subscription.items:
+                self.drop(subscription, item)
+            await stint.pause()
+
 
 class _ItemWatcher:
     """Tells ``item`` of each value of what it watches."""
@@ -265,12 +268,12 @@ class _ItemWatcher:
     def __init__(self, subscription: Subscription, item: ValueItem) -> None:
         self._subscription = subscription
         self._item = item
-        self._looks_alike = subscription.owner.looks_alike(item.target)
+        self._looks_alike = subscription.owner.looks_alike(item.node, item.attribute)
 
     def told(self, value: ua.DataValue, now: float) -> None:
         item, subscription = self._item, self._subscription
         if not self._looks_alike:
-            value = subscription.owner.seen(item.target, value)
+            value = subscription.owner.seen(item.node, item.attribute, value)
         is_queued = item.change(value, now)
         subscription.noticed(item, is_queued=is_queued)
 
@@ -289,21 +292,18 @@ def _item(subscription: Subscription, number: int) -> Item:
     return item
 
 
-async def _codes(act: Callable[[int], None], numbers: Sequence[int]) -> list[ua.StatusCode]:
-    stint, codes = Stint(), list[ua.StatusCode]()
+async def codes(act: Callable[[int], None], numbers: Sequence[int]) -> list[ua.StatusCode]:
+    """Status codes of the operations of a request, carried out in turns."""
+    stint, found = Stint(), list[ua.StatusCode]()
     for number in numbers:
-        codes.append(code_of(act, number))
+        try:
+            act(number)
+        except ServiceError as error:
+            found.append(status(int(error.code)))
+        else:
+            found.append(GOOD)
         await stint.pause()
-    return codes
-
-
-def code_of(act: Callable[[int], None], number: int) -> ua.StatusCode:
-    """Status code of one of the operations of a request."""
-    try:
-        act(number)
-    except ServiceError as error:
-        return status(int(error.code))
-    return GOOD
+    return found
 
 
 def _agreed(result: _T, item: Item) -> _T:

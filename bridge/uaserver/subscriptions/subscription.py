@@ -14,7 +14,7 @@ from bridge.uaserver.counts import SubscriptionCounts
 from bridge.uaserver.encoding import weight
 from bridge.uaserver.filters.eventfilter import Occurrence
 from bridge.uaserver.languages import speaking
-from bridge.uaserver.library import ServiceError, StatusCodes, get, make, status, ua
+from bridge.uaserver.library import AttributeIds, ServiceError, StatusCodes, get, make, status, ua
 from bridge.uaserver.subscriptions.items import EventItem, Item, ValueItem
 from bridge.uaserver.subscriptions.notifications import change, changes
 from bridge.uaserver.subscriptions.publishing import PublishQueue, PublishRequest
@@ -81,11 +81,11 @@ class SubscriptionOwner(Protocol):
         """Whether the session has ended. Its subscriptions may be transferred as long as they live."""
         ...
 
-    def looks_alike(self, wanted: ua.ReadValueId) -> bool:
+    def looks_alike(self, where: ua.NodeId, attribute: AttributeIds) -> bool:
         """Whether everybody sees the same of it: its values as they are."""
         ...
 
-    def seen(self, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
+    def seen(self, where: ua.NodeId, attribute: AttributeIds, value: ua.DataValue) -> ua.DataValue:
         """``value`` as this user may see it."""
         ...
 

@@ -17,8 +17,8 @@ from bridge.base.publishing_clock import cycle_by
 from bridge.base.sources import source_of
 from bridge.uaserver.counts import ServerCounts
 from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
-from bridge.uaserver.loop import loop_time
-from bridge.uaserver.subscriptions.monitoring import MonitoredItems, code_of
+from bridge.uaserver.loop import Stint, loop_time
+from bridge.uaserver.subscriptions.monitoring import MonitoredItems, codes
 from bridge.uaserver.subscriptions.publishing import PublishRequest
 from bridge.uaserver.subscriptions.quotas import MOST_ITEMS, MOST_SUBSCRIPTIONS, lower_than, room_for_items
 from bridge.uaserver.subscriptions.subscription import Subscription, SubscriptionOwner, terms
@@ -35,6 +35,8 @@ class Subscriptions:
         self.items = MonitoredItems(space)
         self.counts = ServerCounts()
         self._timers: dict[int, asyncio.TimerHandle] = {}
+        self._dropping: set[asyncio.Task[None]] = set()
+        self._drops = asyncio.Lock()
 
     def prepare(self) -> None:
         """The address space is complete."""
@@ -56,7 +58,6 @@ class Subscriptions:
     def create(
         self, owner: SubscriptionOwner, params: ua.CreateSubscriptionParameters
     ) -> ua.CreateSubscriptionResult:
-        self.drop_left_behind()
         if len(self.subscriptions) >= MOST_SUBSCRIPTIONS:
             raise ServiceError(StatusCodes.BadTooManySubscriptions)
         enabled: bool = get(params, "PublishingEnabled")
@@ -77,38 +78,40 @@ class Subscriptions:
             self._begin(found)
         return _revised(ua.ModifySubscriptionResult(), found)
 
-    def set_publishing_mode(
+    async def set_publishing_mode(
         self, owner: SubscriptionOwner, params: ua.SetPublishingModeParameters
     ) -> list[ua.StatusCode]:
         def set_one(number: int) -> None:
             self.own(owner, number).set_enabled(get(params, "PublishingEnabled"))
 
-        return [code_of(set_one, number) for number in get(params, "SubscriptionIds")]
+        return await codes(set_one, get(params, "SubscriptionIds"))
 
-    def delete(
+    async def delete(
         self, owner: SubscriptionOwner, params: ua.DeleteSubscriptionsParameters
     ) -> list[ua.StatusCode]:
-        results = [
-            code_of(lambda one: self._close(self.own(owner, one)), number)
-            for number in get(params, "SubscriptionIds")
-        ]
+        dropping: list[asyncio.Task[None]] = []
+
+        def delete_one(number: int) -> None:
+            dropping.append(self._close(self.own(owner, number)))
+
+        results = await codes(delete_one, get(params, "SubscriptionIds"))
         self._release_requests(owner)
+        await _all(dropping)
         return results
 
-    def drop_left_behind(self) -> None:
+    async def drop_left_behind(self) -> None:
         """Delete the oldest subscription without a session, where there are as many as there may be."""
         if len(self.subscriptions) >= MOST_SUBSCRIPTIONS and (oldest := next(self._left_behind(), None)):
-            self._close(oldest)
+            await _all([self._close(oldest)])
 
     def _left_behind(self) -> Iterator[Subscription]:
         """Subscriptions whose session has ended, the oldest first."""
         return (found for found in self.subscriptions.values() if found.owner.is_gone)
 
-    def end(self, owner: SubscriptionOwner, *, delete: bool) -> None:
+    async def end(self, owner: SubscriptionOwner, *, delete: bool) -> None:
         """The session ends. What it leaves behind is for the same client; without one it goes, too."""
         if delete or not _is_known(owner):
-            for found in self.of(owner):
-                self._close(found)
+            await _all([self._close(found) for found in self.of(owner)])
 
     def publish(
         self,
@@ -132,11 +135,15 @@ class Subscriptions:
         found = self.own(owner, get(params, "SubscriptionId"))
         return found.republish(get(params, "RetransmitSequenceNumber"))
 
-    def transfer(
+    async def transfer(
         self, owner: SubscriptionOwner, params: ua.TransferSubscriptionsParameters
     ) -> list[ua.TransferResult]:
         initial: bool = get(params, "SendInitialValues")
-        return [self._transfer(owner, number, initial) for number in get(params, "SubscriptionIds")]
+        stint, results = Stint(), list[ua.TransferResult]()
+        for number in get(params, "SubscriptionIds"):
+            results.append(self._transfer(owner, number, initial))
+            await stint.pause()
+        return results
 
     def _transfer(self, owner: SubscriptionOwner, number: int, initial: bool) -> ua.TransferResult:
         found = self.subscriptions.get(number)
@@ -175,8 +182,7 @@ class Subscriptions:
             ending = [found for found in left if source_of(found.owner.address) == source]
             if not ending and self._is_full:
                 ending = left
-            for oldest in ending[:1]:
-                self._close(oldest)
+            await _all([self._close(oldest) for oldest in ending[:1]])
             if ending:
                 return True
             holders = [found.owner for found in self.subscriptions.values() for _ in found.items]
@@ -215,17 +221,31 @@ class Subscriptions:
             owner.publishing.say_last(subscription.last_word(StatusCodes.BadTimeout), now)
             self._release_requests(owner)
 
-    def _close(self, subscription: Subscription) -> None:
+    def _close(self, subscription: Subscription) -> asyncio.Task[None]:
+        """It is there for nobody any more. Its items, of which there may be many, are dropped by a task."""
         del self.subscriptions[subscription.number]
         self._timers.pop(subscription.number).cancel()
         subscription.owner.publishing.forget(subscription)
-        for item in list(subscription.items.values()):
-            self.items.drop(subscription, item)
+        dropping = asyncio.create_task(self._drop_items(subscription))
+        self._dropping.add(dropping)
+        dropping.add_done_callback(self._dropping.discard)
+        return dropping
+
+    async def _drop_items(self, subscription: Subscription) -> None:
+        # One after the other: each takes its share of the loop's time.
+        async with self._drops:
+            await self.items.drop_all(subscription)
 
     def _release_requests(self, owner: SubscriptionOwner) -> None:
         """Answer the Publish requests of a session without subscriptions, to which nothing can come."""
         if not self.of(owner):
             owner.publishing.refuse_all(StatusCodes.BadNoSubscription, loop_time())
+
+
+async def _all(dropping: Sequence[asyncio.Task[None]]) -> None:
+    """Wait for them. They go on where whoever waits does not."""
+    if dropping:
+        await asyncio.wait(dropping)
 
 
 def _revised(result: _T, subscription: Subscription) -> _T:

@@ -60,6 +60,33 @@ def test_the_elements_of_a_message_are_counted() -> None:
     struct_from_binary(ua.ReadParameters, Buffer(reads(6)))
 
 
+def test_what_is_decoded_at_once_is_short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Others wait meanwhile."""
+    monkeypatch.setattr(decoding, "MOST_AT_ONCE", 5)
+    decoding.begin(100)
+    struct_from_binary(ua.ReadParameters, Buffer(reads(5)))
+    with pytest.raises(UaStatusCodeError) as refused:
+        struct_from_binary(ua.ReadParameters, Buffer(reads(1)))
+    assert refused.value.code == ua.StatusCodes.BadEncodingLimitsExceeded
+
+
+@pytest.mark.parametrize(("elements", "parts", "is_taken"), [(20, 4, True), (1, 6, False), (20, 6, False)])
+async def test_an_element_that_is_decoded_in_its_turn_is_short(
+    monkeypatch: pytest.MonkeyPatch, elements: int, parts: int, is_taken: bool
+) -> None:
+    monkeypatch.setattr(decoding, "MOST_AT_ONCE", 5)
+    path = ua.BrowsePath(RelativePath=ua.RelativePath([ua.RelativePathElement()] * parts))
+    params = ua.TranslateBrowsePathsToNodeIdsParameters([path] * elements)
+    content = Buffer(struct_to_binary(params))
+    decoding.begin(200)
+    decode = decoding.decoded(ua.TranslateBrowsePathsToNodeIdsParameters, ("BrowsePaths",), content)
+    if is_taken:
+        assert await decode == params
+    else:
+        with pytest.raises(UaStatusCodeError):
+            await decode
+
+
 @pytest.mark.parametrize("size", [-1, 4])
 def test_a_buffer_gives_what_it_has(size: int) -> None:
     with pytest.raises(NotEnoughData):

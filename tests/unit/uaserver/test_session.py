@@ -83,9 +83,8 @@ async def test_another_user_on_the_same_session_ends_the_one_before(rig: Rig) ->
 
 
 async def test_who_may_not_write_sees_that(rig: Rig) -> None:
-    def read(session: Session, where: ua.NodeId, attribute: int) -> ua.DataValue:
-        wanted = ua.ReadValueId(where, attribute)
-        return session.seen(wanted, rig.space.read_attribute_value(where, attribute))
+    def read(session: Session, where: ua.NodeId, attribute: ua.AttributeIds) -> ua.DataValue:
+        return session.seen(where, attribute, rig.space.read_attribute_value(where, attribute))
 
     may, may_not = rig.session(User("eva")), rig.session(User("guest", has_rights=False))
     assert read(may, WORD, Ids.UserAccessLevel).Value.Value == 3

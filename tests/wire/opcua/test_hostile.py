@@ -282,9 +282,11 @@ async def test_requests_that_come_together_leave_others_their_turn(
             turn += 1
             await asyncio.sleep(0)
 
-    def noted(self: Session, wanted: ua.ReadValueId, value: ua.DataValue) -> ua.DataValue:
+    def noted(
+        self: Session, where: ua.NodeId, attribute: ua.AttributeIds, value: ua.DataValue
+    ) -> ua.DataValue:
         turns.append(turn)
-        return seen(self, wanted, value)
+        return seen(self, where, attribute, value)
 
     async with connected(served[0]) as client:
         monkeypatch.setattr(Session, "seen", noted)

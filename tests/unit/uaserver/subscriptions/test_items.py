@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bridge.uaserver.filters.changefilter import ChangeFilter
 from bridge.uaserver.filters.eventfilter import EventFilter, Occurrence
 from bridge.uaserver.filters.where import Where
-from bridge.uaserver.reading import window
+from bridge.uaserver.reading import window_of
 from bridge.uaserver.subscriptions.items import (
     EventItem,
     ItemSettings,
@@ -24,7 +24,7 @@ from bridge.uaserver.subscriptions.items import (
 
 Codes, Kind, Mode = ua.StatusCodes, ua.VariantType, ua.MonitoringMode
 OVERFLOW = 0x480
-TARGET = ua.ReadValueId(AttributeId=ua.AttributeIds.Value)
+VALUE = ua.AttributeIds.Value
 PASSES_ALL = EventFilter(["Message", "EventType"], Where([]), None)
 NODE = ua.NodeId("conveyor", 2)
 
@@ -84,7 +84,8 @@ def make_item(
     size: int = 1, discard_oldest: bool = True, sampling_ms: float = 50, mode: Mode = Mode.Reporting
 ) -> ValueItem:
     settings = ItemSettings(77, sampling_ms, size, discard_oldest)
-    return ValueItem(1, TARGET, window(TARGET, ua.TimestampsToReturn.Both), settings, ChangeFilter(), mode)
+    looked_at = window_of((), VALUE, ua.TimestampsToReturn.Both)
+    return ValueItem(1, NODE, VALUE, looked_at, settings, ChangeFilter(), mode)
 
 
 def told(item: ValueItem) -> list[tuple[float, bool]]:

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 from bridge.uaserver.filters.changefilter import ChangeFilter
 from bridge.uaserver.library import ServiceError
-from bridge.uaserver.reading import window
+from bridge.uaserver.reading import window_of
 from bridge.uaserver.subscriptions.items import ItemSettings, ValueItem
 from bridge.uaserver.subscriptions.publishing import PublishRequest
 from bridge.uaserver.subscriptions.subscription import RETRANSMISSIONS, Subscription, Terms, terms
 from tests.support.opcua_sessions import Session, decoded_changes
 
 Codes, Mode = ua.StatusCodes, ua.MonitoringMode
-TARGET = ua.ReadValueId(AttributeId=ua.AttributeIds.Value)
+NODE, VALUE = ua.NodeId("conveyor", 2), ua.AttributeIds.Value
 
 
 class Rig:
@@ -43,11 +43,12 @@ class Rig:
         self.got: list[ua.PublishResult] = []
         self.refused: list[int] = []
         self.items: list[ValueItem] = []
-        looked_at = window(TARGET, ua.TimestampsToReturn.Both)
+        looked_at = window_of((), VALUE, ua.TimestampsToReturn.Both)
         for number in range(items):
             item = ValueItem(
                 number,
-                TARGET,
+                NODE,
+                VALUE,
                 looked_at,
                 ItemSettings(number, 50, queue, True),
                 ChangeFilter(),

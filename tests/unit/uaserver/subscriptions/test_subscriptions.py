@@ -23,15 +23,17 @@ async def test_who_was_left_behind_makes_room_and_nobody_else() -> None:
     )
     for number in range(MOST_SUBSCRIPTIONS):
         there.create(left if number < 2 else busy, params)
-    there.end(left, delete=False)
+    await there.end(left, delete=False)
     left.is_gone = True
     for _ in range(2):
+        await there.drop_left_behind()
         there.create(busy, params)
     assert there.of(left) == []
+    await there.drop_left_behind()
     with pytest.raises(ServiceError) as refused:
         there.create(busy, params)
     assert refused.value.code == Codes.BadTooManySubscriptions
-    there.end(busy, delete=True)
+    await there.end(busy, delete=True)
     assert there.subscriptions == {}
 
 
@@ -44,6 +46,6 @@ async def test_what_nobody_could_take_over_is_not_left_behind(
     there = Subscriptions(AddressSpace())
     owner = Session(identity=User(user), channel_certificate=certificate)
     there.create(owner, ua.CreateSubscriptionParameters(RequestedPublishingInterval=1e6))
-    there.end(owner, delete=False)
+    await there.end(owner, delete=False)
     assert len(there.subscriptions) == stays
-    there.end(owner, delete=True)
+    await there.end(owner, delete=True)

@@ -13,7 +13,7 @@ from bridge.uaserver.filters.changefilter import ChangeFilter
 from bridge.uaserver.filters.eventfilter import EventFilter, Occurrence
 from bridge.uaserver.filters.where import Where
 from bridge.uaserver.library import ServiceError
-from bridge.uaserver.reading import window
+from bridge.uaserver.reading import window_of
 from bridge.uaserver.subscriptions import triggering
 from bridge.uaserver.subscriptions.items import EventItem, ItemSettings, ValueItem
 from bridge.uaserver.subscriptions.publishing import PublishRequest
@@ -22,15 +22,15 @@ from bridge.uaserver.subscriptions.triggering import TriggeringLinks
 from tests.support.opcua_sessions import Session, decoded_changes
 
 Codes, Mode = ua.StatusCodes, ua.MonitoringMode
-TARGET = ua.ReadValueId(AttributeId=ua.AttributeIds.Value)
+VALUE = ua.AttributeIds.Value
 NODE = ua.NodeId("conveyor", 2)
 TRIGGER, LINKED, EVENTS = 0, 1, 2
 
 
 def value_item(number: int, mode: Mode, queue: int = 10, discard_oldest: bool = True) -> ValueItem:
-    looked_at = window(TARGET, ua.TimestampsToReturn.Both)
+    looked_at = window_of((), VALUE, ua.TimestampsToReturn.Both)
     settings = ItemSettings(number, 50, queue, discard_oldest)
-    return ValueItem(number, TARGET, looked_at, settings, ChangeFilter(), mode)
+    return ValueItem(number, NODE, VALUE, looked_at, settings, ChangeFilter(), mode)
 
 
 class Rig:
@@ -233,6 +233,6 @@ def test_what_is_released_is_what_was_queued_then(
             told = item.take().Value.Value
             assert told <= released or size == 1 or not oldest
     item.release()
-    left = len(item.queue)
+    left = len(item.queue or ())
     assert sum(1 for _ in iter(lambda: item.has_report and item.take(), False)) == left
     assert not item.has_something

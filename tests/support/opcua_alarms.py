@@ -13,6 +13,8 @@ from asyncua import Client, ua
 from asyncua.common.subscription import Subscription
 
 from bridge.command import Plant
+from bridge.uaserver.conditions.condition_fields import ConditionPlace, common_fields
+from bridge.uaserver.conditions.conditions import Condition, Conditions
 from tests.support import sites
 from tests.support.opcua_site import LocalView, namespace
 
@@ -91,6 +93,18 @@ def tell(view: LocalView, *troubles: dict[str, Any]) -> None:
     now = time.monotonic()
     view.plant.set("bridge/troubles", json.dumps(troubles), now)
     view.plant.set("bridge/drives_waiting", 0, now)
+
+
+def thousand(conditions: Conditions) -> list[Condition]:
+    """More alarms than a site has drives, told by the Server object."""
+    server = ua.NodeId(Ids.Server)
+    kind, process = ua.NodeId(Ids.AlarmConditionType), ua.LocalizedText("process", "en")
+    common = common_fields(kind, "Alarm", Ids.ProcessConditionClassType, process, {})
+    names = [f"many/{number}" for number in range(1000)]
+    made = [Condition(ConditionPlace(ua.NodeId(one, 2), server, one, (server,), common)) for one in names]
+    for one in made:
+        conditions.add(one)
+    return made
 
 
 class Follower:

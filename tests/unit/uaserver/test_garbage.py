@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from bridge.uaserver import garbage
 from bridge.uaserver.garbage import GarbageCollector
 
 
@@ -23,6 +24,25 @@ def collections() -> Iterator[list[int]]:
     gc.callbacks.append(note)
     yield found
     gc.callbacks.remove(note)
+
+
+async def test_the_rest_is_looked_for_after_a_time(
+    monkeypatch: pytest.MonkeyPatch, collections: list[int]
+) -> None:
+    monkeypatch.setattr(garbage, "_PERIOD_S", 0.0)
+    collector = GarbageCollector()
+    collector.begin()
+    try:
+        for _ in range(4):
+            await asyncio.sleep(0)
+        assert collections.count(2) > 1, "and again"
+    finally:
+        collector.end()
+        gc.unfreeze()
+    collections.clear()
+    for _ in range(4):
+        await asyncio.sleep(0)
+    assert collections == []
 
 
 async def test_a_full_collection_waits_for_the_end_of_sessions(collections: list[int]) -> None:

@@ -24,8 +24,8 @@ from bridge.northbound.opcua.alarms import alarm_server
 from bridge.northbound.opcua.alarms.alarm_server import AlarmSite
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.text import Text, as_json
-from bridge.uaserver.conditions.condition_fields import AlarmContent, ConditionPlace, common_fields
-from bridge.uaserver.conditions.conditions import Condition, Conditions
+from bridge.uaserver.conditions.condition_fields import AlarmContent
+from bridge.uaserver.conditions.conditions import Conditions
 from tests.support.opcua_alarms import (
     Follower,
     alarm_of,
@@ -38,6 +38,7 @@ from tests.support.opcua_alarms import (
     of,
     plant_of_many,
     tell,
+    thousand,
     trouble,
 )
 from tests.support.opcua_site import LocalView, namespace, serving
@@ -326,18 +327,6 @@ def conditions_of(served: Served) -> Conditions:
     """The server's own, whatever the plant tells."""
     server: Any = served[0]._server
     return server.iserver.conditions
-
-
-def thousand(conditions: Conditions) -> list[Condition]:
-    """More alarms than a site has drives, told by the Server object."""
-    server = ua.NodeId(Ids.Server)
-    kind, process = ua.NodeId(Ids.AlarmConditionType), ua.LocalizedText("process", "en")
-    common = common_fields(kind, "Alarm", Ids.ProcessConditionClassType, process, {})
-    names = [f"many/{number}" for number in range(1000)]
-    made = [Condition(ConditionPlace(ua.NodeId(one, 2), server, one, (server,), common)) for one in names]
-    for one in made:
-        conditions.add(one)
-    return made
 
 
 @pytest.mark.landing

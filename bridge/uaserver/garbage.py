@@ -1,7 +1,7 @@
 """Garbage of the process: looked for between requests, never in the midst of one.
 
-A full collection looks at everything that is alive: 7 ms for ten thousand monitored items. Left alone, CPython
-begins one in whatever request makes objects, and looks at all that this request has made, too.
+A full collection looks at everything that is alive: 7 ms for ten thousand monitored items. Left alone,
+CPython begins one in whatever request makes objects, and looks at all that this request has made, too.
 """
 
 from __future__ import annotations

@@ -200,6 +200,18 @@ TARGETS: Sequence[Target] = (
         least=99,
         unit=" %",
     ),
+    Target(
+        "OPC UA: memory of the server after 100,000 alarm events more",
+        _number("opcua: MB more after 100,000 alarm events"),
+        most=10,
+        unit=" MB",
+    ),
+    Target(
+        "OPC UA: memory of the server after 10,000 clients more",
+        _number("opcua: MB more after 10,000 clients"),
+        most=5,
+        unit=" MB",
+    ),
     Target("FC16 → RPDO under the front's worst load, p50", _under_load("p50_ms"), most=1, unit=" ms"),
     Target("the same, p99", _under_load("p99_ms"), most=4, unit=" ms"),
     Target("PDOs that ours lost end to end, at all rates", _lost, most=0),

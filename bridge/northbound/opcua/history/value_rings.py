@@ -6,6 +6,7 @@ takes another eight, and the words themselves once, however often they come.
 
 from __future__ import annotations
 
+import math
 import sys
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
@@ -66,6 +67,8 @@ class ValueRing:
     def __init__(self, data_type: DataType, capacity: int) -> None:
         self.first = 0
         self.end = 0
+        self.taken_at = -math.inf
+        """Time of the latest sample as the image has it."""
         self._data_type = data_type
         self._capacity = capacity
         self._latest_us = 0
@@ -95,6 +98,9 @@ class ValueRing:
         self._latest_us = time_us
         self.end += 1
         self.first = max(self.first, self.end - self._capacity)
+
+    def is_latest(self, value: Value, quality: Quality) -> bool:
+        return self.end > 0 and self.value(self.end - 1) == value and self.quality(self.end - 1) is quality
 
     def time_us(self, number: int) -> int:
         return self._times[number % self._capacity]
@@ -146,8 +152,12 @@ class ValueRings:
             if ring is None:
                 continue
             value, quality, time, _ = image[place]
+            # What was there at the start is told as the first change once more.
+            if time == ring.taken_at and ring.is_latest(value, quality):
+                continue
             # Before the first value there is nothing, not even a time.
             if quality is not Quality.WAITING or ring.end:
+                ring.taken_at = time
                 try:
                     ring.append(epoch_us(epoch_ns(time)), value, quality)
                 except (TypeError, OverflowError) as error:

@@ -132,6 +132,7 @@ def test_changes_of_chosen_points_are_kept_from_the_first_value_on() -> None:
     for place in every:
         points.set(place, points.points[place].data_type.zero, 2.0)
     rings.record([0, 1])
+    rings.record(every[:2])  # as at the start: what is there, and then that it has changed
     points.judge([0], Quality.LOST, 3.0)
     rings.record([0])
     points.judge([0], Quality.WAITING, 4.0)

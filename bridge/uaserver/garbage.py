@@ -26,13 +26,13 @@ class GarbageCollector:
         self._timer: asyncio.TimerHandle | None = None
 
     def begin(self) -> None:
-        """What is there now lives as long as the process: no collection need look at it again."""
+        """Leave out of all collections what is there now: it lives as long as the process."""
         gc.freeze()
         gc.set_threshold(*self._before[:2], _NEVER)
         self._arm()
 
     def note_end(self) -> None:
-        """A session has ended."""
+        """Count a session that has ended."""
         self._ended += 1
         if self._ended >= _ENDED_SESSIONS:
             self._ended = 0

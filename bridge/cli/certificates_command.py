@@ -116,6 +116,7 @@ def _facts(one: Listed) -> dict[str, Any]:
         "thumbprint": one.thumbprint,
         "fingerprint": one.fingerprint,
         "subject": one.subject,
+        "since": one.since.isoformat(),
         "until": one.until.isoformat(),
         "fault": one.fault or None,
         "reason": render(one.said),

@@ -23,7 +23,7 @@ from bridge.project import Project, load_project
 from bridge.service.fault_texts import german_faults
 from bridge.service.mirrored import required, serve_mirrored
 from bridge.service.page.buses import Buses
-from bridge.service.page.system_facts import SystemOf
+from bridge.service.page.system_facts import SystemOf, store_of
 
 _log = logging.getLogger(__name__)
 
@@ -51,16 +51,18 @@ def exports_of(project: Project) -> dict[str, Export]:
 
 def sources_of(project: Project) -> PageSources:
     """Sources of the page: files, buses and system of ``project``."""
-    buses = Buses(project, clock.epoch_ns)
+    buses, site = Buses(project, clock.epoch_ns), project.site
+    state_dir = Path(site.site.state_dir)
     return PageSources(
         {"de": german_faults(project.families)},
         exports_of(project),
         buses.taps(),
         buses.layouts(),
         buses.capture,
-        LedgerFile(Path(project.site.site.state_dir)).totals,
+        LedgerFile(state_dir).totals,
         dictionary_files(project.families, project.path),
         SystemOf(project),
+        store_of(site.opcua, state_dir) if site.opcua else None,
     )
 
 

@@ -36,7 +36,16 @@ def read_limited(path: Path) -> bytes:
 
 
 def parse(content: bytes) -> Content:
-    """A certificate, or a revocation list. Raises one of ``MALFORMED``."""
+    """A certificate, or a revocation list, whose names can be read. Raises one of ``MALFORMED``."""
+    found = _parsed(content)
+    # Names are parsed when they are looked at: in a list, one that is malformed would keep everybody out.
+    found.issuer.public_bytes()
+    if isinstance(found, x509.Certificate):
+        found.subject.public_bytes()
+    return found
+
+
+def _parsed(content: bytes) -> Content:
     if _CRL in content:
         return x509.load_pem_x509_crl(content)
     if _CERTIFICATE in content:

@@ -21,14 +21,15 @@ _OF_DAYS = (CertificateFault.TIME, CertificateFault.ISSUER_TIME)
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """One certificate. ``place`` is its folder, ``until`` the end of its validity, UTC; ``fault`` is empty
-    where nothing is wrong, and ``said`` the fault for people."""
+    """One certificate. ``place`` is its folder, ``since`` and ``until`` are the bounds of its validity, UTC;
+    ``fault`` is empty where nothing is wrong, and ``said`` the fault for people."""
 
     place: str
     file: Path
     thumbprint: str
     fingerprint: str
     subject: str
+    since: datetime
     until: datetime
     fault: str = ""
     said: Said = ""
@@ -49,9 +50,10 @@ def inventory(store: TrustStore, now: datetime) -> Iterator[Listed]:
 
 def _listed(place: str, file: Path, certificate: x509.Certificate, verdict: Verdict) -> Iterator[Listed]:
     try:
-        subject, until = certificate.subject.rfc4514_string(), certificate.not_valid_after_utc
+        subject = certificate.subject.rfc4514_string()
+        bounds = certificate.not_valid_before_utc, certificate.not_valid_after_utc
     except MALFORMED:
         return
     fault = str(verdict.fault or "")
     prints = thumbprint(certificate), fingerprint(certificate)
-    yield Listed(place, file, *prints, short(subject), until, fault, verdict.said)
+    yield Listed(place, file, *prints, short(subject), *bounds, fault, verdict.said)

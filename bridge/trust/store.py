@@ -203,20 +203,19 @@ class TrustStore:
     def trust(self, certificate: x509.Certificate) -> Path:
         """Put it into ``trusted``. Raises ``OperationFailed``."""
         path = self._put(self.trusted, certificate)
-        (self.rejected / path.name).unlink(missing_ok=True)
+        _remove(self.rejected / path.name)
         return path
 
     def reject(self, file: Path) -> Path:
-        """Move a certificate out of ``trusted`` into ``rejected``. Raises ``OperationFailed``."""
+        """Move a certificate out of ``trusted``, whatever files it is in, into ``rejected``. Raises
+        ``OperationFailed``."""
         try:
             content = parse(read_limited(file))
         except (OSError, *MALFORMED) as error:
             raise OperationFailed(Text.of("trust.unusable_file", file=str(file), why=str(error))) from error
         path = self._put(self.rejected, content) if isinstance(content, x509.Certificate) else file
-        try:
-            file.unlink()
-        except OSError as error:
-            raise OperationFailed(Text.of("trust.unwritable", file=str(file), why=str(error))) from error
+        for same in {file, *(one for one, held in self.files(self.trusted) if held == content)}:
+            _remove(same)
         return path
 
     def add(self, folder: Path, content: Content) -> Path:
@@ -247,11 +246,14 @@ class TrustStore:
         raise _not_one(prefix, len(found), self.rejected)
 
     def find_trusted(self, prefix: str) -> Path:
-        """File in ``trusted`` of the certificate whose thumbprint begins so; raises as ``find_rejected``."""
+        """A file in ``trusted`` of the certificate whose thumbprint begins so. Raises as
+        ``find_rejected``."""
         files = self.files(self.trusted)
-        found = [path for path, one in files if isinstance(one, x509.Certificate) and _matches(one, prefix)]
+        found = {
+            one: path for path, one in files if isinstance(one, x509.Certificate) and _matches(one, prefix)
+        }
         if len(found) == 1:
-            return found[0]
+            return next(iter(found.values()))
         raise _not_one(prefix, len(found), self.trusted)
 
 
@@ -263,6 +265,14 @@ def _write(path: Path, content: bytes) -> Path:
     except OSError as error:
         raise OperationFailed(Text.of("trust.unwritable", file=str(path), why=str(error))) from error
     return path
+
+
+def _remove(path: Path) -> None:
+    """Remove the file, which need not be there. Raises ``OperationFailed``."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise OperationFailed(Text.of("trust.unwritable", file=str(path), why=str(error))) from error
 
 
 def _matches(certificate: x509.Certificate, prefix: str) -> bool:

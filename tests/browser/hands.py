@@ -22,10 +22,10 @@ PATIENT_MS: Final = 2000
 
 
 @contextmanager
-def serving(folder: Path, *nodes: str) -> Iterator[int]:
-    """The page of a site with these nodes on a simulated bus; its port."""
+def serving(folder: Path, *nodes: str, more_users: str = "") -> Iterator[int]:
+    """The page of a site with these nodes on a simulated bus; its port. ``more_users`` are further users."""
     port = free_port()
-    opcua = f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{users()}'
+    opcua = f'[opcua]\nlisten = "127.0.0.1:{free_port()}"\n{users()}\n{more_users}'
     page = f'[page]\nlisten = "127.0.0.1:{port}"\n'
     site = sites.write(folder, sites.bus(*nodes, more=sites.BESIDE_A_BROWSER), opcua, page)
     with drivebridge(folder, "run", "run", str(site), notify=True) as process:

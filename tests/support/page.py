@@ -104,7 +104,8 @@ class Answer:
 
 
 class Served:
-    """``page`` on a port of its own; ``later_s`` is how much later than now it is for the page."""
+    """``page`` on a port of its own; ``later_s`` is how much later than now it is for the page. ``opcua`` are
+    further keys of that table."""
 
     def __init__(
         self,
@@ -112,6 +113,7 @@ class Served:
         system: Any = None,
         capture: Any = no_capture,
         kept: Path | None = None,
+        opcua: str = "",
     ) -> None:
         users = "".join(
             f'[[opcua.user]]\nname = "{one}"\nrole = "{one}"\npassword_hash = "{_hash(one + "!")}"\n'
@@ -119,7 +121,7 @@ class Served:
         )
         more = f'anonymous = "{anonymous}"' if anonymous else ""
         node = sites.node(sites.drive("fu1", "lease", 1000))
-        text = sites.site(sites.bus(node), f'[opcua]\nlisten = "127.0.0.1:4840"\n{more}\n{users}')
+        text = sites.site(sites.bus(node), f'[opcua]\nlisten = "127.0.0.1:4840"\n{more}\n{opcua}\n{users}')
         plant = sites.plant_of(text)
         self.later_s = 0.0
         self.view = PlantView(plant)

@@ -40,12 +40,13 @@ GUARDED = (
 Json = dict[str, Any]
 
 
+def user(role: str) -> str:
+    """User of the role's name, whose password ends with "!"."""
+    return f'[[opcua.user]]\nname = "{role}"\nrole = "{role}"\npassword_hash = "{cheap_hash(role + "!")}"\n'
+
+
 def users() -> str:
-    entries = [
-        f'[[opcua.user]]\nname = "{name}"\nrole = "{name}"\npassword_hash = "{cheap_hash(name + "!")}"\n'
-        for name in ("observer", "operator", "engineer")
-    ]
-    return "\n".join(entries)
+    return "\n".join(map(user, ("observer", "operator", "engineer")))
 
 
 def write_site(folder: Path, port: int, page: str = "", opcua: str = "", timeout_ms: int = 1000) -> Path:

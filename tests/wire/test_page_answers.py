@@ -54,3 +54,19 @@ async def test_a_browser_asks_whether_a_file_is_still_the_same() -> None:
         again = await served.ask("GET", "/static/js/main.js", If_None_Match=first.headers["etag"])
         assert (again.status, again.body) == (304, b"")
         assert again.headers["cache-control"] == "no-cache"
+
+
+@pytest.mark.parametrize("opcua", ["", 'trust = "anybody"'])
+async def test_the_page_says_whether_anybody_is_let_in_by_opcua(opcua: str) -> None:
+    async with Served(opcua=opcua).serving() as served:
+        cookie, _ = await served.login("observer")
+        told = (await served.ask("GET", "/api/system", Cookie=cookie)).json
+        assert told["trusts_anybody"] is bool(opcua)
+
+
+async def test_without_folders_of_certificates_there_is_nothing_to_decide() -> None:
+    async with Served().serving() as served:
+        cookie, token = await served.login("engineer")
+        for decision in ("trust", "reject"):
+            path = f"/api/certificates/{decision}"
+            assert (await served.ask("POST", path, b"{}", Cookie=cookie, X_Token=token)).status == 404

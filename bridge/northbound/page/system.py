@@ -27,14 +27,15 @@ _encode = msgspec.json.Encoder().encode
 @dataclass(frozen=True, slots=True)
 class CertificateFacts:
     """One certificate. ``of`` is its owner: ``opcua``, ``page``, a client's file, or the folder that holds
-    it; ``until`` is in seconds since 1970. ``wrong`` is why one was refused; who wants to trust it names its
-    ``thumbprint``."""
+    it; it is valid from ``since`` to ``until``, in seconds since 1970. ``fingerprint`` is SHA-256, and
+    ``thumbprint`` SHA-1, by which who decides on it names it. ``wrong`` is what stands against it."""
 
     of: str
     subject: str
+    since: float
     until: float
     fingerprint: str
-    thumbprint: str = ""
+    thumbprint: str
     wrong: Said = ""
 
     @property
@@ -77,15 +78,18 @@ class SystemFacts(Protocol):
 
 class System:
     """Routes for ``facts``; ``tabs`` lists the open tabs, ``session_of`` gives the session of a request.
-    Facts on people and files are for engineers."""
+    Facts on people and files are for engineers. With ``trusts_anybody`` no list of OPC UA clients counts."""
 
     def __init__(
         self,
         facts: SystemFacts,
         tabs: Callable[[], list[dict[str, Any]]],
         session_of: Callable[[Request], PageSession | None],
+        *,
+        trusts_anybody: bool = False,
     ) -> None:
         self._facts = facts
+        self._trusts_anybody = trusts_anybody
         self._tabs = tabs
         self._session_of = session_of
         self._checking = asyncio.Semaphore(1)
@@ -114,6 +118,7 @@ class System:
         is_engineer = session.role >= Role.ENGINEER
         shown = [_listed(one) for one in readable if is_engineer or not one.is_refused]
         told: dict[str, Any] = {"versions": versions, "certificates": shown}
+        told["trusts_anybody"] = self._trusts_anybody
         told["faults"] = [_shown(one) for one in faults]
         told["clients"] = {protocol: len(addresses) for protocol, addresses in connections.items()}
         if is_engineer:
@@ -155,11 +160,17 @@ class System:
 
 
 def _listed(one: CertificateFacts) -> dict[str, Any]:
-    facts = {"of": one.of, "subject": one.subject, "until": one.until, "fingerprint": one.fingerprint}
-    if not one.is_refused:
+    facts = {
+        "of": one.of,
+        "subject": one.subject,
+        "since": one.since,
+        "until": one.until,
+        "fingerprint": one.fingerprint,
+        "thumbprint": one.thumbprint,
+    }
+    if not one.wrong:
         return facts
-    wrong = {"message": render(one.wrong), "text": as_json(one.wrong)}
-    return facts | {"thumbprint": one.thumbprint, "wrong": wrong}
+    return facts | {"wrong": {"message": render(one.wrong), "text": as_json(one.wrong)}}
 
 
 def _shown(part: UnreadablePart) -> dict[str, Any]:

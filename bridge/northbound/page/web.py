@@ -28,6 +28,7 @@ from bridge.condition.plant_layout import layout_of
 from bridge.config import PageTable, UserTable
 from bridge.northbound.logins import PasswordChecks, TooManyChecks
 from bridge.northbound.page.bus_page import BusPage, Capture
+from bridge.northbound.page.certificate_page import CertificatePage
 from bridge.northbound.page.guards import MOST_BODY, Guards
 from bridge.northbound.page.integration import Export, Integration
 from bridge.northbound.page.parameter_page import Counts, ParameterPage, holders_of
@@ -41,6 +42,7 @@ from bridge.northbound.page.throttle import FIRST_PAUSE_S, Throttle
 from bridge.northbound.page.traffic import BusTap, TrafficViews
 from bridge.northbound.view import View
 from bridge.text.templates import LANGUAGES, source
+from bridge.trust import TrustStore
 
 _log = logging.getLogger(__name__)
 
@@ -69,6 +71,8 @@ class PageSources:
     dictionaries: Mapping[str, Path]
     """Makers' device descriptions by mapping."""
     system: SystemFacts
+    clients: TrustStore | None = None
+    """Certificates of OPC UA clients; None where the site serves no OPC UA."""
 
 
 class _Files(StaticFiles):
@@ -155,7 +159,13 @@ class Page:
                 self._has_token,
             ).routes,
             *BusPage(site.site.name, sources.layouts, sources.capture, self._session_of).routes,
-            *System(sources.system, lambda: self.shown, self._session_of).routes,
+            *System(
+                sources.system,
+                lambda: self.shown,
+                self._session_of,
+                trusts_anybody=settings is not None and settings.trust == "anybody",
+            ).routes,
+            *self._certificate_routes(sources.clients),
             WebSocketRoute("/live", self._live),
             Mount("/static", _Files(directory=STATIC)),
         ]
@@ -172,6 +182,11 @@ class Page:
         async with self._tabs.serving():
             yield
         self._checks.close()
+
+    def _certificate_routes(self, clients: TrustStore | None) -> list[Route]:
+        if clients is None:
+            return []
+        return CertificatePage(clients, body_of, self._session_of, self._has_token).routes
 
     @property
     def shown(self) -> list[dict[str, Any]]:

@@ -14,19 +14,19 @@ from typing import Any, Final, cast
 
 from cryptography import x509
 from cryptography.exceptions import UnsupportedAlgorithm
-from cryptography.hazmat.primitives.hashes import SHA256
 
 from bridge import __version__
 from bridge.base.errors import BridgeError, Fault, FileFaults
-from bridge.config import ListeningTable, Site
+from bridge.config import ListeningTable, OpcUaTable, Site
 from bridge.lint import Severity, lint
 from bridge.northbound.opcua.certificates.own_files import CERTIFICATES, own_pair
 from bridge.northbound.page.system import CertificateFacts, UnreadablePart
 from bridge.project import Project, load_project
 from bridge.text import Text, as_json
 from bridge.trust import TrustStore
+from bridge.trust.files import fingerprint, thumbprint
 from bridge.trust.inventory import inventory
-from bridge.trust.store import OWN, REJECTED
+from bridge.trust.store import OWN
 
 _LIBRARIES: Final = ("asyncua", "pymodbus", "eclipse-zenoh", "python-can", "canopen", "starlette", "uvicorn")
 _SECRETS: Final = (
@@ -188,21 +188,26 @@ def _certificates(site: Site) -> Iterator[CertificateFacts | UnreadablePart]:
     if opcua:
         own, _ = own_pair(opcua, Path(site.site.state_dir) / CERTIFICATES / OWN)
         yield from _certificate("opcua", own)
-        yield from _kept(Path(site.site.state_dir) / CERTIFICATES)
+        yield from _kept(store_of(opcua, Path(site.site.state_dir)))
         if opcua.trusted_dir:
             yield from _trusted(Path(opcua.trusted_dir))
     if page and page.certificate:
         yield from _certificate("page", Path(page.certificate))
 
 
-def _kept(folder: Path) -> Iterator[CertificateFacts]:
+def store_of(settings: OpcUaTable, state_dir: Path) -> TrustStore:
+    """The folders of the site. A ``trusted_dir`` that is none is as good as an empty one."""
+    also = [Path(settings.trusted_dir)] if settings.trusted_dir else []
+    return TrustStore(state_dir / CERTIFICATES, also)
+
+
+def _kept(store: TrustStore) -> Iterator[CertificateFacts]:
     """Certificates of others in the folders of the site."""
-    for one in inventory(TrustStore(folder), datetime.now(UTC)):
+    for one in inventory(store, datetime.now(UTC)):
         if one.place != OWN:
-            print_ = bytes.fromhex(one.fingerprint).hex(":").upper()
-            wrong = one.said if one.place == REJECTED else ""
-            until = one.until.timestamp()
-            yield CertificateFacts(one.place, one.subject, until, print_, one.thumbprint, wrong)
+            bounds = one.since.timestamp(), one.until.timestamp()
+            print_ = _in_pairs(one.fingerprint)
+            yield CertificateFacts(one.place, one.subject, *bounds, print_, one.thumbprint, one.said)
 
 
 def _trusted(folder: Path) -> Iterator[CertificateFacts | UnreadablePart]:
@@ -223,8 +228,9 @@ def _certificate(of: str, file: Path) -> Iterator[CertificateFacts | UnreadableP
         content = file.read_bytes()
         is_text = content.lstrip().startswith(b"-----")
         one = x509.load_pem_x509_certificate(content) if is_text else x509.load_der_x509_certificate(content)
-        print_ = one.fingerprint(SHA256()).hex(":").upper()
-        subject, until = one.subject.rfc4514_string(), one.not_valid_after_utc.timestamp()
+        subject = one.subject.rfc4514_string()
+        bounds = one.not_valid_before_utc.timestamp(), one.not_valid_after_utc.timestamp()
+        prints = _in_pairs(fingerprint(one)), thumbprint(one)
     except FileNotFoundError:
         return
     except OSError as error:
@@ -232,7 +238,11 @@ def _certificate(of: str, file: Path) -> Iterator[CertificateFacts | UnreadableP
     except _MALFORMED as error:
         yield UnreadablePart(of, Text.of("page.no_certificate", why=str(error)))
     else:
-        yield CertificateFacts(of, subject, until, print_)
+        yield CertificateFacts(of, subject, *bounds, *prints)
+
+
+def _in_pairs(fingerprint: str) -> str:
+    return bytes.fromhex(fingerprint).hex(":").upper()
 
 
 def _tail(path: Path) -> list[bytes]:

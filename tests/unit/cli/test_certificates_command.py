@@ -54,6 +54,7 @@ def test_a_refused_client_is_listed_with_its_reason_trusted_and_rejected_again(
     (one,) = listed(site)
     assert (one["place"], one["thumbprint"], one["subject"]) == ("rejected", PRINT, "CN=client")
     assert (one["fault"], one["reason"]) == ("BadCertificateUntrusted", "it is not trusted")
+    assert (one["since"], one["until"]) == (CLIENT.begins.isoformat(), CLIENT.ends.isoformat())
     assert run("trust", site, PRINT[:8]) == f"trusted: {PRINT}, CN=client\n"
     assert store.lists().trusts(STRANGER.certificate)
     (one,) = listed(site)

@@ -34,6 +34,15 @@ def test_each_kind_is_told_by_its_content(encoding: Encoding) -> None:
     assert parse(crl.public_bytes(encoding)) == crl
 
 
+@pytest.mark.parametrize(
+    "content", [LEAF.der, ROOT.der, crl_of(ROOT).public_bytes(Encoding.DER)], ids=["issuer", "subject", "CRL"]
+)
+def test_one_whose_names_cannot_be_read_is_none(content: bytes) -> None:
+    assert b"root" in content
+    with pytest.raises(MALFORMED):
+        parse(content.replace(b"root", b"\xff\xfe\xff\xfe"))
+
+
 def test_certificates_stand_one_behind_the_other() -> None:
     assert certificates_in(LEAF.der + ROOT.der) == [LEAF.certificate, ROOT.certificate]
     assert len(certificates_in(LEAF.der * 9)) == MOST_IN_CHAIN

@@ -160,6 +160,19 @@ class TestDecisions:
         assert not store.lists().trusts(OTHER.certificate)
         assert [one.certificate for one in store.rejected_ones()] == [OTHER.certificate]
 
+    def test_one_that_cannot_be_read_keeps_nobody_else_out(self, store: TrustStore) -> None:
+        store.trust(LEAF.certificate)
+        (store.trusted / "broken.der").write_bytes(OTHER.der.replace(b"other", b"\xff\xfe\xff\xfe\xff"))
+        assert store.lists().trusts(LEAF.certificate)
+
+    def test_one_that_is_there_twice_is_rejected_in_both_files(self, store: TrustStore) -> None:
+        (store.trusted / "panel.der").write_bytes(OTHER.der)
+        store.trust(OTHER.certificate)
+        store.trust(LEAF.certificate)
+        store.reject(store.find_trusted(thumbprint(OTHER.certificate)))
+        assert not store.lists().trusts(OTHER.certificate)
+        assert store.lists().trusts(LEAF.certificate)
+
     @pytest.mark.parametrize("prefix", ["", "ab", "ffffffffffff", "../../etc"])
     def test_a_thumbprint_that_nobody_has_is_an_error(self, store: TrustStore, prefix: str) -> None:
         self.refused(store)
@@ -180,4 +193,10 @@ class TestDecisions:
         store.trusted.rmdir()
         store.trusted.write_text("in the way")
         with pytest.raises(OperationFailed, match="cannot be written"):
+            store.trust(OTHER.certificate)
+
+    def test_a_file_that_cannot_be_taken_away_is_named(self, store: TrustStore) -> None:
+        in_the_way = store.rejected / f"{thumbprint(OTHER.certificate)}.der"
+        in_the_way.mkdir()
+        with pytest.raises(OperationFailed, match=in_the_way.name):
             store.trust(OTHER.certificate)

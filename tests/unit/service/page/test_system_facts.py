@@ -25,7 +25,7 @@ from bridge.service.page.system_facts import SystemOf, without_secrets
 from bridge.trust import TrustStore
 from bridge.trust.files import thumbprint
 from tests.support import sites
-from tests.support.certificates import CLIENT, make
+from tests.support.certificates import CLIENT, DAY, NOW, make
 
 HASH = "$argon2id$v=19$m=8,t=1,p=1$c2FsdHNhbHRzYWx0$C2zIbrBy8FoEh1bQ+nS6cg"
 _QUOTES = ('"{}"', "'{}'", '"""{}"""', "'''\n{}'''", '"""\\\n  {}"""')
@@ -149,6 +149,7 @@ def test_each_certificate_is_told_whatever_the_others_are(tmp_path: Path) -> Non
     told = {one.of: one for one in facts.certificates()}
     assert isinstance(told["d-good.der"], CertificateFacts)
     assert told["d-good.der"].subject == "CN=box"
+    assert told["d-good.der"].until - told["d-good.der"].since == timedelta(days=9).total_seconds()
     unread = {name for name, one in told.items() if isinstance(one, UnreadablePart) and one.text}
     assert unread == {"a-malformed.der", "b.txt", "c-folder"}
 
@@ -162,11 +163,47 @@ def test_who_was_refused_is_told_with_the_reason(tmp_path: Path, monkeypatch: py
     store.keep_rejected([stranger.certificate], "10.0.0.1", 0.0)
     store.trust(known.certificate)
     told = {one.of: one for one in facts.certificates() if isinstance(one, CertificateFacts)}
-    assert told["trusted"].subject == "CN=known"
+    assert (told["trusted"].subject, told["trusted"].wrong) == ("CN=known", "")
+    assert (told["trusted"].since, told["trusted"].until) == (
+        CLIENT.begins.timestamp(),
+        CLIENT.ends.timestamp(),
+    )
     refused = told["rejected"]
     assert (refused.subject, refused.thumbprint) == ("CN=client", thumbprint(stranger.certificate))
     assert str(refused.wrong) == "it is not trusted"
     assert [one.is_refused for one in told.values()] == [False, True]
+
+
+def test_one_that_is_trusted_and_has_run_out_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    facts = system(tmp_path, '[opcua]\nlisten = "127.0.0.1:4840"\n')
+    TrustStore(tmp_path / "state" / "certificates").trust(make(CLIENT.but(ends=NOW - DAY / 2)).certificate)
+    (old,) = facts.certificates()
+    assert isinstance(old, CertificateFacts)
+    assert old.of == "trusted"
+    assert "was valid until" in str(old.wrong)
+
+
+def test_what_is_in_trusted_dir_counts_for_who_was_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    facts = system(tmp_path, f'[opcua]\nlisten = "127.0.0.1:4840"\ntrusted_dir = "{tmp_path / "more"}"\n')
+    store, client = TrustStore(tmp_path / "state" / "certificates"), make()
+    store.prepare()
+    store.keep_rejected([client.certificate], "10.0.0.1", 0.0)
+
+    def wrong() -> str:
+        return next(
+            str(one.wrong)
+            for one in facts.certificates()
+            if isinstance(one, CertificateFacts) and one.is_refused
+        )
+
+    assert wrong() == "it is not trusted"
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "panel.der").write_bytes(client.der)
+    assert wrong() == ""
 
 
 def test_a_folder_that_may_not_be_read_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

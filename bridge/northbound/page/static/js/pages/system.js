@@ -30,7 +30,7 @@ function View() {
         <${Health} />
       </div>
       <${Clients} told=${told} />
-      <${Certificates} certificates=${told.certificates} />
+      <${Certificates} certificates=${told.certificates} trustsAnybody=${told.trusts_anybody} again=${answer.again} />
     `}
     ${may("engineer") ? html`<${SiteFile} />` : html`<p class="quiet">${t("system.engineer")}</p>`}
     <${Events} />

@@ -106,7 +106,7 @@ class ValueItem:
 
     @property
     def share(self) -> Hashable:
-        """What it is counted as."""
+        """Key under which it is counted."""
         return self.source, self.node, self.attribute
 
     @property

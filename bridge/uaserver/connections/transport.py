@@ -261,7 +261,7 @@ class Processor(UaProcessor):
         except ServiceError as error:
             # Part 4 §5.7.3.1: who uses a session before it is activated has none any more.
             if error.code == StatusCodes.BadSessionNotActivated and isinstance(self.session, Session):
-                await self.session.close_session()
+                await self.session.abort()
             raise
         self._begin()
         if need is Need.CREATE:
@@ -344,6 +344,8 @@ class Processor(UaProcessor):
 
     async def close(self) -> None:
         self._undertakings.cancel_all()
+        if isinstance(self.session, Session) and self._should_close_session_on_transport_loss():
+            await self.session.abort()
         await super().close()
         if isinstance(self.session, Session) and self.session.holder is self:
             self.session.leave(clock.now())

@@ -6,10 +6,11 @@ import asyncio
 
 import pytest
 from asyncua import Client, ua
+from asyncua.ua.ua_binary import struct_from_binary
 
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.uaserver.conformance import claimed
-from tests.support.opcua_raw import ask, item, monitored, published, subscribed, values
+from tests.support.opcua_raw import answered, ask, asking, item, monitored, published, subscribed, values
 from tests.support.opcua_services import LOAD, client, load, point, served, server, view
 from tests.support.opcua_site import LocalView, connected
 
@@ -32,6 +33,38 @@ def number(value: int) -> ua.Variant:
 async def test_the_server_claims_no_more_than_is_held(client: Client) -> None:
     told = await client.get_node(Ids.Server_ServerCapabilities_ServerProfileArray).read_value()
     assert told == claimed()
+
+
+async def test_a_request_is_answered_by_its_handle_with_what_it_asks_for(client: Client) -> None:
+    """Every service: the session's token, the request's handle, its diagnostics and its time-out."""
+    too_many = [ua.ReadValueId(ua.NodeId(Ids.Server), ua.AttributeIds.NodeId)] * 10_001
+    for request, code in (
+        (asking("Read", NodesToRead=too_many[:1]), Codes.Good),
+        (asking("Read", 0x07, NodesToRead=too_many), Codes.BadTooManyOperations),
+        (asking("Read", NodesToRead=too_many), Codes.BadTooManyOperations),
+    ):
+        header = (await answered(client, request)).ResponseHeader
+        assert (header.RequestHandle, header.ServiceResult.value) == (
+            request.RequestHeader.RequestHandle,
+            code,
+        )
+        info, table = header.ServiceDiagnostics, header.StringTable
+        is_explained = bool(code and request.RequestHeader.ReturnDiagnostics)
+        assert (info.AdditionalInfo is not None, info.LocalizedText is not None) == (is_explained,) * 2
+        if is_explained:
+            assert "too many operations" in table[info.LocalizedText]
+            assert info.AdditionalInfo == "10001 operations, where one request may have 10000"
+    await subscribed(client, 5000)
+    hasty = asking("Publish")
+    future = client.uaclient.protocol._send_request(hasty, 0.2)  # pyright: ignore[reportPrivateUsage]
+    own = client.uaclient.protocol.authentication_token
+    client.uaclient.session.restore_authentication_token(ua.NodeId(b"x" * 32, 0, ua.NodeIdType.ByteString))
+    wrong = await answered(client, asking("Read", NodesToRead=too_many[:1]))
+    assert wrong.ResponseHeader.ServiceResult.value == Codes.BadSessionIdInvalid
+    client.uaclient.session.restore_authentication_token(own)
+    fault = struct_from_binary(ua.ServiceFault, await asyncio.wait_for(future, 8))
+    assert fault.ResponseHeader.RequestHandle == hasty.RequestHeader.RequestHandle
+    assert fault.ResponseHeader.ServiceResult.value == Codes.BadTimeout
 
 
 async def test_a_client_that_has_forgotten_its_items_asks_for_them(

@@ -50,7 +50,7 @@ class ServerCounts:
     sessions_refused_for_security: int = 0
     sessions_timed_out: int = 0
     sessions_aborted: int = 0
-    """Those that ended with their connection, for want of it, or because they were used before they were
+    """Sessions that ended with their connection, for want of it, or because they were used before they were
     activated."""
     subscriptions: int = 0
     requests_refused: int = 0

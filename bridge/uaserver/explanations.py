@@ -14,7 +14,7 @@ _ADDITIONAL_INFO: Final = 0x80
 _ASKED_FOR: Final = _SYMBOLIC_ID | _LOCALIZED_TEXT | _ADDITIONAL_INFO
 """Bits of ``returnDiagnostics`` for single operations (Part 4 §7.32)."""
 _BITS_OF_SERVICE: Final = 5
-"""Those for the service as a whole are as many places lower."""
+"""Places by which the bits for the service as a whole are lower."""
 
 _LONGEST: Final = 1_000
 _MOST_CHARACTERS: Final = 50_000

@@ -78,7 +78,7 @@ InvalidSignature: type[Exception] = get(uacrypto, "InvalidSignature")
 
 
 def describe_code(code: int) -> str:
-    """What a status code means, in English."""
+    """Meaning of a status code, in English."""
     return get_name_and_doc(code)[1]
 
 

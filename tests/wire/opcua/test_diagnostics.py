@@ -123,6 +123,7 @@ async def test_others_see_their_own_and_no_more(served: Served) -> None:
 
 async def test_each_session_is_found_by_browsing_and_goes_with_its_end(served: Served) -> None:
     async with seen(served, "emil", secret=True) as (emil, his):
+        assert await read(emil, Ids.Server_ServerDiagnostics_EnabledFlag) is True
         number = (await subscribed(emil, 1000)).SubscriptionId
         async with seen(served, "anna") as (_, hers):
             summary = emil.get_node(SESSIONS)

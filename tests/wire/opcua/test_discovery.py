@@ -7,7 +7,6 @@ import asyncio
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -18,8 +17,6 @@ from tests.support.opcua_peers import make_peer
 from tests.support.opcua_raw import ask
 from tests.support.opcua_site import OPEN, connected, serving
 from tests.support.process import REPOSITORY, free_port
-
-HAS_OPEN62541 = find_spec("o6") is not None
 
 
 @asynccontextmanager
@@ -72,8 +69,8 @@ async def registers(kind: str, folder: Path) -> None:
         assert uri not in await known(url), "it has said that it ends"
 
 
-@pytest.mark.skipif(not HAS_OPEN62541, reason="open62541 is not there")
 async def test_a_discovery_server_names_it_as_long_as_it_runs(tmp_path: Path) -> None:
+    pytest.importorskip("o6", reason="open62541 is not there")
     await registers("open62541", tmp_path)
 
 

@@ -42,7 +42,9 @@ _ROOM: Final = f"{_CONFORMANCE}test_half_of_fifty_sessions_have_all_that_is_aske
 _PUBLISHES: Final = f"{_CONFORMANCE}test_ten_publish_requests_may_wait_and_ten_messages_for_a_republish"
 _SESSIONS: Final = f"{_CONFORMANCE}test_fifty_sessions_are_served_at_a_time"
 _QUEUES: Final = f"{_CONFORMANCE}test_a_queue_keeps_as_many_as_it_is_long"
-_WRONG_LOGINS: Final = f"{_WIRE}test_crowds.py::test_wrong_passwords_hold_up_no_right_one"
+_WRONG_LOGINS: Final = (
+    f"{_WIRE}test_crowds.py::test_wrong_logins_are_answered_later_and_later_and_right_ones_at_once"
+)
 _WHOLE: Final = f"{_WIRE}test_attributes.py::test_every_variable_is_read_and_written_whole"
 _SELF_DESCRIPTION: Final = f"{_WIRE}test_attributes.py::test_what_the_server_says_of_itself_is_read"
 

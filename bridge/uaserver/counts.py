@@ -50,6 +50,8 @@ class ServerCounts:
     sessions_refused_for_security: int = 0
     sessions_timed_out: int = 0
     sessions_aborted: int = 0
+    """Sessions that ended with their connection, for want of it, or because they were used before they were
+    activated."""
     subscriptions: int = 0
     requests_refused: int = 0
     requests_refused_for_security: int = 0

@@ -1,4 +1,4 @@
-"""Diagnostic information of operations, for clients that ask for it (OPC 10000-4 §7.12, §7.32)."""
+"""Diagnostic information of operations and faults, for clients that ask for it (OPC 10000-4 §7.12, §7.32)."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from bridge.uaserver.library import get, make, ua
+from bridge.uaserver.library import change, describe_code, get, make, status, text, ua
 
 _SYMBOLIC_ID: Final = 0x20
 _LOCALIZED_TEXT: Final = 0x40
 _ADDITIONAL_INFO: Final = 0x80
 _ASKED_FOR: Final = _SYMBOLIC_ID | _LOCALIZED_TEXT | _ADDITIONAL_INFO
 """Bits of ``returnDiagnostics`` for single operations (Part 4 §7.32)."""
+_BITS_OF_SERVICE: Final = 5
+"""Places by which the bits for the service as a whole are lower."""
 
 _LONGEST: Final = 1_000
 _MOST_CHARACTERS: Final = 50_000
@@ -21,8 +23,8 @@ _MOST_CHARACTERS: Final = 50_000
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Reason why an operation ended as it did: ``symbol`` for programs, one of ``namespace``, ``text`` for
-    people, ``more`` as whoever has refused it says it."""
+    """Reason why an operation ended as it did: ``symbol`` for programs, one of ``namespace``, "" for none,
+    ``text`` for people, ``more`` as whoever has refused it says it."""
 
     symbol: str
     namespace: str
@@ -70,9 +72,23 @@ def add_explanations(
     response.ResponseHeader.StringTable = list(strings.known)
 
 
+def fault(header: ua.RequestHeader, code: int, more: str = "") -> ua.ServiceFault:
+    """Answer to a request with this ``header`` that is refused with ``code``. Who asks is told what the
+    code means, and ``more`` of this one case. Codes of the standard have no symbol (Part 4 §7.12)."""
+    fields: dict[str, object] = {"ServiceResult": status(code)}
+    asked: int = get(header, "ReturnDiagnostics") << _BITS_OF_SERVICE
+    if asked & (_LOCALIZED_TEXT | _ADDITIONAL_INFO):
+        strings = _Strings()
+        why = Explanation("", "", text(describe_code(code)), more)
+        fields |= {"ServiceDiagnostics": _info(why, asked, strings), "StringTable": list(strings.known)}
+    response = ua.ServiceFault()
+    change(get(response, "ResponseHeader"), **fields)
+    return response
+
+
 def _info(one: Explanation, asked: int, strings: _Strings) -> ua.DiagnosticInfo:
     fields: dict[str, object] = {}
-    if asked & _SYMBOLIC_ID:
+    if asked & _SYMBOLIC_ID and one.symbol:
         fields |= {
             "SymbolicId": strings.place(one.symbol),
             "NamespaceURI": strings.place(one.namespace),

@@ -15,6 +15,7 @@ from asyncua.crypto import uacrypto
 from asyncua.ua.attribute_ids import AttributeIds as AttributeIds
 from asyncua.ua.object_ids import ObjectIds as ObjectIds
 from asyncua.ua.status_codes import StatusCodes as StatusCodes
+from asyncua.ua.status_codes import get_name_and_doc
 from asyncua.ua.uaerrors import UaError as UaError
 from asyncua.ua.uaerrors import UaStatusCodeError as UaStatusCodeError
 
@@ -43,6 +44,14 @@ GOOD: Final = status(StatusCodes.Good)
 _T = TypeVar("_T")
 
 
+class ExplainedFault(ServiceError):
+    """Service that is refused; ``why`` is for who has asked for it to be explained."""
+
+    def __init__(self, code: int, why: str) -> None:
+        super().__init__(code)
+        self.why = why
+
+
 def make(structure: Callable[..., _T], **fields: object) -> _T:
     """A new one of asyncua's structures with these fields set."""
     return change(structure(), **fields)
@@ -66,6 +75,11 @@ def first_certificate(content: bytes | None) -> x509.Certificate | None:
 
 
 InvalidSignature: type[Exception] = get(uacrypto, "InvalidSignature")
+
+
+def describe_code(code: int) -> str:
+    """Meaning of a status code, in English."""
+    return get_name_and_doc(code)[1]
 
 
 def text(words: str) -> ua.LocalizedText:

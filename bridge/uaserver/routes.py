@@ -21,9 +21,9 @@ from asyncua.ua.ua_binary import struct_from_binary
 from bridge.uaserver.browsing import Browser
 from bridge.uaserver.decoding import decoded, first_length
 from bridge.uaserver.encoding import UNSENDABLE, Results
-from bridge.uaserver.explanations import Explain, Explanation, add_explanations
+from bridge.uaserver.explanations import Explain, Explanation, add_explanations, fault
 from bridge.uaserver.history.historyread import MOST_NODES
-from bridge.uaserver.library import ServiceError, StatusCodes, change, get, make, status, ua
+from bridge.uaserver.library import ExplainedFault, ServiceError, StatusCodes, change, get, make, ua
 from bridge.uaserver.loop import loop_time
 from bridge.uaserver.services import request_type
 from bridge.uaserver.session import Session
@@ -177,9 +177,7 @@ def _publish(session: Session, params: ua.PublishParameters, request: ServiceReq
             refuse(StatusCodes.BadEncodingError)
 
     def refuse(code: int) -> None:
-        fault = ua.ServiceFault()
-        change(get(fault, "ResponseHeader"), ServiceResult=status(code))
-        request.send(fault)
+        request.send(fault(request.header, code))
 
     hint_ms: int = request.header.TimeoutHint
     expires_at = loop_time() + hint_ms / 1000 if hint_ms else float("inf")
@@ -254,4 +252,5 @@ def _limit(operations: int, most: int) -> None:
     if not operations:
         raise ServiceError(StatusCodes.BadNothingToDo)
     if operations > most:
-        raise ServiceError(StatusCodes.BadTooManyOperations)
+        why = f"{operations} operations, where one request may have {most}"
+        raise ExplainedFault(StatusCodes.BadTooManyOperations, why)

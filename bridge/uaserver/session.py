@@ -320,6 +320,11 @@ class Session(InternalSession):
         if holder:
             holder.end(StatusCodes.BadTcpServerTooBusy)
 
+    async def abort(self, *, delete_subs: bool = True) -> None:
+        """End it for an error, of its client or of the network, and count that (Part 5 §12.9)."""
+        self._server.counts.sessions_aborted += not self.is_gone
+        await self.close_session(delete_subs)
+
     async def close_session(self, delete_subs: bool = True) -> None:
         # asyncua closes it again when its connection ends, and would have the subscriptions deleted then.
         if self.state is SessionState.Closed:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from typing import Any
 
 from asyncua import Client, ua
-from asyncua.ua.ua_binary import struct_from_binary
+from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary
 
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.uaserver.session import Session
@@ -22,12 +23,25 @@ async def explained(client: Client, service: str, **params: object) -> Any:
     return await _ask(client, service, 0xE0, params)
 
 
-async def _ask(client: Client, service: str, diagnostics: int, params: dict[str, object]) -> Any:
+async def answered(client: Client, request: Any) -> Any:
+    """The response to a request, also where it is a fault: as it is on the wire."""
+    future = client.uaclient.protocol._send_request(request, 10)  # pyright: ignore[reportPrivateUsage]
+    data = await asyncio.wait_for(future, 10)
+    kind = nodeid_from_binary(data.copy())
+    return struct_from_binary(ua.extension_objects_by_typeid[kind], data)
+
+
+def asking(service: str, diagnostics: int = 0, **params: object) -> Any:
+    """Request of a service; ``diagnostics`` are its ``returnDiagnostics``."""
     request = getattr(ua, f"{service}Request")()
     request.RequestHeader.ReturnDiagnostics = diagnostics
     for name, value in params.items():
         setattr(request.Parameters, name, value)
-    data = await client.uaclient.protocol.send_request(request)
+    return request
+
+
+async def _ask(client: Client, service: str, diagnostics: int, params: dict[str, object]) -> Any:
+    data = await client.uaclient.protocol.send_request(asking(service, diagnostics, **params))
     return struct_from_binary(getattr(ua, f"{service}Response"), data)
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
+from bridge.base import clock
 from bridge.base.sources import source_of
 from bridge.command.messages.request import Identity, Role, Source
 from bridge.config import OpcUaTable
 from bridge.northbound.logins import PasswordChecks
 from bridge.northbound.opcua.certificates.client_trust import utc_now
 from bridge.northbound.opcua.certificates.user_certificates import judge_user, user_certificates
+from bridge.northbound.opcua.failed_logins import FailedLogins
 from bridge.northbound.passwords import ANONYMOUS, check_users
 from bridge.trust import TrustLists
 from bridge.trust.chain import named
@@ -42,13 +45,20 @@ class Accounts:
     """The users of the site file, with passwords or certificates; ``lists`` gives who is trusted at present,
     for the issuers of these."""
 
-    def __init__(self, settings: OpcUaTable, lists: Callable[[], TrustLists] = TrustLists) -> None:
+    def __init__(
+        self,
+        settings: OpcUaTable,
+        lists: Callable[[], TrustLists] = TrustLists,
+        sleep: Callable[[float], Any] = asyncio.sleep,
+    ) -> None:
         check_users(settings.user)
         self._accounts = {user.name: user for user in settings.user}
         self._of_certificates = user_certificates(settings)
         self._lists = lists
         self._anonymous = Role.named(settings.anonymous)
         self._checks = PasswordChecks()
+        self._failed = FailedLogins()
+        self._sleep = sleep
 
     def close(self) -> None:
         self._checks.close()
@@ -72,7 +82,15 @@ class Accounts:
         return tokens or [ua.UserNameIdentityToken]
 
     async def identify(self, login: LoginAttempt) -> Identity:
-        """Identity that an identity token stands for. Raises ServiceError."""
+        """Identity that an identity token stands for. Raises ServiceError, after a while where many have
+        failed."""
+        try:
+            return await self._identify(login)
+        except ServiceError:
+            await self._sleep(self._failed.delay_s(source_of(login.address), clock.now()))
+            raise
+
+    async def _identify(self, login: LoginAttempt) -> Identity:
         token, address = login.token, login.address
         if isinstance(token, ua.UserNameIdentityToken):
             password = read_password(token, login.nonce, login.key, encrypted=login.encrypted)

@@ -18,6 +18,7 @@ from bridge.uaserver.client_notices import tell
 from bridge.uaserver.library import (
     ServiceError,
     StatusCodes,
+    change,
     first_certificate,
     get,
     ua,
@@ -123,6 +124,12 @@ class SecureChannel(SecureConnection):
             self._refuse(words, StatusCodes.BadSecurityModeRejected)
         super().select_policy(uri, peer_certificate, mode)
         self._shown = peer_certificate
+
+    def open(self, params: Any, server: Any) -> ua.OpenSecureChannelResult:
+        """Without security there is no nonce (Part 6 §6.7.4): null, where asyncua says one of no bytes."""
+        result = super().open(params, server)
+        is_none = self.security_policy.Mode is ua.MessageSecurityMode.None_
+        return change(result, ServerNonce=None) if is_none else result
 
     def _offers(self, uri: str, mode: ua.MessageSecurityMode | None = None) -> bool:
         return any(policy.matches(uri, mode) for policy in self._policies)

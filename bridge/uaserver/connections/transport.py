@@ -36,8 +36,10 @@ from bridge.uaserver.client_notices import tell
 from bridge.uaserver.connection_limits import ConnectionStage
 from bridge.uaserver.connections.security import SecureChannel, check_policy
 from bridge.uaserver.encoding import encode
+from bridge.uaserver.explanations import fault
 from bridge.uaserver.languages import speaking
 from bridge.uaserver.library import (
+    ExplainedFault,
     InvalidSignature,
     ServiceError,
     StatusCodes,
@@ -186,7 +188,8 @@ class Processor(UaProcessor):
         try:
             requesthdr = struct_from_binary(ua.RequestHeader, body)
         except decoding.MALFORMED as error:
-            self._refuse(decoding.request_handle(header), seqhdr, self._fault(error))
+            unread = make(ua.RequestHeader, RequestHandle=decoding.request_handle(header))
+            self._refuse(unread, seqhdr, self._fault(error))
             return True
         if typeid not in _SLOW:
             try:
@@ -207,11 +210,11 @@ class Processor(UaProcessor):
             self._note(typeid, StatusCodes.Good)
             return goes_on
         except (ServiceError, UaStatusCodeError) as error:
-            code = int(error.code)
+            code, why = int(error.code), error.why if isinstance(error, ExplainedFault) else ""
         except Exception as error:  # noqa: BLE001 - asyncua logs a traceback for each
-            code = self._fault(error)
+            code, why = self._fault(error), str(error) if decoding.is_malformed(error) else ""
         self._note(typeid, code)
-        self._refuse(requesthdr.RequestHandle, seqhdr, code)
+        self._refuse(requesthdr, seqhdr, code, why)
         return True
 
     def _note(self, typeid: ua.NodeId, code: int) -> None:
@@ -224,10 +227,8 @@ class Processor(UaProcessor):
             session.counts.note(NAMES[typeid], code)
             session.facts.seen_at = datetime.now(UTC)
 
-    def _refuse(self, handle: int, seqhdr: Any, code: int) -> None:
-        fault = ua.ServiceFault()
-        fault.ResponseHeader.ServiceResult = status(code)
-        self.send_response(handle, seqhdr, fault)
+    def _refuse(self, requesthdr: Any, seqhdr: Any, code: int, why: str = "") -> None:
+        self.send_response(requesthdr.RequestHandle, seqhdr, fault(requesthdr, code, why))
 
     def _fault(self, error: Exception) -> int:
         if decoding.is_malformed(error):
@@ -261,7 +262,7 @@ class Processor(UaProcessor):
         except ServiceError as error:
             # Part 4 §5.7.3.1: who uses a session before it is activated has none any more.
             if error.code == StatusCodes.BadSessionNotActivated and isinstance(self.session, Session):
-                await self.session.close_session()
+                await self.session.abort()
             raise
         self._begin()
         if need is Need.CREATE:
@@ -328,7 +329,7 @@ class Processor(UaProcessor):
         session.touch()
 
         send = partial(self.send_response, requesthdr.RequestHandle, seqhdr)
-        refuse = partial(self._refuse, requesthdr.RequestHandle, seqhdr)
+        refuse = partial(self._refuse, requesthdr, seqhdr)
 
         def is_open() -> bool:
             return session.holder is self and not self._transport.is_closing()
@@ -344,6 +345,8 @@ class Processor(UaProcessor):
 
     async def close(self) -> None:
         self._undertakings.cancel_all()
+        if isinstance(self.session, Session) and self._should_close_session_on_transport_loss():
+            await self.session.abort()
         await super().close()
         if isinstance(self.session, Session) and self.session.holder is self:
             self.session.leave(clock.now())

@@ -45,7 +45,7 @@ async def make_room_for_session(address: str, sessions: Sequence[SubscriptionOwn
     lowest = min(one.identity.rank for one in yielding)
     left = [one for one in yielding if one.holder is None and one.identity.rank == lowest]
     if left:
-        await min(left, key=lambda one: one.left_at).close_session(delete_subs=False)
+        await min(left, key=lambda one: one.left_at).abort(delete_subs=False)
     else:
         await first_to_yield(yielding, _rank_of, share_of).evict()
 
@@ -76,7 +76,7 @@ async def make_room(
         ending = [one for one in left if of_address < MOST_OF_ADDRESS or one in same]
         if ending:
             left.remove(ending[0])
-            await ending[0].close_session()
+            await ending[0].abort()
             continue
         among = [one.owner for one in subscriptions.values()]
         lower = lower_than(session, [one for one in among if of_address < MOST_OF_ADDRESS or one in same])

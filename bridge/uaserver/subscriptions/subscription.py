@@ -89,7 +89,9 @@ class SubscriptionOwner(Protocol):
         """``value`` as this user may see it."""
         ...
 
-    async def close_session(self, delete_subs: bool = True) -> None: ...
+    async def abort(self, *, delete_subs: bool = True) -> None:
+        """End it for an error, of its client or of the network, and count that."""
+        ...
 
     async def evict(self) -> None:
         """End it, with its subscriptions and its connection, for somebody with a higher role."""

@@ -7,7 +7,7 @@ from asyncua import ua
 from asyncua.common.utils import Buffer
 from asyncua.ua.ua_binary import struct_from_binary, struct_to_binary
 
-from bridge.uaserver.explanations import Explanation, add_explanations
+from bridge.uaserver.explanations import Explanation, add_explanations, fault
 
 WHY = Explanation("parameter.refused", "urn:codes", ua.LocalizedText("no", "en"), "SDO abort 06090030h")
 ALL, SYMBOL, TEXT, MORE = 0xE0, 0x20, 0x40, 0x80
@@ -53,3 +53,26 @@ def test_texts_are_told_once_and_not_without_end() -> None:
     told = answer(TEXT, long, 500)
     assert sum(map(len, told.ResponseHeader.StringTable)) < 52_000
     assert len(told.DiagnosticInfos) == 500
+
+
+def refused(asked: int, more: str = "") -> ua.ResponseHeader:
+    response = fault(ua.RequestHeader(ReturnDiagnostics=asked), ua.StatusCodes.BadTooManyOperations, more)
+    header = struct_from_binary(ua.ServiceFault, Buffer(struct_to_binary(response))).ResponseHeader
+    assert header.ServiceResult.value == ua.StatusCodes.BadTooManyOperations
+    return header
+
+
+def test_a_fault_says_what_its_code_means_and_what_is_wrong_in_this_case() -> None:
+    header = refused(0x07, "7 operations")
+    info, table = header.ServiceDiagnostics, header.StringTable
+    assert (info.SymbolicId, info.NamespaceURI) == (None, None), "codes of the standard have none"
+    assert table[info.Locale] == "en"
+    assert table[info.LocalizedText].startswith("The request could not be processed because it specified too")
+    assert info.AdditionalInfo == "7 operations"
+
+
+@pytest.mark.parametrize(("asked", "mask"), [(0x01, 0), (0x02, 0x0C), (0x04, 0x10), (0x07, 0x1C), (0xE0, 0)])
+def test_a_fault_has_what_was_asked_for_of_the_service(asked: int, mask: int) -> None:
+    header = refused(asked, "7 operations")
+    assert struct_to_binary(header.ServiceDiagnostics)[0] == mask
+    assert len(header.StringTable) == (2 if mask & 0x0C else 0)

@@ -71,6 +71,17 @@ async def test_the_application_is_told_who_comes_and_goes_and_who_else_is_there(
     assert first.is_gone and not second.is_gone
 
 
+async def test_what_ends_for_an_error_is_counted_and_no_other_end(rig: Rig) -> None:
+    sessions = [rig.session() for _ in range(4)]
+    await sessions[0].close_session()
+    await sessions[1].evict()
+    await sessions[2].abort()
+    for session in sessions[:3]:
+        await session.abort()  # as its connection does when it ends
+    assert rig.server.sessions == sessions[3:]
+    assert rig.server.counts.sessions_aborted == 1
+
+
 async def test_another_user_on_the_same_session_ends_the_one_before(rig: Rig) -> None:
     session = rig.session(User("anna"))
     session.admitted = User("eva")

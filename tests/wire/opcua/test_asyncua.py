@@ -27,7 +27,7 @@ from tests.support.opcua_site import OPEN, break_off, connected, serving
 
 OVERRIDDEN = {
     "BoundServer": {"start", "stop"},
-    "SecureChannel": {"select_policy"},
+    "SecureChannel": {"open", "select_policy"},
     "TcpAcceptor": {"_make_protocol", "start", "stop"},
     "Processor": {
         "_process_message",

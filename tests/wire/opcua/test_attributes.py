@@ -51,6 +51,69 @@ async def test_no_attribute_of_any_node_is_good_and_null(served: Served, client:
     assert not empty, (len(empty), empty[:20])
 
 
+OF_ALL = (Attribute.NodeId, Attribute.NodeClass, Attribute.BrowseName, Attribute.DisplayName)
+OF_CLASS = {
+    ua.NodeClass.Object: (Attribute.EventNotifier,),
+    ua.NodeClass.Variable: (
+        *(Attribute.Value, Attribute.DataType, Attribute.ValueRank, Attribute.AccessLevel),
+        *(Attribute.UserAccessLevel, Attribute.Historizing),
+    ),
+    ua.NodeClass.Method: (Attribute.Executable, Attribute.UserExecutable),
+    ua.NodeClass.ObjectType: (Attribute.IsAbstract,),
+    ua.NodeClass.VariableType: (Attribute.DataType, Attribute.ValueRank, Attribute.IsAbstract),
+    ua.NodeClass.ReferenceType: (Attribute.IsAbstract, Attribute.Symmetric),
+    ua.NodeClass.DataType: (Attribute.IsAbstract,),
+}
+"""Mandatory attributes of each NodeClass (OPC 10000-3 §5)."""
+
+
+@pytest.mark.landing
+async def test_each_node_has_the_mandatory_attributes_of_its_class(served: Served, client: Client) -> None:
+    (session,) = sessions(served[0])
+    missing: list[str] = []
+    seen: set[ua.NodeClass] = set()
+    for where in walked(session.aspace):
+
+        def read(attribute: Attribute, where: ua.NodeId = where) -> ua.DataValue:
+            wanted = ua.ReadValueId(NodeId=where, AttributeId=attribute)
+            return session._read(wanted, NEITHER)  # pyright: ignore[reportPrivateUsage]
+
+        def is_missing(attribute: Attribute) -> bool:
+            code = read(attribute).StatusCode
+            return code is not None and code.value == Codes.BadAttributeIdInvalid
+
+        node_class = ua.NodeClass(read(Attribute.NodeClass).Value.Value)
+        seen.add(node_class)
+        missing += [
+            f"{where} {attribute.name}"
+            for attribute in (*OF_ALL, *OF_CLASS[node_class])
+            if is_missing(attribute)
+        ]
+    assert not missing, (len(missing), missing[:20])
+    assert seen == set(OF_CLASS)
+
+
+@pytest.mark.landing
+async def test_each_type_that_is_used_is_there_below_its_root(served: Served, client: Client) -> None:
+    (session,) = sessions(served[0])
+    space = session.aspace
+    roots = (Ids.BaseObjectType, Ids.BaseVariableType, Ids.BaseDataType, Ids.References)
+    objects, variables, data, references = (subtypes(space, ua.NodeId(root)) for root in roots)
+    missing: set[str] = set()
+    for where in walked(space):
+        node = space[where]
+        for reference in node.references:
+            if reference.ReferenceTypeId not in references:
+                missing.add(f"{where} has the reference {reference.ReferenceTypeId}")
+            is_type = reference.IsForward and reference.ReferenceTypeId == ua.NodeId(Ids.HasTypeDefinition)
+            if is_type and reference.NodeId not in objects | variables:
+                missing.add(f"{where} is a {reference.NodeId}")
+        kind = node.attributes.get(Attribute.DataType)
+        if kind and kind.value and kind.value.Value and kind.value.Value.Value not in data:
+            missing.add(f"{where} holds {kind.value.Value.Value}")
+    assert not missing, (len(missing), sorted(missing)[:20])
+
+
 async def test_what_the_server_says_of_itself_is_read(served: Served, client: Client) -> None:
     for name, value in VALUES.items():
         assert await client.get_node(ua.NodeId(getattr(Ids, name))).read_value() == value.Value, name

@@ -18,6 +18,7 @@ from bridge.uaserver import connection_limits
 from bridge.uaserver.connection_limits import DEADLINE_S, ConnectionStage
 from bridge.uaserver.subscriptions import monitoring, quotas
 from tests.support.opcua_site import OPEN, break_off, connected, serving
+from tests.support.passwords import cheap_hash
 from tests.support.quiet import quiet_log
 
 Streams = list[tuple[asyncio.StreamReader, asyncio.StreamWriter]]
@@ -153,6 +154,33 @@ async def test_wrong_passwords_hold_up_no_right_one(tmp_path: Path) -> None:
         assert not all(task.done() for task in wrong), "the wrong ones still wait"
         assert right < max(3 * alone, 0.5)
         await asyncio.gather(*wrong)
+
+
+async def test_wrong_logins_are_answered_later_and_later_and_right_ones_at_once(tmp_path: Path) -> None:
+    """Part 4 §5.7.3.1."""
+    user = UserTable(name="anna", role="operator", password_hash=cheap_hash("swordfish"))
+    settings = OpcUaTable(listen="127.0.0.1:0", no_security=True, user=[user])
+
+    async def log_in(password: str) -> float:
+        client = Client(server.endpoint_url, timeout=10)
+        client.set_user("anna")
+        client.set_password(password)
+        await client.connect_socket()
+        await client.send_hello()
+        await client.open_secure_channel()
+        await client.create_session()
+        began = time.monotonic()
+        with suppress(ua.uaerrors.BadUserAccessDenied):
+            await client.activate_session(username="anna", password=password)
+        took = time.monotonic() - began
+        break_off(client)
+        return took
+
+    async with serving(settings, tmp_path) as (server, _):
+        wrong = [await log_in("wrong") for _ in range(5)]
+        assert wrong[3] > 0.25
+        assert wrong[4] > 0.5
+        assert await log_in("swordfish") < 1.0, "a sixth wrong one waits for 1 s"
 
 
 class TestSubscriptions:

@@ -16,7 +16,7 @@ from bridge.uaserver.diagnostics.diagnostics import SecurityDiagnostics
 from bridge.uaserver.session import Session
 from tests.support.opcua_peers import PASSWORD, Served, logged_in, make_peer
 from tests.support.opcua_raw import ask, item, monitored, published, sessions, subscribed, values
-from tests.support.opcua_site import serving
+from tests.support.opcua_site import break_off, serving
 from tests.support.passwords import cheap_hash
 from tests.support.zenoh_peer import until
 
@@ -123,6 +123,7 @@ async def test_others_see_their_own_and_no_more(served: Served) -> None:
 
 async def test_each_session_is_found_by_browsing_and_goes_with_its_end(served: Served) -> None:
     async with seen(served, "emil", secret=True) as (emil, his):
+        assert await read(emil, Ids.Server_ServerDiagnostics_EnabledFlag) is True
         number = (await subscribed(emil, 1000)).SubscriptionId
         async with seen(served, "anna") as (_, hers):
             summary = emil.get_node(SESSIONS)
@@ -172,6 +173,38 @@ async def test_who_watches_them_is_told(served: Served) -> None:
         ids = [one.MonitoredItemId for one in made]
         codes = await ask(emil, "DeleteMonitoredItems", SubscriptionId=number, MonitoredItemIds=ids)
         assert [one.value for one in codes.Results] == [Codes.Good, Codes.Good]
+
+
+async def test_sessions_that_end_for_an_error_are_counted(served: Served) -> None:
+    """Part 5 §12.9. One that is closed is none of them, and one with a subscription waits for its client."""
+    async with seen(served, "emil") as (emil, _):
+
+        async def aborted() -> int:
+            return (await read(emil, SUMMARY)).SessionAbortCount
+
+        before = await aborted()
+        async with seen(served, "anna"):
+            pass
+        async with seen(served, "anna") as (lost, hers):
+            await subscribed(lost, 1000)
+            lost.disconnect_socket()
+            await until(lambda: hers.holder is None, "its connection is gone")
+            assert hers in sessions(served[0])
+            await hers.close_session()
+        assert await aborted() == before
+        async with seen(served, "anna") as (lost, hers):
+            lost.disconnect_socket()
+            await until(lambda: hers not in sessions(served[0]), "it ends with its connection")
+        assert await aborted() == before + 1
+        hasty = Client(served[0].endpoint_url, timeout=5)
+        await hasty.connect_socket()
+        await hasty.send_hello()
+        await hasty.open_secure_channel()
+        await hasty.create_session()
+        with pytest.raises(Errors.BadSessionNotActivated):
+            await hasty.nodes.server_state.read_value()
+        break_off(hasty)
+        assert await aborted() == before + 2
 
 
 async def test_what_a_client_says_of_itself_is_cut(served: Served) -> None:

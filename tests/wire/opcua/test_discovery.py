@@ -1,4 +1,5 @@
-"""How clients find the server: by what it says of itself, and by a discovery server, which is open62541."""
+"""How clients find the server: by what it says of itself, and by a discovery server, which is open62541, or
+asyncua's as an older one."""
 
 from __future__ import annotations
 
@@ -17,18 +18,16 @@ from tests.support.opcua_raw import ask
 from tests.support.opcua_site import OPEN, connected, serving
 from tests.support.process import REPOSITORY, free_port
 
-pytest.importorskip("o6", reason="open62541 is not there")
-
 
 @asynccontextmanager
-async def discovery_server(folder: Path) -> AsyncIterator[str]:
+async def discovery_server(kind: str, folder: Path) -> AsyncIterator[str]:
     peer, port = make_peer("lds"), free_port()
     certificate, key = folder / "lds.der", folder / "lds.pem"
     certificate.write_bytes(peer.certificate)
     key.write_bytes(peer.key)
     process = await asyncio.create_subprocess_exec(
         sys.executable,
-        *("-m", "tests.peers.open62541_lds", str(port), str(certificate), str(key)),
+        *("-m", f"tests.peers.{kind}_lds", str(port), str(certificate), str(key)),
         stdin=asyncio.subprocess.PIPE,
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
@@ -37,8 +36,8 @@ async def discovery_server(folder: Path) -> AsyncIterator[str]:
     assert process.stdout and process.stdin
     try:
         async with asyncio.timeout(20):
-            while b"ready" not in await process.stdout.readline():
-                assert process.returncode is None
+            while b"ready" not in (line := await process.stdout.readline()):
+                assert line, "it has ended"
         yield f"opc.tcp://127.0.0.1:{port}"
     finally:
         process.stdin.close()
@@ -54,10 +53,11 @@ async def known(url: str) -> dict[str, list[str]]:
     return {one.ApplicationUri: list(one.DiscoveryUrls) for one in found}
 
 
-async def test_a_discovery_server_names_it_as_long_as_it_runs(tmp_path: Path) -> None:
-    async with discovery_server(tmp_path) as url:
+async def registers(kind: str, folder: Path) -> None:
+    """It is named by the discovery server as long as it runs."""
+    async with discovery_server(kind, folder) as url:
         settings = OpcUaTable(listen="127.0.0.1:0", discovery_server=url)
-        async with serving(settings, tmp_path / "state") as (server, _):
+        async with serving(settings, folder / "state") as (server, _):
             found: dict[str, list[str]] = {}
             for _ in range(100):
                 found = await known(url)
@@ -67,6 +67,16 @@ async def test_a_discovery_server_names_it_as_long_as_it_runs(tmp_path: Path) ->
             [(uri, urls)] = [(uri, urls) for uri, urls in found.items() if uri.endswith(":drivebridge")]
             assert urls == [server.endpoint_url]
         assert uri not in await known(url), "it has said that it ends"
+
+
+async def test_a_discovery_server_names_it_as_long_as_it_runs(tmp_path: Path) -> None:
+    pytest.importorskip("o6", reason="open62541 is not there")
+    await registers("open62541", tmp_path)
+
+
+async def test_a_discovery_server_that_knows_no_registerserver2_names_it_as_well(tmp_path: Path) -> None:
+    """Part 4 §5.5.6.1: after BadServiceUnsupported by RegisterServer."""
+    await registers("asyncua", tmp_path)
 
 
 async def test_a_discovery_server_that_is_away_is_in_nobodys_way(tmp_path: Path) -> None:

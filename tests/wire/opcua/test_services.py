@@ -232,7 +232,9 @@ async def test_only_endpoints_of_the_profiles_are_named(client: Client) -> None:
 
 async def test_a_node_is_registered_as_itself(client: Client) -> None:
     nodes = [await point(client, LOAD)]
-    assert (await ask(client, "RegisterNodes", NodesToRegister=nodes)).Parameters.RegisteredNodeIds == nodes
+    registered = (await ask(client, "RegisterNodes", NodesToRegister=nodes)).Parameters.RegisteredNodeIds
+    assert registered == nodes
+    assert (await client.get_node(registered[0]).read_browse_name()).Name == "Load"
     await ask(client, "UnregisterNodes", NodesToUnregister=nodes)
 
 

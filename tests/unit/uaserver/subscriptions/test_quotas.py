@@ -110,7 +110,7 @@ class Sessions:
             holder=None if left_at is not None else object(),
             left_at=left_at or 0.0,
             is_gone=False,
-            close_session=end,
+            abort=end,
             evict=end,
         )
         self.all.append(made)

@@ -33,6 +33,7 @@ from tests.compare.drawn import (
     standard,
     times,
 )
+from tests.compare.histories import history
 from tests.compare.sessions import Activate, Close, Create, Use
 
 # Discovery and sessions
@@ -230,6 +231,7 @@ SETS: Final[Mapping[str, Callable[[], Cases]]] = {
     "Session": _session,
     "View": _view,
     "Attribute": _attribute,
+    "History": history,
     "Method": _method,
     "MonitoredItem": monitored_item,
     "Subscription": subscription,

@@ -8,12 +8,14 @@ from __future__ import annotations
 from typing import Final
 
 from tests.compare.difference import Difference
+from tests.compare.known_history import OF_HISTORY
 from tests.compare.known_items import OF_ITEMS
 from tests.compare.known_services import OF_SERVICES
+from tests.compare.known_sessions import OF_SESSIONS
 from tests.compare.play import Seen
 from tests.compare.servers import NAMES, OURS
 
-DIFFERENCES: Final[tuple[Difference, ...]] = (*OF_SERVICES, *OF_ITEMS)
+DIFFERENCES: Final[tuple[Difference, ...]] = (*OF_SESSIONS, *OF_SERVICES, *OF_HISTORY, *OF_ITEMS)
 
 
 def differing(seen: Seen) -> list[str]:

@@ -33,7 +33,10 @@ _OF_CLASS: Final = {
     "object": _COMMON | _OPTIONAL | {Ids.EventNotifier},
     "method": _COMMON | _OPTIONAL | {Ids.Executable, Ids.UserExecutable},
 }
-_VARIABLES: Final = {ua.NodeId(one.id, one.namespace): one for one in (*space.VARIABLES, *space.POINTS)}
+_PAST: Final = [one.variable for one in space.HISTORIES]
+_VARIABLES: Final = {
+    ua.NodeId(one.id, one.namespace): one for one in (*space.VARIABLES, *space.POINTS, *_PAST)
+}
 _OBJECTS: Final = {ua.NodeId(one.id, one.namespace): one for one in space.OBJECTS}
 _METHODS: Final = {ua.NodeId(one.id, one.namespace) for one in space.METHODS}
 _SERVER: Final = ua.NodeId(ua.ObjectIds.Server)

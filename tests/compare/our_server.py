@@ -22,6 +22,7 @@ from bridge.uaserver.address_space import access_level_ex, constant
 from bridge.uaserver.application import ServedApplication
 from bridge.uaserver.explanations import Explain
 from bridge.uaserver.filters.eventfilter import Occurrence
+from bridge.uaserver.history.history import ValueHistory
 from bridge.uaserver.library import make, text, variant
 from bridge.uaserver.session import InnerServer
 from tests.compare import space
@@ -40,7 +41,7 @@ class _Application(ServedApplication[Any]):
         self._inner = inner
 
     def __getattribute__(self, name: str) -> Any:
-        if name in ("write", "call") or name.startswith("_"):
+        if name in ("write", "call", "value_history") or name.startswith("_"):
             return object.__getattribute__(self, name)
         return getattr(self._backend, name)
 
@@ -63,6 +64,9 @@ class _Application(ServedApplication[Any]):
         self._emit(calls[0].InputArguments[0].Value)
         return [ua.CallMethodResult()]
 
+    def value_history(self, where: ua.NodeId) -> ValueHistory | None:
+        return _PAST.get(where) or self._backend.value_history(where)
+
     def _emit(self, severity: int) -> None:
         kinds, now = ua.VariantType, datetime.now(UTC)
         machine = ua.NodeId("machine", 1)
@@ -82,6 +86,30 @@ class _Application(ServedApplication[Any]):
                     subscription.hear(Occurrence(emitter, fields))
 
 
+class _Past:
+    """History of a variable in namespace 1, as a ``ValueHistory``."""
+
+    stepped = False
+    first = 0
+
+    def __init__(self, kept: space.History) -> None:
+        self.end = len(kept.samples)
+        self._kept = kept
+
+    def time_us(self, number: int) -> int:
+        return round(self._kept.at(number).timestamp() * 1_000_000)
+
+    def sample(self, number: int) -> ua.DataValue:
+        value, code = self._kept.samples[number]
+        held = ua.Variant(value, getattr(ua.VariantType, self._kept.variable.type))
+        return ua.DataValue(
+            held, ua.StatusCode(getattr(ua.StatusCodes, code)), SourceTimestamp=self._kept.at(number)
+        )
+
+
+_PAST = {ua.NodeId(one.variable.id, 1): _Past(one) for one in space.HISTORIES}
+
+
 class _Builder:
     def __init__(self, inner: InnerServer) -> None:
         self._space = inner.aspace
@@ -95,7 +123,7 @@ class _Builder:
                 self._add(one.id, one.parent, ua.NodeClass.Object, attributes, kind, Ids.Organizes)
             if one.notifies:
                 self._notify(ua.NodeId(one.id, one.namespace))
-        for one in space.VARIABLES:
+        for one in (*space.VARIABLES, *(one.variable for one in space.HISTORIES)):
             self._variable(one)
         for one in space.METHODS:
             if one.namespace == 1:

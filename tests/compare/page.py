@@ -39,6 +39,7 @@ _WORDS: Final = {
     "some": "endpoints",
     "none": "no endpoint",
     "does not end": "keep-alives of this one alone",
+    "closes": "ends",
 }
 
 
@@ -60,9 +61,7 @@ def _cells(row: Difference) -> Sequence[str]:
 def _told(codes: Codes) -> str:
     if codes is ANYTHING:
         return "differs"
-    return ", ".join(
-        {"None": "nothing", "some": "endpoints", "none": "no endpoint"}.get(one, one) for one in codes
-    )
+    return ", ".join(_WORDS.get(one, one) for one in codes)
 
 
 def _row(cells: Sequence[str]) -> str:

@@ -249,6 +249,7 @@ def _differing(found: Sequence[Facts]) -> Iterator[str]:
 _OPERATIONS: Final = {
     "Read": "NodesToRead",
     "Write": "NodesToWrite",
+    "HistoryRead": "NodesToRead",
     "Browse": "NodesToBrowse",
     "BrowseNext": "ContinuationPoints",
     "TranslateBrowsePathsToNodeIds": "BrowsePaths",

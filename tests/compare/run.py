@@ -84,6 +84,8 @@ def _played(servers: Servers, service_set: str, case: Sequence[Any], report: Rep
     logged_in = service_set not in _WITHOUT_SESSION
     with playing(servers.ports, logged_in=logged_in) as play, suppress(EndOfCaseError):
         play.run(case)
+    for name in _closing(play):
+        servers.await_end(name)
     report.cases += 1
     report.requests += play.asked
     report.told += play.told
@@ -93,6 +95,10 @@ def _played(servers: Servers, service_set: str, case: Sequence[Any], report: Rep
             if row:
                 report.rows[DIFFERENCES.index(row)] += 1
     return play
+
+
+def _closing(play: Play) -> set[str]:
+    return {name for seen in play.seen for name, value in seen.values.items() if value == "closes"}
 
 
 def _unknown(play: Play) -> list[Seen]:

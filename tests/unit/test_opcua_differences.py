@@ -11,6 +11,7 @@ from tests.compare.facts import Facts, facts_of
 from tests.compare.page import PAGE, page
 from tests.compare.play import Party, Play, Seen
 from tests.compare.servers import NAMES, NODE_OPCUA, OPEN62541, OURS
+from tests.compare.space import BEGIN
 
 Codes = ua.StatusCodes
 
@@ -73,6 +74,17 @@ def test_a_row_explains_what_was_asked_so_and_nothing_else(step: Ask, left: list
     refused = read(value(None, Codes.BadDataEncodingInvalid))
     (seen,) = compared(step, read(value(True)), read(value(True)), refused)
     assert unexplained(seen) == left
+
+
+def test_of_the_past_the_samples_are_compared_with_their_times() -> None:
+    sample = value(1.5)
+    sample.SourceTimestamp = BEGIN
+    past = ua.HistoryReadResult(HistoryData=ua.HistoryData([sample]), ContinuationPoint=b"more")
+    found = facts_of(ua.HistoryReadResponse(Results=[past]), "HistoryRead")
+    assert found["Results[0].values"] == [f"{BEGIN} Double 1.5 Good"]
+    assert found["Results[0].goes on"] is True
+    nothing = facts_of(ua.HistoryReadResponse(Results=[ua.HistoryReadResult()]), "HistoryRead")
+    assert nothing["Results[0].values"] == []
 
 
 def test_of_several_faults_any_may_be_told_but_no_other_code() -> None:

@@ -2,7 +2,9 @@
 // It says "port PORT" once it listens. The nodes are those of tests/compare/space.py.
 import { readFileSync } from "node:fs";
 import * as opcua from "node-opcua-server";
+import { VariableHistorian } from "node-opcua-address-space";
 import { DataType, Variant, VariantArrayType } from "node-opcua-variant";
+import { DataValue } from "node-opcua-data-value";
 import { StatusCodes } from "node-opcua-status-code";
 import { MessageSecurityMode, SecurityPolicy } from "node-opcua-secure-channel";
 
@@ -61,6 +63,28 @@ for (const one of made.variables) {
     const [low, high] = one.range;
     namespace.addAnalogDataItem({ ...options, engineeringUnitsRange: { low, high } });
   } else namespace.addVariable(options);
+}
+for (const one of made.histories) {
+  const { variable, samples } = one;
+  const node = namespaces[1].addVariable({
+    browseName: named(variable.id),
+    nodeId: `s=${variable.id}`,
+    componentOf: parent(variable),
+    dataType: variable.type,
+    accessLevel: variable.access,
+    userAccessLevel: variable.access,
+  });
+  const historian = new VariableHistorian(node, { maxOnlineValues: 1000 });
+  space.installHistoricalDataNode(node, { historian });
+  for (const sample of samples) {
+    await historian.push(
+      new DataValue({
+        value: { dataType: DataType[variable.type], value: sample.value },
+        statusCode: StatusCodes[sample.status],
+        sourceTimestamp: new Date(sample.at),
+      }),
+    );
+  }
 }
 const argument = ([name, type]) => ({ name, dataType: DataType[type], valueRank: -1 });
 for (const one of made.methods) {

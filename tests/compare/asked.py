@@ -81,9 +81,12 @@ class Memory:
         made = self.made.get(wanted.kind)
         if made:
             return made[wanted.place % len(made)]
-        return {"point": b"unknown", "history point": b"unknown", "session": ua.NodeId(UNKNOWN, 0)}.get(
-            wanted.kind, UNKNOWN
-        )
+        return {
+            "point": b"unknown",
+            "history point": b"unknown",
+            "event": b"unknown",
+            "session": ua.NodeId(UNKNOWN, 0),
+        }.get(wanted.kind, UNKNOWN)
 
     def filled(self, asked: Any) -> Any:
         """A copy of ``asked`` with this server's ids in it."""

@@ -13,6 +13,7 @@ from asyncua import ua
 from hypothesis import strategies as st
 
 from tests.compare import space
+from tests.compare.alarms import alarm
 from tests.compare.asked import NO_SESSION, UNKNOWN, Ask, Made
 from tests.compare.cases_items import monitored_item, subscription
 from tests.compare.drawn import (
@@ -233,6 +234,7 @@ SETS: Final[Mapping[str, Callable[[], Cases]]] = {
     "Attribute": _attribute,
     "History": history,
     "Method": _method,
+    "Alarm": alarm,
     "MonitoredItem": monitored_item,
     "Subscription": subscription,
 }

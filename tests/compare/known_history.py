@@ -26,6 +26,7 @@ from tests.compare.play import Seen
 from tests.compare.servers import NODE_OPCUA, OPEN62541, OURS
 
 _KEPT: Final = {ua.NodeId(one.variable.id, 1) for one in space.HISTORIES}
+_NO_TIMES: Final = (ua.TimestampsToReturn.Neither, ua.TimestampsToReturn.Invalid)
 _RESULTS: Final = r"Results\[\d+\]\.(StatusCode|values|goes on)"
 
 
@@ -78,7 +79,7 @@ def _faults(step: Any, operation: Any) -> Faults:
     if has_encoding(operation):
         found.append(DATA_ENCODING)
     if not _is_raw(step) or _is_modified(step):
-        found.append({"BadHistoryOperationUnsupported"})
+        found.append({"BadHistoryOperationUnsupported", "BadInvalidArgument"})
     elif _is_too_little(step):
         found.append({"BadHistoryOperationInvalid", "BadHistoryOperationUnsupported"})
     if step.asked.get("TimestampsToReturn") == ua.TimestampsToReturn.Server:
@@ -151,13 +152,13 @@ OF_HISTORY: Final = (
     ),
     Difference(
         "HistoryRead",
-        "neither of the timestamps",
+        "timestamps that there are not, or neither of them",
         ("BadTimestampsToReturnInvalid",),
         both("Good"),
         "Part 4 §5.11.3.2",
         "It shall be refused.",
         path="result",
-        when=of_step(lambda step: step.asked["TimestampsToReturn"] == ua.TimestampsToReturn.Neither),
+        when=of_step(lambda step: step.asked["TimestampsToReturn"] in _NO_TIMES),
     ),
     Difference(
         "HistoryRead",
@@ -172,12 +173,21 @@ OF_HISTORY: Final = (
     Difference(
         "HistoryRead",
         "to release continuation points, also such that are not there",
-        ("Good",),
+        ANYTHING,
         ANY,
         "Part 4 §5.11.3.2",
         "Nothing is read, and what is not there need not be released.",
         path=_RESULTS,
         when=of_step(_releases),
+    ),
+    Difference(
+        "HistoryRead",
+        "a variable without a history",
+        ("BadHistoryOperationUnsupported",),
+        open62541("BadUserAccessDenied"),
+        "Part 4 §5.11.3.4",
+        "It has none, whoever asks.",
+        when=of_operation(lambda one: one.NodeId not in _KEPT),
     ),
     Difference(
         "HistoryRead",

@@ -20,6 +20,9 @@ from asyncua.server.address_space import NodeManagementService
 from bridge.northbound.opcua.backend import Backend
 from bridge.uaserver.address_space import access_level_ex, constant
 from bridge.uaserver.application import ServedApplication
+from bridge.uaserver.conditions.condition import NORMAL
+from bridge.uaserver.conditions.condition_fields import AlarmContent, ConditionPlace, common_fields
+from bridge.uaserver.conditions.conditions import Condition
 from bridge.uaserver.explanations import Explain
 from bridge.uaserver.filters.eventfilter import Occurrence
 from bridge.uaserver.history.history import ValueHistory
@@ -31,6 +34,7 @@ from tests.support.opcua_site import OPEN, serving
 Ids = ua.ObjectIds
 _WRITABLE = {ua.NodeId(one.id, 1) for one in space.VARIABLES}
 _EMIT = ua.NodeId(space.EMIT.id, 1)
+_RAISE, _ALARM = ua.NodeId(space.RAISE, 1), ua.NodeId(space.ALARM, 1)
 
 
 class _Application(ServedApplication[Any]):
@@ -59,10 +63,21 @@ class _Application(ServedApplication[Any]):
     async def call(
         self, user: Any, calls: Sequence[ua.CallMethodRequest], explain: Explain
     ) -> list[ua.CallMethodResult]:
+        if [one.MethodId for one in calls] == [_RAISE]:
+            return [self._raise()]
         if [one.MethodId for one in calls] != [_EMIT]:
             return await self._backend.call(user, calls, explain)
         self._emit(calls[0].InputArguments[0].Value)
         return [ua.CallMethodResult()]
+
+    def _raise(self) -> ua.CallMethodResult:
+        conditions = self._inner.conditions
+        assert conditions
+        condition = conditions.conditions[_ALARM]
+        condition.state = NORMAL
+        conditions.raised(condition, AlarmContent(text("raised"), 500), anew=True)
+        told = variant(condition.event_id, ua.VariantType.ByteString)
+        return ua.CallMethodResult(OutputArguments=[told])
 
     def value_history(self, where: ua.NodeId) -> ValueHistory | None:
         return _PAST.get(where) or self._backend.value_history(where)
@@ -84,6 +99,30 @@ class _Application(ServedApplication[Any]):
             for subscription in list(self._inner.subscriptions.subscriptions.values()):
                 if subscription.is_listening:
                     subscription.hear(Occurrence(emitter, fields))
+
+
+class _Owner:
+    """Owner of the condition in namespace 1, of which everybody may do everything."""
+
+    def permits(self, user: Any, method: str) -> bool:
+        return True
+
+    async def acknowledging(self, user: Any, condition: ua.NodeId) -> int:
+        return ua.StatusCodes.Good
+
+    def on_call(self, user: Any, condition: ua.NodeId, method: str, code: int) -> None:
+        pass
+
+
+def _add_alarm(inner: InnerServer) -> None:
+    conditions = inner.conditions
+    assert conditions
+    conditions._owner = _Owner()  # pyright: ignore[reportPrivateUsage]
+    kind = ua.NodeId(Ids.AlarmConditionType)
+    common = common_fields(kind, "Alarm", Ids.ProcessConditionClassType, text("process"), {})
+    source = ua.NodeId(space.ALARM.rpartition("/")[0], 1)
+    place = ConditionPlace(_ALARM, source, "source", (ua.NodeId(Ids.Server), source), common)
+    conditions.add(Condition(place))
 
 
 class _Past:
@@ -218,6 +257,7 @@ async def main() -> None:
         async with serving(OPEN, Path(folder)) as (server, _):
             inner: InnerServer = server._server.iserver  # pyright: ignore
             _Builder(inner).build()
+            _add_alarm(inner)
             inner.application = _Application(inner.application, inner)  # pyright: ignore
             print(f"port {server.port}", flush=True)
             await asyncio.Event().wait()

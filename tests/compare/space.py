@@ -123,6 +123,11 @@ METHODS: Final = (
     Method(f"{_FU1}/Start", _FU1, {"direction": "Int32"}, _OUTCOME, namespace=2),
 )
 
+ALARM: Final = "alarms/source/Alarm"
+"""Condition of an object that tells its events to the Server object. open62541 (o6) has none."""
+RAISE: Final = "alarms/raise"
+"""Method that makes the alarm active and not acknowledged; its output is the EventId."""
+
 
 def timestamp(time: datetime) -> str:
     return time.isoformat().replace("+00:00", "Z")
@@ -133,6 +138,8 @@ def as_json() -> str:
     made = {
         "objects": [asdict(one) for one in OBJECTS],
         "variables": [asdict(one) for one in (*VARIABLES, *POINTS)],
+        "alarm": ALARM,
+        "raise": RAISE,
         "histories": [
             {
                 "variable": asdict(one.variable),

@@ -6,9 +6,10 @@ import pytest
 from asyncua import ua
 
 from tests.compare.asked import Ask, Made
+from tests.compare.cases import SETS
 from tests.compare.differences import DIFFERENCES, explanation, unexplained
 from tests.compare.facts import Facts, facts_of
-from tests.compare.page import PAGE, page
+from tests.compare.page import CLEAN, PAGE, page
 from tests.compare.play import Party, Play, Seen
 from tests.compare.servers import NAMES, NODE_OPCUA, OPEN62541, OURS
 from tests.compare.space import BEGIN
@@ -85,6 +86,19 @@ def test_of_the_past_the_samples_are_compared_with_their_times() -> None:
     assert found["Results[0].goes on"] is True
     nothing = facts_of(ua.HistoryReadResponse(Results=[ua.HistoryReadResult()]), "HistoryRead")
     assert nothing["Results[0].values"] == []
+
+
+def test_a_set_without_one_server_is_compared_with_the_other() -> None:
+    step = Ask("Publish")
+    told = [["Message alarm"], ["the refresh of the conditions begins"]]
+    values = {OURS: told, NODE_OPCUA: told[:1]}
+    assert unexplained(Seen("Publish", "events 1", values, step)) == []
+    values = {OURS: told, NODE_OPCUA: []}
+    assert unexplained(Seen("Publish", "events 1", values, step)) == [NODE_OPCUA]
+
+
+def test_the_page_has_a_number_of_cases_for_each_set() -> None:
+    assert set(CLEAN) == set(SETS)
 
 
 def test_of_several_faults_any_may_be_told_but_no_other_code() -> None:

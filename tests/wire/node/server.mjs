@@ -113,5 +113,39 @@ for (const one of made.methods) {
     callback(null, { statusCode: StatusCodes.Good, outputArguments });
   });
 }
+space.installAlarmsAndConditionsService();
+const source = namespaces[1].addObject({
+  browseName: "source",
+  nodeId: `s=${made.alarm.replace(/\/[^/]*$/, "")}`,
+  organizedBy: space.rootFolder.objects,
+  eventSourceOf: space.rootFolder.objects.server,
+  eventNotifier: 1,
+});
+const alarm = namespaces[1].instantiateAlarmCondition("AlarmConditionType", {
+  browseName: named(made.alarm),
+  nodeId: `s=${made.alarm}`,
+  componentOf: source,
+  conditionSource: source,
+  inputNode: source,
+  optionals: ["ConfirmedState", "Confirm"],
+});
+const raising = namespaces[1].addMethod(source, {
+  browseName: named(made.raise),
+  nodeId: `s=${made.raise}`,
+  componentOf: source,
+  outputArguments: [argument(["event", "ByteString"])],
+});
+raising.bindMethod((_inputs, _context, callback) => {
+  const branch = alarm.currentBranch();
+  alarm.activateAlarm();
+  branch.setAckedState(false);
+  branch.setConfirmedState(true);
+  branch.setComment({ text: "" });
+  alarm.raiseNewCondition({ message: "raised", severity: 500, retain: true });
+  callback(null, {
+    statusCode: StatusCodes.Good,
+    outputArguments: [{ dataType: DataType.ByteString, value: branch.getEventId() }],
+  });
+});
 await server.start();
 console.log(`port ${port}`);

@@ -261,6 +261,15 @@ OF_HISTORY: Final = (
     ),
     Difference(
         "HistoryRead",
+        "an `indexRange` of what has no elements",
+        ("Good", "GoodNoData"),
+        open62541("BadIndexRangeNoData"),
+        "Part 4 §7.27",
+        "Each sample says so.",
+        when=of_operation(lambda one: bool(one.IndexRange)),
+    ),
+    Difference(
+        "HistoryRead",
         "an `indexRange`",
         ANYTHING,
         {NODE_OPCUA: ANYTHING},

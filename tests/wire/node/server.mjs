@@ -87,13 +87,15 @@ for (const one of made.histories) {
   }
 }
 const argument = ([name, type]) => ({ name, dataType: DataType[type], valueRank: -1 });
+// An empty list would make a property without arguments, which the other servers do not have.
+const listed = (one) => (Object.keys(one).length ? Object.entries(one).map(argument) : undefined);
 for (const one of made.methods) {
   const method = namespaces[one.namespace].addMethod(parent(one), {
     browseName: named(one.id),
     nodeId: `s=${one.id}`,
     componentOf: parent(one),
-    inputArguments: Object.entries(one.inputs).map(argument),
-    outputArguments: Object.entries(one.outputs).map(argument),
+    inputArguments: listed(one.inputs),
+    outputArguments: listed(one.outputs),
   });
   method.bindMethod((inputs, _context, callback) => {
     const outputArguments = [];

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from datetime import UTC, datetime
 from enum import Enum
 from typing import Any, Final
 
@@ -13,6 +14,8 @@ from asyncua import ua
 NO_SESSION: Final = ua.NodeId()
 UNKNOWN: Final = 987_654_321
 """An id that no server gives."""
+NO_TIME: Final = datetime(1601, 1, 1, tzinfo=UTC)
+"""A DateTime of 0, which is one that is not given (Part 6 §5.2.2.5)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +81,12 @@ class Memory:
         made = self.made.get(wanted.kind)
         if made:
             return made[wanted.place % len(made)]
-        return {"point": b"unknown", "session": ua.NodeId(UNKNOWN, 0)}.get(wanted.kind, UNKNOWN)
+        return {
+            "point": b"unknown",
+            "history point": b"unknown",
+            "event": b"unknown",
+            "session": ua.NodeId(UNKNOWN, 0),
+        }.get(wanted.kind, UNKNOWN)
 
     def filled(self, asked: Any) -> Any:
         """A copy of ``asked`` with this server's ids in it."""

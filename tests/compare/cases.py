@@ -13,6 +13,7 @@ from asyncua import ua
 from hypothesis import strategies as st
 
 from tests.compare import space
+from tests.compare.alarms import alarm
 from tests.compare.asked import NO_SESSION, UNKNOWN, Ask, Made
 from tests.compare.cases_items import monitored_item, subscription
 from tests.compare.drawn import (
@@ -33,6 +34,7 @@ from tests.compare.drawn import (
     standard,
     times,
 )
+from tests.compare.histories import history
 from tests.compare.sessions import Activate, Close, Create, Use
 
 # Discovery and sessions
@@ -230,7 +232,9 @@ SETS: Final[Mapping[str, Callable[[], Cases]]] = {
     "Session": _session,
     "View": _view,
     "Attribute": _attribute,
+    "History": history,
     "Method": _method,
+    "Alarm": alarm,
     "MonitoredItem": monitored_item,
     "Subscription": subscription,
 }

@@ -62,6 +62,8 @@ def _walk(held: Any, path: str, found: Facts) -> None:
         found[path] = code_name(held.value)
     elif isinstance(held, ua.BrowseResult):
         found |= {f"{path}.{name}": one for name, one in _browsed(held).items()}
+    elif isinstance(held, ua.HistoryReadResult):
+        found |= {f"{path}.{name}": one for name, one in _past(held).items()}
     elif isinstance(held, ua.DataValue):
         found |= {f"{path}.{name}": one for name, one in _data_value(held).items()}
     elif is_dataclass(held) and not isinstance(held, ua.NodeId | ua.Variant | ua.QualifiedName):
@@ -83,6 +85,24 @@ def _data_value(held: ua.DataValue) -> Facts:
         "SourceTimestamp": held.SourceTimestamp is not None,
         "ServerTimestamp": held.ServerTimestamp is not None,
     }
+
+
+def _past(held: ua.HistoryReadResult) -> Facts:
+    if not held.StatusCode.is_good():
+        return {"StatusCode": code_name(held.StatusCode.value)}
+    values = getattr(held.HistoryData, "DataValues", None) or []
+    return {
+        "StatusCode": code_name(held.StatusCode.value),
+        "goes on": bool(held.ContinuationPoint),
+        "values": [_sample(one) for one in values],
+    }
+
+
+def _sample(held: ua.DataValue) -> str:
+    code = code_name(held.StatusCode.value if held.StatusCode else 0)
+    value = "" if code.startswith("Bad") else plain(held.Value)
+    server = " with server time" if held.ServerTimestamp else ""
+    return f"{held.SourceTimestamp} {value} {code}{server}"
 
 
 def _browsed(held: ua.BrowseResult) -> Facts:

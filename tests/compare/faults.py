@@ -33,10 +33,22 @@ _OF_CLASS: Final = {
     "object": _COMMON | _OPTIONAL | {Ids.EventNotifier},
     "method": _COMMON | _OPTIONAL | {Ids.Executable, Ids.UserExecutable},
 }
-_VARIABLES: Final = {ua.NodeId(one.id, one.namespace): one for one in (*space.VARIABLES, *space.POINTS)}
+_PAST: Final = [one.variable for one in space.HISTORIES]
+_VARIABLES: Final = {
+    ua.NodeId(one.id, one.namespace): one for one in (*space.VARIABLES, *space.POINTS, *_PAST)
+}
 _OBJECTS: Final = {ua.NodeId(one.id, one.namespace): one for one in space.OBJECTS}
 _METHODS: Final = {ua.NodeId(one.id, one.namespace) for one in space.METHODS}
 _SERVER: Final = ua.NodeId(ua.ObjectIds.Server)
+_ALARM: Final = ua.NodeId(space.ALARM, 1)
+_CONDITION_TYPE: Final = ua.NodeId(ua.ObjectIds.ConditionType)
+_CONDITION_METHODS: Final = {
+    ua.NodeId(ua.ObjectIds.AcknowledgeableConditionType_Acknowledge): _ALARM,
+    ua.NodeId(ua.ObjectIds.ConditionType_AddComment): _ALARM,
+    ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh): _CONDITION_TYPE,
+    ua.NodeId(ua.ObjectIds.ConditionType_ConditionRefresh2): _CONDITION_TYPE,
+}
+"""Methods of conditions, with the object that they are called on."""
 DATA_ENCODING: Final = {"BadDataEncodingInvalid", "BadDataEncodingUnsupported"}
 FILTERS: Final = {
     *("BadFilterNotAllowed", "BadMonitoredItemFilterUnsupported", "BadMonitoredItemFilterInvalid"),
@@ -48,7 +60,7 @@ def class_of(where: ua.NodeId) -> str:
     """Empty for a node that is not there."""
     if where in _VARIABLES:
         return "variable"
-    if where in _OBJECTS or where == _SERVER:
+    if where in _OBJECTS or where in (_SERVER, _ALARM, _CONDITION_TYPE):
         return "object"
     return "method" if where in _METHODS else ""
 
@@ -181,13 +193,17 @@ def of_call(call: ua.CallMethodRequest) -> Faults:
     found: Faults = []
     if not class_of(call.ObjectId):
         found.append({"BadNodeIdUnknown", "BadNodeIdInvalid"})
-    if call.MethodId not in _METHODS or not _is_of(call):
+    if not _is_of(call):
         found.append({"BadMethodInvalid", "BadNodeIdUnknown", "BadNodeClassInvalid", "BadNodeIdInvalid"})
     found.append({"BadArgumentsMissing", "BadTooManyArguments", "BadInvalidArgument", "BadTypeMismatch"})
     return found
 
 
 def _is_of(call: ua.CallMethodRequest) -> bool:
+    if call.MethodId in _CONDITION_METHODS:
+        return _CONDITION_METHODS[call.MethodId] == call.ObjectId
+    if call.MethodId not in _METHODS:
+        return False
     return str(call.MethodId.Identifier).rpartition("/")[0] == call.ObjectId.Identifier
 
 

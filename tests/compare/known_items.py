@@ -72,6 +72,15 @@ OF_ITEMS: Final = (
     ),
     Difference(
         "CreateMonitoredItems",
+        "an attribute that the node does not have, with an `indexRange`",
+        ("BadAttributeIdInvalid",),
+        open62541("BadInternalError"),
+        "Part 4 §5.13.2.4",
+        "It is not the server that has failed.",
+        when=of_operation(lambda one: bool(target_of(one).IndexRange)),
+    ),
+    Difference(
+        "CreateMonitoredItems",
         "events of an object that sends none",
         ("BadNotSupported",),
         node_opcua("Good"),
@@ -113,6 +122,16 @@ OF_ITEMS: Final = (
         "Part 4 §7.22.3",
         "They are told where one is wrong: BadNodeIdUnknown is a field that there is not.",
         path=r"Results\[\d+\]\.FilterResult\.SelectClauseResults\[\d+\]",
+    ),
+    Difference(
+        "CreateMonitoredItems, ModifyMonitoredItems",
+        "results of the elements of an event filter",
+        ("Good",),
+        both("None"),
+        "Part 4 §7.7.2",
+        "Where a field is wrong there is one for each element, too.",
+        path=r"Results\[\d+\]\.FilterResult\.WhereClauseResult\.ElementResults\[\d+\]"
+        r"\.(StatusCode|OperandStatusCodes\[\d+\])",
     ),
     Difference(
         "CreateMonitoredItems, ModifyMonitoredItems",

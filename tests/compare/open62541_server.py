@@ -37,6 +37,7 @@ def _variable(server: Any, one: space.Variable) -> None:
         valueRank=1 if is_array else -1,
         accessLevel=one.access,
         userAccessLevel=one.access,
+        historizing=bool(one.access & space.HISTORY_READ),
         value=_native(one.type, one.value),
     )
     if is_array:
@@ -73,7 +74,7 @@ def build(server: Any) -> None:
         if one.notifies:
             server._write_attribute(where, _EVENT_NOTIFIER, o6.Byte(1))
             server.addReferenceLegacy(server.serverNode, where, o6.NodeId(ns0.reftypes.HasNotifier))
-    for one in (*space.VARIABLES, *space.POINTS):
+    for one in (*space.VARIABLES, *space.POINTS, *(one.variable for one in space.HISTORIES)):
         _variable(server, one)
 
     def add(_: Any, *inputs: Any) -> tuple[Any, ...]:
@@ -104,10 +105,25 @@ def build(server: Any) -> None:
         )
 
 
+def _historize(server: Any, one: space.History) -> None:
+    where = _node_id(one.variable.id, one.variable.namespace)
+    server._history_add(where, len(one.samples) + 1, "manual")
+    for place, (value, code) in enumerate(one.samples):
+        sample = o6.DataValue(
+            value=_native(one.variable.type, value),
+            status=getattr(o6.StatusCode, code.upper()),
+            sourceTimestamp=o6.DateTime(one.at(place)),
+        )
+        server._history_insert(where, sample)
+
+
 def main(port: int) -> None:
     server = o6.Server(port=port)
+    server.config.setHistoryDatabase()
     build(server)
     server.start()
+    for one in space.HISTORIES:
+        _historize(server, one)
     print(f"port {port}", flush=True)
     while True:
         time.sleep(1)

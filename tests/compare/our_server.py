@@ -20,8 +20,12 @@ from asyncua.server.address_space import NodeManagementService
 from bridge.northbound.opcua.backend import Backend
 from bridge.uaserver.address_space import access_level_ex, constant
 from bridge.uaserver.application import ServedApplication
+from bridge.uaserver.conditions.condition import NORMAL
+from bridge.uaserver.conditions.condition_fields import AlarmContent, ConditionPlace, common_fields
+from bridge.uaserver.conditions.conditions import Condition
 from bridge.uaserver.explanations import Explain
 from bridge.uaserver.filters.eventfilter import Occurrence
+from bridge.uaserver.history.history import ValueHistory
 from bridge.uaserver.library import make, text, variant
 from bridge.uaserver.session import InnerServer
 from tests.compare import space
@@ -30,6 +34,7 @@ from tests.support.opcua_site import OPEN, serving
 Ids = ua.ObjectIds
 _WRITABLE = {ua.NodeId(one.id, 1) for one in space.VARIABLES}
 _EMIT = ua.NodeId(space.EMIT.id, 1)
+_RAISE, _ALARM = ua.NodeId(space.RAISE, 1), ua.NodeId(space.ALARM, 1)
 
 
 class _Application(ServedApplication[Any]):
@@ -40,7 +45,7 @@ class _Application(ServedApplication[Any]):
         self._inner = inner
 
     def __getattribute__(self, name: str) -> Any:
-        if name in ("write", "call") or name.startswith("_"):
+        if name in ("write", "call", "value_history") or name.startswith("_"):
             return object.__getattribute__(self, name)
         return getattr(self._backend, name)
 
@@ -58,10 +63,24 @@ class _Application(ServedApplication[Any]):
     async def call(
         self, user: Any, calls: Sequence[ua.CallMethodRequest], explain: Explain
     ) -> list[ua.CallMethodResult]:
+        if [one.MethodId for one in calls] == [_RAISE]:
+            return [self._raise()]
         if [one.MethodId for one in calls] != [_EMIT]:
             return await self._backend.call(user, calls, explain)
         self._emit(calls[0].InputArguments[0].Value)
         return [ua.CallMethodResult()]
+
+    def _raise(self) -> ua.CallMethodResult:
+        conditions = self._inner.conditions
+        assert conditions
+        condition = conditions.conditions[_ALARM]
+        condition.state = NORMAL
+        conditions.raised(condition, AlarmContent(text("raised"), 500), anew=True)
+        told = variant(condition.event_id, ua.VariantType.ByteString)
+        return ua.CallMethodResult(OutputArguments=[told])
+
+    def value_history(self, where: ua.NodeId) -> ValueHistory | None:
+        return _PAST.get(where) or self._backend.value_history(where)
 
     def _emit(self, severity: int) -> None:
         kinds, now = ua.VariantType, datetime.now(UTC)
@@ -82,6 +101,54 @@ class _Application(ServedApplication[Any]):
                     subscription.hear(Occurrence(emitter, fields))
 
 
+class _Owner:
+    """Owner of the condition in namespace 1, of which everybody may do everything."""
+
+    def permits(self, user: Any, method: str) -> bool:
+        return True
+
+    async def acknowledging(self, user: Any, condition: ua.NodeId) -> int:
+        return ua.StatusCodes.Good
+
+    def on_call(self, user: Any, condition: ua.NodeId, method: str, code: int) -> None:
+        pass
+
+
+def _add_alarm(inner: InnerServer) -> None:
+    conditions = inner.conditions
+    assert conditions
+    conditions._owner = _Owner()  # pyright: ignore[reportPrivateUsage]
+    kind = ua.NodeId(Ids.AlarmConditionType)
+    common = common_fields(kind, "Alarm", Ids.ProcessConditionClassType, text("process"), {})
+    source = ua.NodeId(space.ALARM.rpartition("/")[0], 1)
+    place = ConditionPlace(_ALARM, source, "source", (ua.NodeId(Ids.Server), source), common)
+    conditions.add(Condition(place))
+
+
+class _Past:
+    """History of a variable in namespace 1, as a ``ValueHistory``."""
+
+    stepped = False
+    first = 0
+
+    def __init__(self, kept: space.History) -> None:
+        self.end = len(kept.samples)
+        self._kept = kept
+
+    def time_us(self, number: int) -> int:
+        return round(self._kept.at(number).timestamp() * 1_000_000)
+
+    def sample(self, number: int) -> ua.DataValue:
+        value, code = self._kept.samples[number]
+        held = ua.Variant(value, getattr(ua.VariantType, self._kept.variable.type))
+        return ua.DataValue(
+            held, ua.StatusCode(getattr(ua.StatusCodes, code)), SourceTimestamp=self._kept.at(number)
+        )
+
+
+_PAST = {ua.NodeId(one.variable.id, 1): _Past(one) for one in space.HISTORIES}
+
+
 class _Builder:
     def __init__(self, inner: InnerServer) -> None:
         self._space = inner.aspace
@@ -95,7 +162,7 @@ class _Builder:
                 self._add(one.id, one.parent, ua.NodeClass.Object, attributes, kind, Ids.Organizes)
             if one.notifies:
                 self._notify(ua.NodeId(one.id, one.namespace))
-        for one in space.VARIABLES:
+        for one in (*space.VARIABLES, *(one.variable for one in space.HISTORIES)):
             self._variable(one)
         for one in space.METHODS:
             if one.namespace == 1:
@@ -190,6 +257,7 @@ async def main() -> None:
         async with serving(OPEN, Path(folder)) as (server, _):
             inner: InnerServer = server._server.iserver  # pyright: ignore
             _Builder(inner).build()
+            _add_alarm(inner)
             inner.application = _Application(inner.application, inner)  # pyright: ignore
             print(f"port {server.port}", flush=True)
             await asyncio.Event().wait()

@@ -249,6 +249,7 @@ def _differing(found: Sequence[Facts]) -> Iterator[str]:
 _OPERATIONS: Final = {
     "Read": "NodesToRead",
     "Write": "NodesToWrite",
+    "HistoryRead": "NodesToRead",
     "Browse": "NodesToBrowse",
     "BrowseNext": "ContinuationPoints",
     "TranslateBrowsePathsToNodeIds": "BrowsePaths",
@@ -309,9 +310,11 @@ _TAKE_BACK: Final[Mapping[str, Callable[[Ask, Any], Ask]]] = {
 
 
 @contextmanager
-def playing(ports: Mapping[str, int], *, logged_in: bool = True) -> Iterator[Play]:
+def playing(
+    ports: Mapping[str, int], names: Sequence[str] = NAMES, *, logged_in: bool = True
+) -> Iterator[Play]:
     """A play with each server, with sessions of its own, and all variables as they are at first."""
-    parties = [Party(name, ports[name]) for name in NAMES]
+    parties = [Party(name, ports[name]) for name in names]
     try:
         for one in parties:
             if logged_in:

@@ -14,9 +14,11 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from tests.compare.cases import SETS
 from tests.compare.differences import DIFFERENCES, differing, explanation, unexplained
 from tests.compare.play import EndOfCaseError, Play, Seen, playing
-from tests.compare.servers import Servers
+from tests.compare.servers import NAMES, NODE_OPCUA, OURS, Servers
 
 _WITHOUT_SESSION = ("Discovery", "Session")
+_ASKED = {"Alarm": (OURS, NODE_OPCUA)}
+"""Servers of the sets that not all of them have."""
 
 
 @dataclass
@@ -82,8 +84,11 @@ def compare(servers: Servers, service_set: str, cases: int, first: int) -> Repor
 def _played(servers: Servers, service_set: str, case: Sequence[Any], report: Report) -> Play:
     servers.refresh()
     logged_in = service_set not in _WITHOUT_SESSION
-    with playing(servers.ports, logged_in=logged_in) as play, suppress(EndOfCaseError):
+    asked = _ASKED.get(service_set, NAMES)
+    with playing(servers.ports, asked, logged_in=logged_in) as play, suppress(EndOfCaseError):
         play.run(case)
+    for name in _closing(play):
+        servers.await_end(name)
     report.cases += 1
     report.requests += play.asked
     report.told += play.told
@@ -93,6 +98,10 @@ def _played(servers: Servers, service_set: str, case: Sequence[Any], report: Rep
             if row:
                 report.rows[DIFFERENCES.index(row)] += 1
     return play
+
+
+def _closing(play: Play) -> set[str]:
+    return {name for seen in play.seen for name, value in seen.values.items() if value == "closes"}
 
 
 def _unknown(play: Play) -> list[Seen]:

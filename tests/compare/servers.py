@@ -23,6 +23,7 @@ NODE_FOLDER: Final = REPOSITORY / "tests" / "wire" / "node"
 _MOST_AGE_S: Final = 8 * 60.0
 """o6 ends its process after ten minutes."""
 _START_S: Final = 60.0
+_END_S: Final = 2.0
 
 
 def missing() -> str | None:
@@ -58,6 +59,11 @@ class Servers:
                 process.wait()
                 self._start(name)
                 self._await(name)
+
+    def await_end(self, name: str) -> None:
+        """It has closed a connection: if that was the end of its process, it is over a moment later."""
+        with suppress(subprocess.TimeoutExpired):
+            self._processes[name].wait(_END_S)
 
     def _start(self, name: str) -> None:
         python = [sys.executable, "-m"]

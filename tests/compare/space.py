@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime, timedelta
 from typing import Any, Final
 
-READ, WRITE = 1, 2
+READ, WRITE, HISTORY_READ = 1, 2, 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,17 @@ class Variable:
     access: int = READ | WRITE
     namespace: int = 1
     range: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """Samples of a variable, one a second: values and names of their status codes."""
+
+    variable: Variable
+    samples: tuple[tuple[Any, str], ...] = ()
+
+    def at(self, place: int) -> datetime:
+        return BEGIN + timedelta(seconds=place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +65,7 @@ OBJECTS: Final = (
     Object("area/deep", "area", is_folder=True),
     Object("area/deep/box", "area/deep"),
     Object("machine", "", notifies=True),
+    Object("past", "", is_folder=True),
     Object("conveyor/fu1", "", 2),
 )
 SCALARS: Final = (
@@ -85,6 +98,21 @@ POINTS: Final = (
     Variable(f"{_FU1}/supervision/follows", _FU1, "Boolean", True, READ, 2),
 )
 VARIABLES: Final = (*SCALARS, ANALOG, *ARRAYS, *LIMITED)
+BEGIN: Final = datetime(2024, 1, 1, tzinfo=UTC)
+"""Time of the first sample of each history; the others follow second by second."""
+
+
+def _history(name: str, kind: str, value: Any, samples: list[tuple[Any, str]]) -> History:
+    return History(Variable(name, "past", kind, value, READ | HISTORY_READ), tuple(samples))
+
+
+HISTORIES: Final = (
+    _history("numbers", "Double", 0.0, [(number * 1.5, "Good") for number in range(10)]),
+    _history("words", "String", "", [("first", "Good"), ("second", "Uncertain"), ("third", "Good")]),
+    _history("one", "Int32", 0, [(7, "Good")]),
+    _history("none", "Int32", 0, []),
+)
+"""Variables with a past that stays as it is."""
 ADD: Final = Method("machine/add", "machine", {"a": "Int32", "b": "Int32"}, {"sum": "Int32"})
 EMIT: Final = Method("machine/emit", "machine", {"severity": "UInt16"})
 """Sends a BaseEventType of that severity from the machine."""
@@ -95,12 +123,33 @@ METHODS: Final = (
     Method(f"{_FU1}/Start", _FU1, {"direction": "Int32"}, _OUTCOME, namespace=2),
 )
 
+ALARM: Final = "alarms/source/Alarm"
+"""Condition of an object that tells its events to the Server object. open62541 (o6) has none."""
+RAISE: Final = "alarms/raise"
+"""Method that makes the alarm active and not acknowledged; its output is the EventId."""
+
+
+def timestamp(time: datetime) -> str:
+    return time.isoformat().replace("+00:00", "Z")
+
 
 def as_json() -> str:
     """All nodes, for a server that is not in Python."""
     made = {
         "objects": [asdict(one) for one in OBJECTS],
         "variables": [asdict(one) for one in (*VARIABLES, *POINTS)],
+        "alarm": ALARM,
+        "raise": RAISE,
+        "histories": [
+            {
+                "variable": asdict(one.variable),
+                "samples": [
+                    {"at": timestamp(one.at(place)), "value": value, "status": code}
+                    for place, (value, code) in enumerate(one.samples)
+                ],
+            }
+            for one in HISTORIES
+        ],
         "methods": [asdict(one) for one in METHODS],
     }
     return json.dumps(made)

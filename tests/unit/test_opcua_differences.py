@@ -6,11 +6,13 @@ import pytest
 from asyncua import ua
 
 from tests.compare.asked import Ask, Made
+from tests.compare.cases import SETS
 from tests.compare.differences import DIFFERENCES, explanation, unexplained
 from tests.compare.facts import Facts, facts_of
-from tests.compare.page import PAGE, page
+from tests.compare.page import CLEAN, PAGE, page
 from tests.compare.play import Party, Play, Seen
 from tests.compare.servers import NAMES, NODE_OPCUA, OPEN62541, OURS
+from tests.compare.space import BEGIN
 
 Codes = ua.StatusCodes
 
@@ -73,6 +75,30 @@ def test_a_row_explains_what_was_asked_so_and_nothing_else(step: Ask, left: list
     refused = read(value(None, Codes.BadDataEncodingInvalid))
     (seen,) = compared(step, read(value(True)), read(value(True)), refused)
     assert unexplained(seen) == left
+
+
+def test_of_the_past_the_samples_are_compared_with_their_times() -> None:
+    sample = value(1.5)
+    sample.SourceTimestamp = BEGIN
+    past = ua.HistoryReadResult(HistoryData=ua.HistoryData([sample]), ContinuationPoint=b"more")
+    found = facts_of(ua.HistoryReadResponse(Results=[past]), "HistoryRead")
+    assert found["Results[0].values"] == [f"{BEGIN} Double 1.5 Good"]
+    assert found["Results[0].goes on"] is True
+    nothing = facts_of(ua.HistoryReadResponse(Results=[ua.HistoryReadResult()]), "HistoryRead")
+    assert nothing["Results[0].values"] == []
+
+
+def test_a_set_without_one_server_is_compared_with_the_other() -> None:
+    step = Ask("Publish")
+    told = [["Message alarm"], ["the refresh of the conditions begins"]]
+    values = {OURS: told, NODE_OPCUA: told[:1]}
+    assert unexplained(Seen("Publish", "events 1", values, step)) == []
+    values = {OURS: told, NODE_OPCUA: []}
+    assert unexplained(Seen("Publish", "events 1", values, step)) == [NODE_OPCUA]
+
+
+def test_the_page_has_a_number_of_cases_for_each_set() -> None:
+    assert set(CLEAN) == set(SETS)
 
 
 def test_of_several_faults_any_may_be_told_but_no_other_code() -> None:

@@ -98,6 +98,12 @@ class Rest:
             left = replace(left, after=None)
         return taken, left
 
+    def limited(self, most: int) -> Rest:
+        """The first ``most``, at least one, and nothing after them."""
+        count = min(len(self.numbers), most - (self.before is not None))
+        has_room = count + (self.before is not None) < most
+        return replace(self, stop=self.at + count * self.step, after=self.after if has_room else None)
+
     def within(self, kept: Kept) -> Rest:
         """The same without what is no longer kept. Raises ServiceError where what comes next is not."""
         if self.numbers and self.at < kept.first:

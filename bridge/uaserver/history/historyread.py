@@ -92,11 +92,13 @@ class _ValuePoint:
 
 @dataclass(frozen=True, slots=True)
 class _EventPoint:
-    """Events of ``where`` that are still to be read."""
+    """Events of ``where`` that are still to be read, at most ``most`` in an answer (0: as many as fit); with
+    ``ends`` that is all of them."""
 
     where: ua.NodeId
     times: _Times
     most: int
+    ends: bool
     filter: EventFilter
 
 
@@ -215,20 +217,24 @@ class _Read:
             raise ServiceError(StatusCodes.BadTooManyOperations)
 
     def begin(self, wanted: ua.HistoryReadValueId) -> _ValuePoint | _EventPoint:
+        """Whole read of one node. From one time on it is a number, and ends with it (Part 11 §6.5.3.2)."""
         where: ua.NodeId = get(wanted, "NodeId")
         details = self.details
         if isinstance(details, ua.ReadRawModifiedDetails) and not get(details, "IsReadModified"):
             kept, window = self._values_of(wanted)
             start, end = spanned(details)
             rest = raw(kept, start, end, bounds=get(details, "ReturnBounds"))
-            return _ValuePoint(where, rest, get(details, "NumValuesPerNode"), window)
+            most = get(details, "NumValuesPerNode")
+            if start is None or end is None:
+                rest = rest.limited(most)
+            return _ValuePoint(where, rest, most, window)
         if isinstance(details, ua.ReadEventDetails):
             kept = self._events_of(where)
             filter_ = event_filter(get(details, "Filter"), self.types)
             start, end = spanned(details)
-            return _EventPoint(
-                where, _event_times(kept, start, end), get(details, "NumValuesPerNode"), filter_
-            )
+            times = _event_times(kept, start, end)
+            ends = start is None or end is None
+            return _EventPoint(where, times, get(details, "NumValuesPerNode"), ends, filter_)
         raise ServiceError(StatusCodes.BadHistoryOperationUnsupported)
 
     async def values(self, begun: _ValuePoint, share: _Share) -> _ValuePoint | None:
@@ -256,7 +262,10 @@ class _Read:
             if found is None or not begun.filter.passes(found):
                 continue
             if not share.left(begun.most):
-                return replace(begun, times=replace(times, rest=replace(times.rest, at=number)))
+                most = begun.most - share.count if begun.ends else begun.most
+                if begun.ends and not most:
+                    return None
+                return replace(begun, times=replace(times, rest=replace(times.rest, at=number)), most=most)
             fields = make(ua.HistoryEventFieldList, EventFields=begun.filter.fields(found))
             share.add(struct_to_binary(fields))
         return None

@@ -2,7 +2,9 @@
 // It says "port PORT" once it listens. The nodes are those of tests/compare/space.py.
 import { readFileSync } from "node:fs";
 import * as opcua from "node-opcua-server";
+import { VariableHistorian } from "node-opcua-address-space";
 import { DataType, Variant, VariantArrayType } from "node-opcua-variant";
+import { DataValue } from "node-opcua-data-value";
 import { StatusCodes } from "node-opcua-status-code";
 import { MessageSecurityMode, SecurityPolicy } from "node-opcua-secure-channel";
 
@@ -62,14 +64,38 @@ for (const one of made.variables) {
     namespace.addAnalogDataItem({ ...options, engineeringUnitsRange: { low, high } });
   } else namespace.addVariable(options);
 }
+for (const one of made.histories) {
+  const { variable, samples } = one;
+  const node = namespaces[1].addVariable({
+    browseName: named(variable.id),
+    nodeId: `s=${variable.id}`,
+    componentOf: parent(variable),
+    dataType: variable.type,
+    accessLevel: variable.access,
+    userAccessLevel: variable.access,
+  });
+  const historian = new VariableHistorian(node, { maxOnlineValues: 1000 });
+  space.installHistoricalDataNode(node, { historian });
+  for (const sample of samples) {
+    await historian.push(
+      new DataValue({
+        value: { dataType: DataType[variable.type], value: sample.value },
+        statusCode: StatusCodes[sample.status],
+        sourceTimestamp: new Date(sample.at),
+      }),
+    );
+  }
+}
 const argument = ([name, type]) => ({ name, dataType: DataType[type], valueRank: -1 });
+// An empty list would make a property without arguments, which the other servers do not have.
+const listed = (one) => (Object.keys(one).length ? Object.entries(one).map(argument) : undefined);
 for (const one of made.methods) {
   const method = namespaces[one.namespace].addMethod(parent(one), {
     browseName: named(one.id),
     nodeId: `s=${one.id}`,
     componentOf: parent(one),
-    inputArguments: Object.entries(one.inputs).map(argument),
-    outputArguments: Object.entries(one.outputs).map(argument),
+    inputArguments: listed(one.inputs),
+    outputArguments: listed(one.outputs),
   });
   method.bindMethod((inputs, _context, callback) => {
     const outputArguments = [];
@@ -89,5 +115,39 @@ for (const one of made.methods) {
     callback(null, { statusCode: StatusCodes.Good, outputArguments });
   });
 }
+space.installAlarmsAndConditionsService();
+const source = namespaces[1].addObject({
+  browseName: "source",
+  nodeId: `s=${made.alarm.replace(/\/[^/]*$/, "")}`,
+  organizedBy: space.rootFolder.objects,
+  eventSourceOf: space.rootFolder.objects.server,
+  eventNotifier: 1,
+});
+const alarm = namespaces[1].instantiateAlarmCondition("AlarmConditionType", {
+  browseName: named(made.alarm),
+  nodeId: `s=${made.alarm}`,
+  componentOf: source,
+  conditionSource: source,
+  inputNode: source,
+  optionals: ["ConfirmedState", "Confirm"],
+});
+const raising = namespaces[1].addMethod(source, {
+  browseName: named(made.raise),
+  nodeId: `s=${made.raise}`,
+  componentOf: source,
+  outputArguments: [argument(["event", "ByteString"])],
+});
+raising.bindMethod((_inputs, _context, callback) => {
+  const branch = alarm.currentBranch();
+  alarm.activateAlarm();
+  branch.setAckedState(false);
+  branch.setConfirmedState(true);
+  branch.setComment({ text: "" });
+  alarm.raiseNewCondition({ message: "raised", severity: 500, retain: true });
+  callback(null, {
+    statusCode: StatusCodes.Good,
+    outputArguments: [{ dataType: DataType.ByteString, value: branch.getEventId() }],
+  });
+});
 await server.start();
 console.log(`port ${port}`);

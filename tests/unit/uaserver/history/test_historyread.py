@@ -135,6 +135,35 @@ async def test_of_the_newest_or_the_oldest_so_many_are_read(rig: Rig) -> None:
     assert messages(await rig.one(events(5, None, 3), SERVER)) == [5, 6, 7]
 
 
+@pytest.mark.parametrize("span", [(5, None), (None, 30)])
+@pytest.mark.parametrize("bounds", [False, True])
+@pytest.mark.parametrize("most", [1, 3, 25])
+async def test_from_one_time_on_the_number_is_all_that_is_asked_for(
+    rig: Rig, span: tuple[int | None, int | None], bounds: bool, most: int
+) -> None:
+    """Part 11 §6.5.3.2 and §6.5.2.2: a continuation point is for a range with two ends."""
+    found = await rig.one(raw(*span, most, ReturnBounds=bounds))
+    assert found.ContinuationPoint is None
+    assert len(values(found)) <= most
+    found = await rig.one(events(*span, most), SERVER)
+    assert found.ContinuationPoint is None
+    assert len(messages(found)) <= most
+
+
+async def test_that_number_goes_on_where_an_answer_cannot_have_it(rig: Rig) -> None:
+    rig.store.samples = Samples([sample(at, "x" * 100) for at in range(300)])
+    rig.store.happened = told(range(300))
+    rig.most_bytes = 2_000
+    for details, where, read in (
+        (raw(0, None, 100), LOAD, values),
+        (events(0, None, 100), SERVER, messages),
+        (events(None, 300, 100), SERVER, messages),
+    ):
+        pieces = await all_of(rig, details, where, read)
+        assert len(pieces) > 1
+        assert sum(len(piece) for piece in pieces) == 100
+
+
 async def test_nothing_in_that_time_is_good_and_said(rig: Rig) -> None:
     for details, where in ((raw(30, 40), LOAD), (events(30, 40), SERVER)):
         result = await rig.one(details, where)

@@ -102,7 +102,10 @@ class Parameter(Table):
     )
     sets: int = Field(0, ge=0, le=16, description="number of parameter sets; 0: it has one value")
     elements: int = Field(0, ge=0, le=255, description="number of elements; 0: it is no array")
-    states: States = Field(default_factory=dict[int, str])
+    states: States = Field(
+        default_factory=dict[int, str],
+        description="number to text; it takes no others, unless it has `low` and `high`",
+    )
     point: bool = Field(False, description="true: shown as a point of the drive")
     every_ms: int = Field(0, ge=0, le=3_600_000, description="period in which a point is read; 0: on demand")
     absent: float | None = Field(
@@ -136,6 +139,11 @@ class Parameter(Table):
     @property
     def leaf(self) -> str:
         return leaf_of(self.name)
+
+    @property
+    def is_enumeration(self) -> bool:
+        """True where it takes no value but those in ``states``."""
+        return bool(self.states) and (self.low is None or self.high is None)
 
     @property
     def readable(self) -> bool:

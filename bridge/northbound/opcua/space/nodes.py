@@ -32,7 +32,7 @@ class VariableKind(Enum):
     ANALOG = "AnalogUnitType"
     MULTI_STATE = "MultiStateDiscreteType"
     MULTI_STATE_VALUE = "MultiStateValueDiscreteType"
-    """With codes that are negative, or too large for a list of texts."""
+    """With codes that are negative, too large for a list of texts, or without one."""
     TWO_STATE = "TwoStateDiscreteType"
 
 
@@ -342,7 +342,8 @@ _MOST_STATES: Final = 256
 def _variable(point: Point, index: int, *, kept: bool) -> VariableNode:
     kind = VariableKind.PLAIN
     if point.states:
-        is_list = all(0 <= code < _MOST_STATES for code, _ in point.states)
+        has_others = point.low is not None and point.high is not None
+        is_list = not has_others and all(0 <= code < _MOST_STATES for code, _ in point.states)
         kind = VariableKind.MULTI_STATE if is_list else VariableKind.MULTI_STATE_VALUE
     elif point.unit:
         kind = VariableKind.ANALOG

@@ -30,6 +30,7 @@ export function Editor({ holder, entry, described, onWritten }) {
       <${Field} entry=${entry} value=${one?.value} isBusy=${said.isBusy} /> ${entry.unit}
       <button class="main" disabled=${said.isBusy}>${t("parameters.write")}</button>
       <small>${range(entry)}</small>
+      ${entry.states && !isChosen(entry) && html`<small>${Object.keys(entry.states).map((code) => shown(entry, Number(code))).join(", ")}</small>`}
       ${entry.factory !== undefined && html`<small>${t("parameters.factory_is", { value: shown(entry, entry.factory) })}</small>`}
       <small>${wear(entry, described)}</small>
       ${entry.protected && html`<p class="quiet">${t(`parameters.protected.${entry.protected}`)}</p>`}

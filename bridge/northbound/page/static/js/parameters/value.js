@@ -19,8 +19,10 @@ export function range(entry) {
   return rangeOf(entry.low, entry.high, entry.unit);
 }
 
-/** True if the value is chosen from a list. */
-export const isChosen = (entry) => Boolean(entry.states) || entry.type === "bool";
+const hasRange = ({ low, high }) => low !== undefined && high !== undefined;
+
+/** True if the value is chosen from a list: not one that has a range, and texts for some of it alone. */
+export const isChosen = (entry) => (Boolean(entry.states) && !hasRange(entry)) || entry.type === "bool";
 export const isText = (entry) => BARE.includes(entry.type);
 
 /** Limits of a number typed for the parameter. */

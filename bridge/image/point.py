@@ -64,7 +64,7 @@ class Point:
     writable: bool = False
     write: WriteKind = WriteKind.TELEGRAM
     description: Words = ""
-    states: tuple[tuple[int, str], ...] = ()
+    states: tuple[tuple[int, Words], ...] = ()
     bits: tuple[str, ...] = ()
     added: int = 0
 

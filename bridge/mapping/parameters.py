@@ -11,7 +11,7 @@ from bridge.canopen.datatypes import Plain, TypeName, encode
 from bridge.config.field_types import PlainValue
 from bridge.image import DataType
 from bridge.mapping.entry_types import ObjectRef, Ref, States, Table
-from bridge.text import Text
+from bridge.text import Text, Words
 from bridge.tomlfile import Unfit
 
 GROUPS: Final = ("number", "letter", "element", "set")
@@ -90,6 +90,7 @@ class Parameter(Table):
 
     name: str = Field(min_length=1)
     title: str
+    german: str = Field("", description="title in German")
     object: Ref | None = Field(None, description="left out: by [parameter_names]")
     data_type: TypeName
     factor: float = Field(1.0, allow_inf_nan=False)
@@ -105,6 +106,9 @@ class Parameter(Table):
     states: States = Field(
         default_factory=dict[int, str],
         description="number to text; it takes no others, unless it has `low` and `high`",
+    )
+    german_states: States = Field(
+        default_factory=dict[int, str], description="the same in German, with the numbers of `states`"
     )
     point: bool = Field(False, description="true: shown as a point of the drive")
     every_ms: int = Field(0, ge=0, le=3_600_000, description="period in which a point is read; 0: on demand")
@@ -139,6 +143,15 @@ class Parameter(Table):
     @property
     def leaf(self) -> str:
         return leaf_of(self.name)
+
+    @property
+    def said_states(self) -> tuple[tuple[int, Words], ...]:
+        """Values with their texts in the reader's language."""
+        german = self.german_states
+        return tuple(
+            (code, Text.both(text, german[code]) if code in german else text)
+            for code, text in self.states.items()
+        )
 
     @property
     def is_enumeration(self) -> bool:

@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 from bridge.command.messages.request import Action
 from bridge.image import Point
-from bridge.text import Text
+from bridge.text import Text, Words
 
 GROUPS: Final = ("command", "status", "actual", "parameter", "supervision", "identity")
 """Folders that every drive has, whether or not they hold a point."""
@@ -359,9 +359,9 @@ def _variable(point: Point, index: int, *, kept: bool) -> VariableNode:
     return VariableNode(point.name, pascal_case(point.leaf), kind, point, index, bits=bits, kept=kept)
 
 
-def enum_strings(states: Sequence[tuple[int, str]]) -> tuple[str, ...]:
+def enum_strings(states: Sequence[tuple[int, Words]]) -> tuple[Words, ...]:
     """EnumStrings of sparse codes: the index is the code, a code without a state is empty."""
-    strings = [""] * (max(code for code, _ in states) + 1)
+    strings: list[Words] = [""] * (max(code for code, _ in states) + 1)
     for code, text in states:
         strings[code] = text
     return tuple(strings)

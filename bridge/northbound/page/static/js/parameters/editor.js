@@ -6,7 +6,7 @@ import { NumberField, numbersIn } from "../numberfield.js";
 import { t, worded } from "../texts.js";
 import { told } from "../outcome.js";
 import { held, write } from "./held.js";
-import { chosen, isChosen, isText, limitsOf, range, shown } from "./value.js";
+import { chosen, isChosen, isText, limitsOf, range, shown, statesOf } from "./value.js";
 
 export function Editor({ holder, entry, described, onWritten }) {
   const [said, setSaid] = useState({ text: "" });
@@ -41,7 +41,7 @@ export function Editor({ holder, entry, described, onWritten }) {
 
 function Field({ entry, value, isBusy }) {
   if (isChosen(entry)) {
-    const choices = entry.states ?? { true: "true", false: "false" };
+    const choices = statesOf(entry) ?? { true: "true", false: "false" };
     const isKnown = String(value) in choices;
     return html`<select id="value" name="value" required disabled=${isBusy}>
       ${!isKnown && html`<option value="" selected>${t("parameters.choose")}</option>`}

@@ -1,14 +1,21 @@
 // Values of parameters as people read and type them: as they are in the drive, in the reader's number format.
 
 import { exact, range as rangeOf } from "../format.js";
+import { language } from "../texts.js";
 
 const BARE = ["string", "bytes"];
+
+/** The title in the reader's language. */
+export const titleOf = (entry) => (language.value === "de" && entry.german) || entry.title;
+
+/** The texts of its values in the reader's language; undefined where it has none. */
+export const statesOf = (entry) => (language.value === "de" && entry.german_states) || entry.states;
 
 /** A value in words: "1.03 s", "1 (automatic)". */
 export function shown(entry, value) {
   if (value === null || value === undefined) return "–";
   if (typeof value !== "number") return String(value);
-  const state = entry.states?.[value];
+  const state = statesOf(entry)?.[value];
   if (state) return `${value} (${state})`;
   return entry.unit ? `${exact(value)}\u202f${entry.unit}` : exact(value);
 }

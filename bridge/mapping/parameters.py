@@ -147,11 +147,12 @@ class Parameter(Table):
     @property
     def said_states(self) -> tuple[tuple[int, Words], ...]:
         """Values with their texts in the reader's language."""
-        german = self.german_states
-        return tuple(
-            (code, Text.both(text, german[code]) if code in german else text)
-            for code, text in self.states.items()
-        )
+        return tuple((code, self.said_state(code)) for code in self.states)
+
+    def said_state(self, code: int) -> Words:
+        """Text of a value in the reader's language; "" where it has none."""
+        english, german = self.states.get(code, ""), self.german_states.get(code, "")
+        return Text.both(english, german) if german else english
 
     @property
     def is_enumeration(self) -> bool:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from bridge.image.point import DataType, Point, WriteKind
 from bridge.parameter import Names, ParameterEntry
+from bridge.text import Text, Words
 
 
 def parameter_points(name: str, names: Names) -> list[Point]:
@@ -23,6 +26,19 @@ def _point(name: str, entry: ParameterEntry) -> Point:
         high=definition.high,
         writable=definition.writable,
         write=WriteKind.PARAMETER,
-        description=f"{entry.name} {definition.title}",
-        states=tuple(definition.states.items()) if definition.value_type.is_integer else (),
+        description=_described(entry.name, definition.title, definition.german),
+        states=_shared(definition.said_states) if definition.value_type.is_integer else (),
     )
+
+
+@cache
+def _described(name: str, title: str, german: str) -> Words:
+    """Description in the reader's language: one object, however many drives of a family there are."""
+    english = f"{name} {title}"
+    return Text.both(english, f"{name} {german}") if german else english
+
+
+@cache
+def _shared(states: tuple[tuple[int, Words], ...]) -> tuple[tuple[int, Words], ...]:
+    """The states, one object for all drives as well."""
+    return states

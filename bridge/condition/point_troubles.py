@@ -9,7 +9,7 @@ from typing import Final
 
 from bridge.drive import Explained
 from bridge.image import Image, Quality, Value
-from bridge.text import Said, Text, Words
+from bridge.text import Said, Text, Words, in_english
 
 OwnFault = Callable[[int, int], Explained | None]
 """The fault that a drive's own status word and its last emergency code tell; None where there is none."""
@@ -44,7 +44,11 @@ class ImageReader:
         self._image = image
         self._places = image.index
         self.of_bridge = [point.name for point in image.points if point.path[0] == "bridge"]
-        self._labels = {point.name: dict(point.states) for point in image.points if point.states}
+        self._labels = {
+            point.name: {code: in_english(text) for code, text in point.states}
+            for point in image.points
+            if point.states
+        }
 
     def __call__(self, name: str) -> Value | None:
         place = self._places.get(name)

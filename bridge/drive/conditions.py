@@ -75,7 +75,7 @@ class Conditions:
         return None
 
     def _shown(self, name: str, setting: float) -> Text:
-        state = self._family.parameter_named(name).states.get(round(setting))
+        state = self._family.parameter_named(name).said_state(round(setting))
         if state:
             return Text.of("meaning.setting_state", parameter=name, value=setting, state=state)
         return Text.of("meaning.setting", parameter=name, value=setting)

@@ -241,8 +241,8 @@ class Meanings:
     def _shown(self, meaning: Meaning, in_set: int) -> Text:
         code = self._code(meaning, in_set)
         name, _ = self._family.parameter_and_set(meaning.parameter)
-        states = next((one.states for one in self._family.parameter if one.name == name), None)
-        state = states.get(code) if states and code is not None else None
+        parameter = next((one for one in self._family.parameter if one.name == name), None)
+        state = parameter.said_state(code) if parameter and code is not None else ""
         shown = code or 0
         if state:
             return Text.of("meaning.code_state", parameter=meaning.parameter, code=shown, state=state)

@@ -50,10 +50,10 @@ class Point:
 
     ``name`` is the full name, ``<node>/<drive>/<group>/<leaf>`` for what belongs to a drive. ``low``
     and ``high`` are in ``unit``. ``write`` is what a write of it is, where it is ``writable``. ``states`` are
-    the codes of an enumeration with their text, ``bits`` the names of a word's bits from bit 0 on ("" where a
-    bit has no meaning). ``added`` is the number of the
-    addition by which the point came, 0 for the first points: registers, which are in the order of the points,
-    put those of each addition behind all before, so that none of these moves.
+    the codes of an enumeration with their text; one with ``low`` and ``high`` may have other codes between
+    them, too. ``bits`` are the names of a word's bits from bit 0 on ("" where a bit has no meaning).
+    ``added`` is the number of the addition by which the point came, 0 for the first points: registers, which
+    are in the order of the points, put those of each addition behind all before, so that none of these moves.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Point:
     writable: bool = False
     write: WriteKind = WriteKind.TELEGRAM
     description: Words = ""
-    states: tuple[tuple[int, str], ...] = ()
+    states: tuple[tuple[int, Words], ...] = ()
     bits: tuple[str, ...] = ()
     added: int = 0
 

@@ -13,6 +13,7 @@ from bridge.mapping.checks_process import check_cob_id, check_parameter, check_p
 from bridge.mapping.checks_values import check_meanings, check_values
 from bridge.mapping.merge import MergedFile
 from bridge.mapping.model import ControlWord, Family, pattern_bits
+from bridge.mapping.parameters import Parameter
 from bridge.text import Text
 from bridge.tomlfile import Key, Unfit
 
@@ -93,6 +94,17 @@ def _check_parameters(family: Family, file: MergedFile) -> None:
             file.fault((*key, "factor"), Text.of("mapping.zero"))
         if one.data_type in ("string", "bytes") and (one.factor != 1 or one.states):
             file.fault((*key, "data_type"), Text.of("mapping.text_unscaled"))
+        if one.german_states:
+            _check_languages(one, key, file)
+
+
+def _check_languages(one: Parameter, key: Key, file: MergedFile) -> None:
+    """Check that a value with a text in German has one in English, and the other way round."""
+    states = {"states": one.states.keys(), "german_states": one.german_states.keys()}
+    for field, other in (("states", "german_states"), ("german_states", "states")):
+        for number in sorted(states[field] - states[other]):
+            said = Text.of("mapping.one_language", field=f"{number}", language=field)
+            file.fault((*key, other), said)
 
 
 def _check_eeprom(family: Family, file: MergedFile) -> None:

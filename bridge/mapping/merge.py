@@ -3,7 +3,8 @@
 Tables are merged key by key. The lists ``value``, ``parameter``, ``poll``, ``slot``, ``input``,
 ``own_supervision`` and ``fault`` are merged item by item, by ``name`` (values by ``group`` too), ``meaning``
 by ``word`` and ``group``, the PDOs of a slot by ``number``; every other list is replaced. ``without`` leaves
-items of those lists out first.
+items of those lists out first. A parameter that gets another title, or other states, loses the German of the
+former ones.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ _BY_NAME: Final = {
     **dict.fromkeys(("parameter", "poll", "slot", "input", "own_supervision", "fault"), ("name",)),
 }
 _PDOS: Final = ("rpdo", "tpdo")
+_GERMAN: Final = {"title": "german", "states": "german_states"}
 _Place = tuple[TomlFile, Key]
 
 
@@ -141,8 +143,16 @@ class MergedFile:
             if place is None:
                 merged.append(self._put(item, (name, len(merged)), (name, n), file))
             else:
-                merged[place] = self._table(merged[place], item, (name, place), (name, n), file)
+                kept = self._without_german(merged[place], item, (name, place))
+                merged[place] = self._table(kept, item, (name, place), (name, n), file)
         return merged
+
+    def _without_german(self, base: dict[str, Any], over: dict[str, Any], at: Key) -> dict[str, Any]:
+        """Table of a parameter without the German of what ``over`` says anew."""
+        gone = [german for english, german in _GERMAN.items() if at[0] == "parameter" and english in over]
+        for german in gone:
+            self._drop((*at, german))
+        return {name: value for name, value in base.items() if name not in gone}
 
     def _pdos(self, base: Any, over: Any, here: Key, there: Key, file: TomlFile) -> list[Any]:
         """PDOs merged by number; one without a number is the first."""

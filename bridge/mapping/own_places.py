@@ -10,7 +10,7 @@ from typing import Final
 from bridge.canopen.datatypes import INTEGERS, Integer
 from bridge.config import BusTable, NodeTable
 from bridge.mapping.model import Family, ObjectRef, OwnObject, OwnSupervision, Slot
-from bridge.text import Said, Text
+from bridge.text import Said, Text, Words
 
 LIFE_TIME_FACTOR: Final = (0x100D, 0)
 """Life time factor: the life time is guard time (100Ch) × this (CiA 301 §7.5.2.12)."""
@@ -29,7 +29,7 @@ class OwnPlace:
     per_drive: bool
     low: int
     high: int
-    states: Mapping[int, str]
+    states: Mapping[int, Words]
     absent: int | None = None
     """Value that counts where a node does not have the object."""
 
@@ -63,7 +63,7 @@ def place_of(family: Family, one: OwnObject) -> OwnPlace:
     if parameter.high is not None:
         high = min(high, round(parameter.high / parameter.factor))
     ref = family.object_of(parameter)
-    kind, states = parameter.data_type, parameter.states
+    kind, states = parameter.data_type, dict(parameter.said_states)
     per_drive = one.per_drive or family.is_per_axis(ref)
     return OwnPlace(parameter.name, ref, kind, per_drive, low, high, states)
 

@@ -11,7 +11,7 @@ from bridge.canopen.datatypes import Plain, TypeName, encode
 from bridge.config.field_types import PlainValue
 from bridge.image import DataType
 from bridge.mapping.entry_types import ObjectRef, Ref, States, Table
-from bridge.text import Text
+from bridge.text import Text, Words
 from bridge.tomlfile import Unfit
 
 GROUPS: Final = ("number", "letter", "element", "set")
@@ -90,6 +90,7 @@ class Parameter(Table):
 
     name: str = Field(min_length=1)
     title: str
+    german: str = Field("", description="title in German")
     object: Ref | None = Field(None, description="left out: by [parameter_names]")
     data_type: TypeName
     factor: float = Field(1.0, allow_inf_nan=False)
@@ -102,7 +103,13 @@ class Parameter(Table):
     )
     sets: int = Field(0, ge=0, le=16, description="number of parameter sets; 0: it has one value")
     elements: int = Field(0, ge=0, le=255, description="number of elements; 0: it is no array")
-    states: States = Field(default_factory=dict[int, str])
+    states: States = Field(
+        default_factory=dict[int, str],
+        description="number to text; it takes no others, unless it has `low` and `high`",
+    )
+    german_states: States = Field(
+        default_factory=dict[int, str], description="the same in German, with the numbers of `states`"
+    )
     point: bool = Field(False, description="true: shown as a point of the drive")
     every_ms: int = Field(0, ge=0, le=3_600_000, description="period in which a point is read; 0: on demand")
     absent: float | None = Field(
@@ -136,6 +143,21 @@ class Parameter(Table):
     @property
     def leaf(self) -> str:
         return leaf_of(self.name)
+
+    @property
+    def said_states(self) -> tuple[tuple[int, Words], ...]:
+        """Values with their texts in the reader's language."""
+        return tuple((code, self.said_state(code)) for code in self.states)
+
+    def said_state(self, code: int) -> Words:
+        """Text of a value in the reader's language; "" where it has none."""
+        english, german = self.states.get(code, ""), self.german_states.get(code, "")
+        return Text.both(english, german) if german else english
+
+    @property
+    def is_enumeration(self) -> bool:
+        """True where it takes no value but those in ``states``."""
+        return bool(self.states) and (self.low is None or self.high is None)
 
     @property
     def readable(self) -> bool:

@@ -76,7 +76,7 @@ def encode_value(entry: ParameterEntry, value: Value, held: bytes | None) -> byt
         if definition.factor == 1.0 and raw != number:
             raise _not_taken(entry, Text.of("takes.whole_numbers", value=str(value)))
         _check_range(entry, raw if definition.factor == 1.0 else round(raw * definition.factor, _DIGITS))
-        if definition.states and raw not in definition.states:
+        if definition.is_enumeration and raw not in definition.states:
             raise _not_taken(entry, Text.of("takes.one_of", choices=_shown_states(entry)))
         return datatypes.encode(kind, raw)
     except DataTypeError as error:
@@ -205,9 +205,13 @@ def _check_range(entry: ParameterEntry, number: int | float) -> None:
         raise _not_taken(entry, Text.of("takes.range_in", range=allowed, unit=unit, value=value))
 
 
-def _shown_states(entry: ParameterEntry) -> tuple[str, ...]:
-    states = entry.definition.states if entry.definition else {}
-    return tuple(f"{code} ({state})" for code, state in states.items())
+def _shown_states(entry: ParameterEntry) -> tuple[str | Text, ...]:
+    """Choices of a parameter with states, behind its range where they are only some of it."""
+    definition = entry.definition
+    if definition is None or not definition.states:
+        return ()
+    choices = tuple(f"{code} ({state})" for code, state in definition.states.items())
+    return choices if definition.is_enumeration else (shown_range(definition.low, definition.high), *choices)
 
 
 def _not_taken(entry: ParameterEntry, takes: Text) -> ParameterError:

@@ -28,6 +28,7 @@ class ParameterEntry:
             "low": None,
             "high": None,
             "states": {},
+            "german_states": {},
             "unit": "",
         }
         return replace(self, definition=self.definition.model_copy(update=plain))

@@ -83,6 +83,22 @@ def test_a_parameter_is_found_changed_and_put_back_from_a_backup(desk: Desk, tmp
         expect(parameter(page, "P102.1")).to_contain_text("2\u202fs")
 
 
+def test_the_makers_words_are_german_on_a_german_page(desk: Desk) -> None:
+    with desk.sits("engineer") as page:
+        to(page, f"parameters/{DRIVE}")
+        expect(parameter(page, "P509")).to_contain_text("source of the control word")
+        page.get_by_role("button", name="Deutsch").click()
+        page.get_by_role("searchbox").fill("Systembus")
+        expect(parameter(page, "P509")).to_contain_text("Quelle Steuerwort")
+        page.get_by_role("button", name="P509 ändern", exact=True).click()
+        expect(page.locator(".editor")).to_contain_text("3 (Systembus), 6 (CANopen)")
+        # The drive takes the numbers that the manual does not explain, too.
+        page.locator("#value").fill("10")
+        assert page.evaluate("document.querySelector('#value').validity.valid")
+        page.locator("#value").fill("11")
+        assert not page.evaluate("document.querySelector('#value').validity.valid")
+
+
 @pytest.mark.landing
 def test_a_drive_is_compared_with_a_makers_file_and_a_wrong_file_is_told_by_line(
     desk: Desk, tmp_path: Path

@@ -244,6 +244,7 @@ def _entry(holder: Holder, entry: ParameterEntry, counts: Mapping[tuple[str, str
     facts: dict[str, Any] = {
         "name": entry.name,
         "title": definition.title,
+        "german": definition.german,
         "object": str(entry.address),
         "type": definition.data_type,
         "whole": definition.value_type.is_integer,
@@ -251,6 +252,7 @@ def _entry(holder: Holder, entry: ParameterEntry, counts: Mapping[tuple[str, str
         "low": definition.low,
         "high": definition.high,
         "states": {str(code): text for code, text in definition.states.items()},
+        "german_states": {str(code): text for code, text in definition.german_states.items()},
         "write_only": not definition.readable,
         "read_only": not definition.writable,
         "why_never": why_never and as_json(why_never),

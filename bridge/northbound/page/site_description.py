@@ -114,7 +114,7 @@ def _point(point: Point) -> dict[str, Any]:
         "high": point.high,
         "writable": point.writable,
         "description": str(point.description),
-        "states": {str(code): text for code, text in point.states},
+        "states": {str(code): str(text) for code, text in point.states},
         "bits": list(point.bits),
     }
     return {name: fact for name, fact in facts.items() if fact not in ("", None, False, {}, [])}

@@ -92,7 +92,7 @@ class KeySpace:
         """The keys of one drive, node, bus or the bridge: so few points that the answer fits into the queue
         to any client that reads at all."""
         self.bridge_token = f"{self.top}/@/bridge"
-        self._states = tuple(dict(point.states) for point in points)
+        self._states = tuple({code: in_english(text) for code, text in point.states} for point in points)
 
     def is_prompt(self, key: str) -> bool:
         """Whether one of ``prompt`` includes ``key``, which may have wildcards."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from bridge.drive.conditions import Conditions, Lack
@@ -58,6 +60,21 @@ def test_with_another_there_is_no_such_value(family: Family) -> None:
     conditions = Conditions(family)
     conditions.tell(("P7", 1), 5.0)
     assert told(conditions, family) == (Quality.DISABLED, "no position: P7 is 5")
+
+
+def test_a_setting_is_in_the_makers_words_in_both_languages(tmp_path: Path) -> None:
+    path = tmp_path / "spin.toml"
+    states = 'states = { 5 = "free" }\ngerman_states = { 5 = "Frei" }\n'
+    path.write_text(CONDITIONED.replace('name = "P7"\n', f'name = "P7"\n{states}'), encoding="utf-8")
+    family = read_family(path)
+    conditions = Conditions(family)
+    conditions.tell(("P7", 1), 5.0)
+    found = lack(conditions, family)
+    assert found is not None
+    assert [render(found.why, language) for language in ("en", "de")] == [
+        "no position: P7 is 5 (free)",
+        "no position: P7 ist 5 (Frei)",
+    ]
 
 
 def test_a_value_without_conditions_lacks_nothing(family: Family) -> None:

@@ -92,6 +92,17 @@ def test_a_heartbeat_is_watched_where_it_is_the_bridges(number: int, verdict: Ow
         assert (own.time_ms, own.silent_ms) == (300.0, 200), "the longer of dead-man time and heartbeat"
 
 
+def test_a_reaction_that_stops_nothing_is_in_the_makers_words_in_both_languages() -> None:
+    bus, node = tables()
+    raw = {(index, sub): 0 for index in (0x5DAE, 0x5DAF) for sub in range(8)} | {(0x5E9A, 1): 100}
+    found = [one.because for one in judge(LENZE, raw, bus, node).watches if one.watches == "process_data"]
+    (why,) = (one for one in found if render(one).startswith("C00593/1"))
+    assert [render(why, language) for language in ("en", "de")] == [
+        "C00593/1 is 0 (no reaction): it runs on",
+        "C00593/1 ist 0 (Keine Reaktion): er läuft weiter",
+    ]
+
+
 def test_silence_of_its_process_data_stops_a_drive_that_watches_them_and_is_alone_on_its_node() -> None:
     """P151 is of the node: with the RPDOs of another drive it never runs out (BU 2500 §7.1)."""
     stops = OwnJudgement((watch(STOPS, 100.0, name="P151"),))

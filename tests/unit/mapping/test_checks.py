@@ -36,6 +36,28 @@ def test_what_is_there_twice_is_told_with_where_it_is_first(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
+    ("texts", "where", "fault"),
+    [
+        (
+            'states = { 0 = "off", 1 = "on" }\ngerman_states = { 0 = "aus" }',
+            30,
+            "parameter[0].german_states: has no 1, which states has",
+        ),
+        (
+            'states = { 0 = "off" }\ngerman_states = { 0 = "aus", 1 = "ein" }',
+            29,
+            "parameter[0].states: has no 1, which german_states has",
+        ),
+        ('german_states = { 0 = "aus" }', 24, "parameter[0].states: has no 0, which german_states has"),
+    ],
+)
+def test_a_parameter_has_the_same_states_in_german(tmp_path: Path, texts: str, where: int, fault: str):
+    described = 'object = "2001:00"\ndata_type = "uint16"\n'
+    found = told(tmp_path, FAMILY.replace(f"{described}[[poll]]", f"{described}{texts}\n[[poll]]"))
+    assert found == [f"{where}: {fault}"]
+
+
+@pytest.mark.parametrize(
     ("more", "fault"),
     [
         ('slot = "two"', "sdo[0].slot: there is no slot 'two' (known: one)"),

@@ -113,6 +113,9 @@ def sentences(family: Family) -> Iterator[tuple[str, str]]:
     for one in (*family.fault, *faults.advice.values()):
         yield one.en.cause, one.de.cause
         yield one.en.remedy, one.de.remedy
+    for one in family.parameter:
+        yield one.title, one.german or one.title
+        yield from ((text, one.german_states.get(code, text)) for code, text in one.states.items())
     for said in (faults.elsewhere, *(one.otherwise for one in (*family.value, *family.meaning))):
         if isinstance(said, Wording):
             yield said.en, said.de

@@ -44,6 +44,27 @@ class TestExtends:
         assert spin.parameter_named("P90").factor == 0.1
         assert spin.faults.texts == {"1.0": "controller silent", "7.2": "spindle too hot", "9.9": "new"}
 
+    def test_what_is_said_anew_has_no_german_of_before(self, folder: Folder) -> None:
+        own = '[[parameter]]\nname = "P90"\n'
+        german = 'german = "Anliegende Störung"\nstates = { 0 = "none" }\ngerman_states = { 0 = "keine" }\n'
+        folder.add("acme/german", f'extends = "acme/base"\n{own}{german}')
+        found = {}
+        for name, more in {
+            "same": 'unit = "x"\n',
+            "titled": 'title = "fault now"\n',
+            "both": 'title = "fault now"\ngerman = "Jetzige Störung"\n',
+            "stated": 'states = { 9 = "hot" }\n',
+        }.items():
+            folder.add(f"acme/{name}", f'extends = "acme/german"\n{own}{more}')
+            one = folder.load(f"acme/{name}").parameter_named("P90")
+            found[name] = (one.german, one.german_states)
+        assert found == {
+            "same": ("Anliegende Störung", {0: "keine"}),
+            "titled": ("", {0: "keine"}),
+            "both": ("Jetzige Störung", {0: "keine"}),
+            "stated": ("Anliegende Störung", {}),
+        }
+
     def test_a_value_of_the_other_group_is_another_one(self, folder: Folder) -> None:
         more = '[[value]]\nname = "speed"\ngroup = "command"\nword = "modes"\n'
         text = (

@@ -43,6 +43,38 @@ def test_both_layouts_of_setpoints_are_known(number: int):
             assert [str(one) for one in mapped] == known
 
 
+@pytest.mark.parametrize(
+    ("name", "states"),
+    [
+        ("P509", {3: "system bus", 6: "CANopen"}),  # §7.2, §8.1
+        ("P510", {0: "automatic"}),  # §7.2
+        (
+            "P543",  # §5.4, §6.8
+            {
+                1: "actual frequency",
+                10: "actual position, increments, low word",
+                15: "actual position, increments, high word",
+            },
+        ),
+        (
+            "P546",  # §5.4, §6.8
+            {
+                1: "set frequency",
+                23: "set position, increments, low word",
+                24: "set position, increments, high word",
+            },
+        ),
+        (
+            "P152",  # §7.1.1
+            {0: "no change", 1: "load factory settings", 2: "basic parameters", 3: "I parameters"},
+        ),
+        ("P160", {0: "off", 1: "receive on", 2: "transmit on", 3: "both on"}),  # §7.1.2
+    ],
+)
+def test_settings_have_the_texts_that_the_manual_has(name: str, states: dict[int, str]):
+    assert NORD.parameter_named(name).states == states
+
+
 def test_process_data_are_always_four_words():
     """§6.4, note."""
     for slot in NORD.slot:

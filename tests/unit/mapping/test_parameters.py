@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import re
+import tomllib
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
+from bridge.mapping.loader import mappings_dir
 from bridge.mapping.parameters import ParameterNames, object_of
 from bridge.tomlfile import Unfit
 
@@ -86,3 +90,25 @@ def test_a_pattern_that_takes_words_for_numbers_names_none(pattern: str, name: s
     names = ParameterNames.model_validate({"pattern": pattern, "example": "P102", "index": 0x2000})
     with pytest.raises(Unfit, match=f"'{re.escape(name)}' is no parameter; they are written as P102"):
         object_of(names, name)
+
+
+ALIKE = re.compile(r"\d+ [kM]bit/s|SK \w+-CAO|\d SDO, \w+")
+"""Texts that are the same in every language."""
+
+
+def listed() -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every ``[[parameter]]`` as a file has it, with the file's name."""
+    for path in sorted(mappings_dir().rglob("*.toml")):
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        yield from (
+            (f"{path.parent.name}/{path.stem} {one['name']}", one) for one in content.get("parameter", ())
+        )
+
+
+def test_every_parameter_has_its_words_in_german() -> None:
+    assert [where for where, one in listed() if bool(one.get("title")) is not bool(one.get("german"))] == []
+    stated = [(where, one) for where, one in listed() if "states" in one]
+    assert len(stated) > 40
+    spoken = {where for where, one in stated if one.get("german_states", {}).keys() == one["states"].keys()}
+    alike = {where for where, one in stated if all(ALIKE.fullmatch(text) for text in one["states"].values())}
+    assert {where for where, _ in stated} - spoken == alike

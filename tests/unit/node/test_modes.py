@@ -14,6 +14,7 @@ from bridge.image import Quality, Reading
 from bridge.mapping import load_family
 from bridge.sim.cia402.cia402_drive import Cia402Drive
 from bridge.sim.cia402.cia402_settings import Cia402Mode, Cia402Settings
+from bridge.text import render
 from tests.support.bench import Bench
 from tests.support.nightly import examples
 
@@ -93,6 +94,7 @@ def test_in_another_mode_a_setpoint_is_refused_and_its_bits_are_not_served(tmp_p
         Quality.DISABLED,
         "means something else in this mode of operation: 6061 is 6 (homing)",
     )
+    assert render(error.why, "de").endswith(": 6061 ist 6 (Referenzfahrt)")
     refused = bench.write(DRIVE, control_word=15, position=100)
     assert (refused.code, "has no effect" in refused.message) == (Code.NOT_CONFIGURED, True)
     assert bench.write(DRIVE, control_word=6, position=100).ok, "it may be a stop"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import struct
 
 import pytest
@@ -79,6 +80,18 @@ def test_whatever_a_drive_sends_is_a_value_or_one_error(data: bytes, kind: str) 
         except ParameterError:
             continue
         assert not isinstance(value, float) or math.isfinite(value)
+
+
+def test_a_range_with_texts_of_some_of_it_takes_the_others_too() -> None:
+    source = entry("int16", low=0, high=10, states={3: "system bus", 6: "CANopen"})
+    assert (shown(source, 0), shown(source, 3)) == ("0", "3 (system bus)")
+    assert [encode_value(source, one, None)[0] for one in (0, "CANopen", 10)] == [0, 6, 10]
+    for value, why in ((11, "takes 0…10, not 11"), ("x", "takes 0…10, 3 (system bus), 6 (CANopen), not 'x'")):
+        with pytest.raises(ParameterError, match=re.escape(why)):
+            encode_value(source, value, None)
+    for more in ({}, {"low": 0}, {"high": 10}):
+        with pytest.raises(ParameterError, match=r"takes 3 \(system bus\)"):
+            encode_value(entry("int16", states={3: "system bus"}, **more), 0, None)
 
 
 @given(st.one_of(st.booleans(), st.integers(), st.floats(), st.text()), st.binary(max_size=9))

@@ -18,6 +18,7 @@ P102 = Parameter.model_validate(
         "low": 0,
         "high": 320,
         "states": {"0": "none"},
+        "german_states": {"0": "keine"},
         "access": "ro",
     }
 )
@@ -46,7 +47,7 @@ def test_as_bytes_it_has_no_scale_no_limits_and_no_texts_and_stays_protected() -
         None,
         "",
     )
-    assert found.states == {}
+    assert (found.states, found.german_states) == ({}, {})
     assert (entry.address, found.writable, found.title) == (PLACE, False, "acceleration time")
     assert P102.data_type == "int16", "the definition itself is as it was"
 

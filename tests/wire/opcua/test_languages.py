@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 
 import pytest
 from asyncua import Client, Node, ua
@@ -13,6 +14,7 @@ from tests.support.opcua_site import LocalView
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 
+SOURCE, SYSTEM_BUS = "conveyor/fu1/parameter/p509", 3
 STATE, STATUS = "conveyor/fu1/status/state", "conveyor/fu1/status/status_word"
 ENGLISH = {
     "name": "StatusWord",
@@ -23,6 +25,9 @@ ENGLISH = {
     "unit": "ampere",
     "argument": "1 forward, -1 reverse, 0 as the drive is set",
     "method": "ramp down, then no voltage",
+    "parameter": "P509 source of the control word",
+    "choice": "system bus",
+    "chosen": "system bus",
 }
 GERMAN = {
     "name": "Statuswort",
@@ -33,6 +38,9 @@ GERMAN = {
     "unit": "Ampere",
     "argument": "1 vorwärts, -1 rückwärts, 0 wie der Antrieb eingestellt ist",
     "method": "Rampe herunter, dann keine Spannung",
+    "parameter": "P509 Quelle Steuerwort",
+    "choice": "Systembus",
+    "chosen": "Systembus",
 }
 
 
@@ -59,6 +67,9 @@ async def told(server: OpcUaServer, *locales: str) -> dict[str, tuple[str | None
             "unit": (await value(client, "conveyor/fu1/actual/current/EngineeringUnits")).Description,
             "argument": arguments[0].Description,
             "method": await (await node(client, "conveyor/fu1/Stop")).read_description(),
+            "parameter": await (await node(client, SOURCE)).read_description(),
+            "choice": (await value(client, f"{SOURCE}/EnumValues"))[0].DisplayName,
+            "chosen": await value(client, f"{SOURCE}/ValueAsText"),
         }
     return {what: (one.Text, one.Locale) for what, one in found.items()}
 
@@ -66,7 +77,8 @@ async def told(server: OpcUaServer, *locales: str) -> dict[str, tuple[str | None
 async def test_each_client_is_told_in_its_own_language_at_the_same_time(
     served: tuple[OpcUaServer, LocalView],
 ) -> None:
-    server, _ = served
+    server, view = served
+    view.plant.image.set(view.plant.image.index[SOURCE], SYSTEM_BUS, time.monotonic())
     german, english, french = await asyncio.gather(
         told(server, "de-AT"), told(server, "en", "de"), told(server, "fr")
     )

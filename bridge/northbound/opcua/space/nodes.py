@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 
 from bridge.command.messages.request import Action
 from bridge.image import Point
-from bridge.text import Text
+from bridge.text import Text, Words
 
 GROUPS: Final = ("command", "status", "actual", "parameter", "supervision", "identity")
 """Folders that every drive has, whether or not they hold a point."""
@@ -32,7 +32,7 @@ class VariableKind(Enum):
     ANALOG = "AnalogUnitType"
     MULTI_STATE = "MultiStateDiscreteType"
     MULTI_STATE_VALUE = "MultiStateValueDiscreteType"
-    """With codes that are negative, or too large for a list of texts."""
+    """With codes that are negative, too large for a list of texts, or without one."""
     TWO_STATE = "TwoStateDiscreteType"
 
 
@@ -342,7 +342,8 @@ _MOST_STATES: Final = 256
 def _variable(point: Point, index: int, *, kept: bool) -> VariableNode:
     kind = VariableKind.PLAIN
     if point.states:
-        is_list = all(0 <= code < _MOST_STATES for code, _ in point.states)
+        has_others = point.low is not None and point.high is not None
+        is_list = not has_others and all(0 <= code < _MOST_STATES for code, _ in point.states)
         kind = VariableKind.MULTI_STATE if is_list else VariableKind.MULTI_STATE_VALUE
     elif point.unit:
         kind = VariableKind.ANALOG
@@ -358,9 +359,9 @@ def _variable(point: Point, index: int, *, kept: bool) -> VariableNode:
     return VariableNode(point.name, pascal_case(point.leaf), kind, point, index, bits=bits, kept=kept)
 
 
-def enum_strings(states: Sequence[tuple[int, str]]) -> tuple[str, ...]:
+def enum_strings(states: Sequence[tuple[int, Words]]) -> tuple[Words, ...]:
     """EnumStrings of sparse codes: the index is the code, a code without a state is empty."""
-    strings = [""] * (max(code for code, _ in states) + 1)
+    strings: list[Words] = [""] * (max(code for code, _ in states) + 1)
     for code, text in states:
         strings[code] = text
     return tuple(strings)

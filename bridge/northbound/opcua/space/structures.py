@@ -18,7 +18,7 @@ from bridge.northbound.opcua.space.nodes import (
     enum_strings,
 )
 from bridge.northbound.opcua.space.words import spoken, state_named
-from bridge.text import Text
+from bridge.text import Text, Words
 from bridge.uaserver.library import ObjectIds, change, make, node_id, text, ua, variant
 
 READ: Final = 1
@@ -125,12 +125,12 @@ def _range(low: float, high: float) -> Property:
 
 
 @cache
-def _enum_strings(states: tuple[tuple[int, str], ...]) -> Property:
+def _enum_strings(states: tuple[tuple[int, Words], ...]) -> Property:
     return _texts("EnumStrings", [state_named(state) for state in enum_strings(states)])
 
 
 @cache
-def _enum_values(states: tuple[tuple[int, str], ...]) -> Property:
+def _enum_values(states: tuple[tuple[int, Words], ...]) -> Property:
     values = [make(ua.EnumValueType, Value=code, DisplayName=state_named(state)) for code, state in states]
     return _structure("EnumValues", values, ObjectIds.EnumValueType)
 

@@ -295,7 +295,7 @@ class Tree:
         read = partial(self._state, node, dict(node.point.states))
         return DerivedValue((node,), TEXT_OF_STATE, read, self.watched)
 
-    def _state(self, node: VariableNode, states: Mapping[int, str]) -> ua.DataValue:
+    def _state(self, node: VariableNode, states: Mapping[int, Words]) -> ua.DataValue:
         told = present_value(self._image, node.index, value_type(node), self._epoch_ns)
         if told.Value is None or told.Value.Value is None:
             return told

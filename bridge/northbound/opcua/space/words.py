@@ -38,8 +38,10 @@ def named(browse_name: str) -> ua.LocalizedText:
 
 
 @cache
-def state_named(state: str) -> ua.LocalizedText:
+def state_named(state: Words) -> ua.LocalizedText:
     """A state as points have it, with the same English text. Those of parameters are their makers'."""
+    if isinstance(state, Text):
+        return spoken(state)
     base, number = _split(state)
     code = Text.word("name", base).code
     return _with_number(state, code, number) if code in templates(LANGUAGES[0]) else text(state)

@@ -37,7 +37,10 @@ def test_each_drive_has_its_parameters_with_range_states_and_wear() -> None:
     assert ramp["factory"] == 3.5
     assert "factory" not in by_name["P102.2"]
     assert told["cycles"] == 100_000
-    assert "protected" in by_name["P509"]
+    source = by_name["P509"]
+    assert "protected" in source
+    assert (source["title"], source["states"]["3"]) == ("source of the control word", "system bus")
+    assert (source["german"], source["german_states"]["3"]) == ("Quelle Steuerwort", "Systembus")
 
 
 @pytest.mark.landing(22)

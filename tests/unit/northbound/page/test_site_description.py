@@ -21,4 +21,8 @@ def test_the_site_is_described_by_the_names_of_its_points() -> None:
     assert names == {point.name for point in plant.image.points}
     for drive in told["drives"]:
         assert f"actual/{drive['main']}" in told["natures"][told["places"][drive["name"]]]
+    assert told["natures"][told["places"][DRIVE]]["parameter/p509"]["states"] == {
+        "3": "system bus",
+        "6": "CANopen",
+    }
     assert all(told["natures"].count(one) == 1 for one in told["natures"]), "each kind is described once"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -41,6 +42,9 @@ def test_a_value_comes_with_quality_and_time_in_microseconds() -> None:
 def test_an_enumeration_names_its_state() -> None:
     assert json.loads(KEYS.as_json(STATE, good(4), NOW_NS))["s"] == "operation_enabled"
     assert "s" not in json.loads(KEYS.as_json(STATE, good(99), NOW_NS))
+    states = ((3, Text.both("system bus", "Systembus")),)
+    keys = KeySpace("drives", "hall3", (replace(POINTS[STATE], states=states),))
+    assert json.loads(keys.as_json(0, good(3), NOW_NS))["s"] == "system bus"
 
 
 def test_a_held_value_says_why_it_is_not_good() -> None:

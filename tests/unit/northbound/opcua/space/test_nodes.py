@@ -156,6 +156,20 @@ def test_two_bits_of_one_name_are_an_error() -> None:
         layout([word])
 
 
+@pytest.mark.parametrize(
+    ("more", "kind"),
+    [
+        ({}, VariableKind.MULTI_STATE),
+        ({"high": 10}, VariableKind.MULTI_STATE),
+        ({"low": 0, "high": 10}, VariableKind.MULTI_STATE_VALUE),
+    ],
+)
+def test_codes_that_may_have_no_text_make_no_list(more: dict[str, float], kind: VariableKind) -> None:
+    point = Point(name="bridge/source", data_type=DataType.INT16, states=((3, "system bus"),), **more)
+    (made,) = variables(layout([point]))
+    assert made.kind is kind
+
+
 def test_sparse_codes_stand_at_their_index() -> None:
     strings = enum_strings([(0, "ok"), (2, "bad"), (255, "unknown")])
     assert (len(strings), strings[0], strings[1], strings[2], strings[255]) == (

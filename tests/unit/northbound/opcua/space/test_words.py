@@ -39,6 +39,10 @@ def test_a_state_is_in_english_what_it_is_on_every_interface(state: str, german:
     assert both(state_named(state)) == ((state, "en"), (german, "de"))
 
 
+def test_a_makers_state_is_in_the_makers_german() -> None:
+    assert both(state_named(Text.both("off", "Ausgänge aus"))) == (("off", "en"), ("Ausgänge aus", "de"))
+
+
 @pytest.mark.parametrize("words", ["P102", "Acme Turbo 7"])
 def test_what_the_program_has_no_word_for_is_the_same_in_every_language(words: str) -> None:
     for said in (named(words), state_named(words), spoken(words)):

@@ -4,7 +4,7 @@ import { html, useEffect, useRef, useState } from "../ui.js";
 import { many, t } from "../texts.js";
 import { told } from "../outcome.js";
 import { write } from "./held.js";
-import { shown } from "./value.js";
+import { shown, titleOf } from "./value.js";
 
 export function Differences({ holder, result, mayWrite }) {
   const [progress, setProgress] = useState({ written: 0 });
@@ -33,7 +33,7 @@ export function Differences({ holder, result, mayWrite }) {
             ${["name", "title", "in_drive", "in_set"].map((name) => html`<th scope="col">${t(`parameters.${name}`)}</th>`)}</tr></thead>
           <tbody>${result.rows.map(({ entry, held, wanted }) => html`<tr>
             <td><input type="checkbox" checked=${left.has(entry.name)} disabled=${progress.isBusy} onChange=${() => toggle(entry.name)} aria-label=${entry.name} /></td>
-            <td><code>${entry.name}</code></td><td>${entry.title}</td><td>${shown(entry, held)}</td><td>${shown(entry, wanted)}</td></tr>`)}
+            <td><code>${entry.name}</code></td><td>${titleOf(entry)}</td><td>${shown(entry, held)}</td><td>${shown(entry, wanted)}</td></tr>`)}
           </tbody>
         </table>
       </div>

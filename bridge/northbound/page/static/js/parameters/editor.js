@@ -6,7 +6,7 @@ import { NumberField, numbersIn } from "../numberfield.js";
 import { t, worded } from "../texts.js";
 import { told } from "../outcome.js";
 import { held, write } from "./held.js";
-import { chosen, isChosen, isText, limitsOf, range, shown } from "./value.js";
+import { chosen, isChosen, isText, limitsOf, range, shown, statesOf } from "./value.js";
 
 export function Editor({ holder, entry, described, onWritten }) {
   const [said, setSaid] = useState({ text: "" });
@@ -30,6 +30,7 @@ export function Editor({ holder, entry, described, onWritten }) {
       <${Field} entry=${entry} value=${one?.value} isBusy=${said.isBusy} /> ${entry.unit}
       <button class="main" disabled=${said.isBusy}>${t("parameters.write")}</button>
       <small>${range(entry)}</small>
+      ${entry.states && !isChosen(entry) && html`<small>${Object.keys(entry.states).map((code) => shown(entry, Number(code))).join(", ")}</small>`}
       ${entry.factory !== undefined && html`<small>${t("parameters.factory_is", { value: shown(entry, entry.factory) })}</small>`}
       <small>${wear(entry, described)}</small>
       ${entry.protected && html`<p class="quiet">${t(`parameters.protected.${entry.protected}`)}</p>`}
@@ -40,7 +41,7 @@ export function Editor({ holder, entry, described, onWritten }) {
 
 function Field({ entry, value, isBusy }) {
   if (isChosen(entry)) {
-    const choices = entry.states ?? { true: "true", false: "false" };
+    const choices = statesOf(entry) ?? { true: "true", false: "false" };
     const isKnown = String(value) in choices;
     return html`<select id="value" name="value" required disabled=${isBusy}>
       ${!isKnown && html`<option value="" selected>${t("parameters.choose")}</option>`}

@@ -3,12 +3,12 @@
 import { html, useEffect, useMemo, useRef, useState } from "../ui.js";
 import { may } from "../session.js";
 import { ask, isConnected } from "../live.js";
-import { inWords, t } from "../texts.js";
+import { inWords, language, t } from "../texts.js";
 import { told } from "../outcome.js";
 import { counted, matching } from "../rows.js";
 import { Editor } from "./editor.js";
 import { held, read, readAll } from "./held.js";
-import { range, shown } from "./value.js";
+import { range, shown, statesOf, titleOf } from "./value.js";
 
 const AT_ONCE = 50;
 const SETTLED_MS = 250;
@@ -18,7 +18,7 @@ export function List({ holder, described, onWritten }) {
   const [count, setCount] = useState(AT_ONCE);
   const [edited, setEdited] = useState("");
   const all = described.parameters;
-  const found = useMemo(() => matching(all, wanted, words), [all, wanted]);
+  const found = useMemo(() => matching(all, wanted, words), [all, wanted, language.value]);
   const drawn = found.slice(0, count);
   const isOver = useRef(false);
   useEffect(() => isConnected.value ? readWhatIsShown(holder, drawn) : undefined, [holder, wanted, count, isConnected.value]);
@@ -52,7 +52,7 @@ export function List({ holder, described, onWritten }) {
 }
 
 const isReadable = (entry) => !entry.write_only;
-const words = (entry) => `${entry.name} ${entry.title ?? ""} ${entry.object} ${entry.unit ?? ""} ${Object.values(entry.states ?? {}).join(" ")}`;
+const words = (entry) => `${entry.name} ${titleOf(entry) ?? ""} ${entry.object} ${entry.unit ?? ""} ${Object.values(statesOf(entry) ?? {}).join(" ")}`;
 
 // Once typing has stopped; a parameter that was read is not read again.
 function readWhatIsShown(holder, entries) {
@@ -71,7 +71,7 @@ function Row({ holder, entry, isEdited, onEdit, described, onWritten }) {
   return html`
     <tr>
       <td><code>${entry.name}</code> <small>${entry.object}</small></td>
-      <td>${entry.title}</td>
+      <td>${titleOf(entry)}</td>
       <td class="value"><${Held} holder=${holder} entry=${entry} /></td>
       <td>${range(entry)}</td>
       <td><${Change} entry=${entry} isEdited=${isEdited} onEdit=${onEdit} /></td>

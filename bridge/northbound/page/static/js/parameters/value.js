@@ -1,14 +1,21 @@
 // Values of parameters as people read and type them: as they are in the drive, in the reader's number format.
 
 import { exact, range as rangeOf } from "../format.js";
+import { language } from "../texts.js";
 
 const BARE = ["string", "bytes"];
+
+/** The title in the reader's language. */
+export const titleOf = (entry) => (language.value === "de" && entry.german) || entry.title;
+
+/** The texts of its values in the reader's language; undefined where it has none. */
+export const statesOf = (entry) => (language.value === "de" && entry.german_states) || entry.states;
 
 /** A value in words: "1.03 s", "1 (automatic)". */
 export function shown(entry, value) {
   if (value === null || value === undefined) return "–";
   if (typeof value !== "number") return String(value);
-  const state = entry.states?.[value];
+  const state = statesOf(entry)?.[value];
   if (state) return `${value} (${state})`;
   return entry.unit ? `${exact(value)}\u202f${entry.unit}` : exact(value);
 }
@@ -19,8 +26,10 @@ export function range(entry) {
   return rangeOf(entry.low, entry.high, entry.unit);
 }
 
-/** True if the value is chosen from a list. */
-export const isChosen = (entry) => Boolean(entry.states) || entry.type === "bool";
+const hasRange = ({ low, high }) => low !== undefined && high !== undefined;
+
+/** True if the value is chosen from a list: not one that has a range, and texts for some of it alone. */
+export const isChosen = (entry) => (Boolean(entry.states) && !hasRange(entry)) || entry.type === "bool";
 export const isText = (entry) => BARE.includes(entry.type);
 
 /** Limits of a number typed for the parameter. */

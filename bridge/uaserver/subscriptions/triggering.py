@@ -41,8 +41,11 @@ class TriggeringLinks:
     def remove(self, trigger: int, number: int) -> None:
         """Raises ServiceError where there is no such link."""
         links = self._links.get(trigger, {})
-        if links.pop(number, None) is None:
+        if number not in links:
             raise ServiceError(StatusCodes.BadMonitoredItemIdInvalid)
+        # What was triggered while there was a link is reported all the same.
+        self.release()
+        del links[number]
         self._count -= 1
         if not links:
             del self._links[trigger]
@@ -52,7 +55,6 @@ class TriggeringLinks:
 
     def drop(self, number: int) -> None:
         """An item is deleted, and with it the links from it and to it."""
-        self._fired.discard(number)
         for linked in list(self._links.get(number, ())):
             self.remove(number, linked)
         for trigger in list(self._triggers.get(number, ())):

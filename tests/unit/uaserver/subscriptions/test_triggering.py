@@ -178,13 +178,24 @@ def test_with_the_item_its_links_go_in_both_directions() -> None:
         assert refused.value.code == Codes.BadMonitoredItemIdInvalid
 
 
-def test_a_link_that_was_removed_counts_no_more() -> None:
+def test_a_link_that_was_removed_counts_for_what_it_has_triggered_and_no_more() -> None:
     rig = Rig()
     rig.link()
     rig.change(LINKED, 7)
     rig.change(TRIGGER, 1)
     rig.subscription.links.remove(TRIGGER, LINKED)
-    assert rig.told() == [(TRIGGER, 1)]
+    rig.change(TRIGGER, 2)
+    rig.change(LINKED, 8)
+    assert sorted(rig.told()) == [(TRIGGER, 1), (TRIGGER, 2), (LINKED, 7)]
+
+
+def test_what_an_item_has_triggered_before_it_was_deleted_is_told() -> None:
+    rig = Rig()
+    rig.link()
+    rig.change(LINKED, 7)
+    rig.change(TRIGGER, 1)
+    rig.subscription.drop(rig.items[TRIGGER])
+    assert rig.told() == [(LINKED, 7)]
 
 
 def test_a_message_that_is_full_leaves_the_rest_for_the_next() -> None:

@@ -14,9 +14,9 @@ from cryptography.hazmat.primitives.serialization import Encoding
 
 from bridge.uaserver.connections.acceptor import TcpAcceptor
 from bridge.uaserver.connections.security import CheckedPolicy, Trust
+from bridge.uaserver.inner_server import InnerServer
 from bridge.uaserver.library import change
 from bridge.uaserver.selfdescription import describe
-from bridge.uaserver.session import InnerServer
 
 _CHUNK: Final = 65535
 _MOST_CHUNKS: Final = 256

@@ -26,8 +26,8 @@ from bridge.uaserver.conditions.conditions import Condition
 from bridge.uaserver.explanations import Explain
 from bridge.uaserver.filters.eventfilter import Occurrence
 from bridge.uaserver.history.history import ValueHistory
+from bridge.uaserver.inner_server import InnerServer
 from bridge.uaserver.library import make, text, variant
-from bridge.uaserver.session import InnerServer
 from tests.compare import space
 from tests.support.opcua_site import OPEN, serving
 

@@ -54,11 +54,11 @@ from bridge.text import LANGUAGES, Text
 from bridge.uaserver import decoding
 from bridge.uaserver.bound import BoundServer
 from bridge.uaserver.connections.acceptor import WINDOW
+from bridge.uaserver.inner_server import InnerServer
 from bridge.uaserver.library import ua
 from bridge.uaserver.librarylog import quieten
 from bridge.uaserver.own_addresses import OwnAddresses
 from bridge.uaserver.registration import RegisteredServer, Registration
-from bridge.uaserver.session import InnerServer
 
 _PRODUCT: Final = "urn:drivebridge"
 _MB: Final = 1_000_000

@@ -22,8 +22,9 @@ from bridge.uaserver.client_notices import tell
 from bridge.uaserver.connection_limits import limits as admission_limits
 from bridge.uaserver.connections.inbox import Inbox
 from bridge.uaserver.connections.transport import MOST_BEFORE_SESSION, Processor
+from bridge.uaserver.inner_server import InnerServer
 from bridge.uaserver.library import StatusCodes, make, status, ua
-from bridge.uaserver.session import InnerServer, Session
+from bridge.uaserver.session import Session
 
 _MOST_UNREAD: Final = 64
 """Messages that a client which waits for its answers has under way at most."""

@@ -37,6 +37,7 @@ from bridge.uaserver.connection_limits import ConnectionStage
 from bridge.uaserver.connections.security import SecureChannel, check_policy
 from bridge.uaserver.encoding import encode
 from bridge.uaserver.explanations import fault
+from bridge.uaserver.inner_server import InnerServer
 from bridge.uaserver.languages import speaking
 from bridge.uaserver.library import (
     ExplainedFault,
@@ -52,7 +53,7 @@ from bridge.uaserver.library import (
 )
 from bridge.uaserver.routes import ROUTES, Route, ServiceRequest
 from bridge.uaserver.services import NAMES, REFUSED, request_type
-from bridge.uaserver.session import InnerServer, Session
+from bridge.uaserver.session import Session
 from bridge.uaserver.states import REFUSALS, Need, RequestSession, need_of
 from bridge.uaserver.subscriptions.quotas import make_room_for_session
 from bridge.uaserver.undertakings import Undertakings, finish

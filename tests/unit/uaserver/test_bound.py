@@ -12,7 +12,7 @@ from asyncua import Client, ua
 from bridge.uaserver import decoding
 from bridge.uaserver.bound import BoundServer
 from bridge.uaserver.connections.security import Refused
-from bridge.uaserver.session import InnerServer
+from bridge.uaserver.inner_server import InnerServer
 from tests.support.opcua_application import Served, User, add_variable
 
 WORD = ua.NodeId("word", 1)

@@ -6,8 +6,9 @@ import pytest
 from asyncua import ua
 
 from bridge.uaserver.application import NOBODY
+from bridge.uaserver.inner_server import InnerServer
 from bridge.uaserver.library import ServiceError
-from bridge.uaserver.session import InnerServer, Session
+from bridge.uaserver.session import Session
 from tests.support.opcua_application import Served, User, add_variable
 
 Ids, Codes = ua.AttributeIds, ua.StatusCodes

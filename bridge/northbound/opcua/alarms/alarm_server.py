@@ -35,8 +35,8 @@ from bridge.text import Text
 from bridge.uaserver.conditions.condition_fields import ConditionPlace, ConditionWords, common_fields
 from bridge.uaserver.conditions.conditions import Condition, Conditions, EventSink
 from bridge.uaserver.filters.where import Fields
+from bridge.uaserver.inner_server import InnerServer
 from bridge.uaserver.library import ObjectIds, node_id, ua, variant
-from bridge.uaserver.session import InnerServer
 
 Kind = ua.VariantType
 _CLASSES: Final = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import groupby
 from typing import Any, Final
 
@@ -24,10 +25,20 @@ from tests.compare.difference import (
 )
 from tests.compare.servers import NODE_OPCUA, OPEN62541, OURS
 
+_GOOD_NUMBER: Final = re.compile(r"Double (\S+) Good(?: with Overflow)?")
+_MOST_DEADBAND: Final = 10.0
+
 
 def _once_each(told: Any) -> list[Any]:
     """Values that were told, without those that are told again."""
     return [value for value, _ in groupby(told or [])]
+
+
+def _is_within_a_deadband(*told: Any) -> bool:
+    """Whether good numbers were told, and all lie within the largest deadband that is asked for."""
+    found = [_GOOD_NUMBER.fullmatch(str(value)) for values in told for value in values or ()]
+    numbers = [float(one[1]) for one in found if one]
+    return 1 < len(numbers) == len(found) and max(numbers) - min(numbers) <= _MOST_DEADBAND
 
 
 OF_ITEMS: Final = (
@@ -193,6 +204,16 @@ OF_ITEMS: Final = (
         "With a deadband this trigger is as StatusValue: the value is told once.",
         path=r"item \d+",
         when=lambda seen, server: _once_each(seen.values[server]) == _once_each(seen.values[OURS]),
+    ),
+    Difference(
+        "Publish",
+        "a value within the deadband with another source time, with StatusValueTimestamp",
+        ANYTHING,
+        {NODE_OPCUA: ANYTHING},
+        "Part 4 §7.22.2",
+        "With a deadband this trigger is as StatusValue: the value is not told.",
+        path=r"item \d+",
+        when=lambda seen, server: _is_within_a_deadband(seen.values[server], seen.values[OURS]),
     ),
     Difference(
         "Publish",

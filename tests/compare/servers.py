@@ -24,6 +24,8 @@ _MOST_AGE_S: Final = 8 * 60.0
 """o6 ends its process after ten minutes."""
 _START_S: Final = 60.0
 _END_S: Final = 2.0
+_TRIES: Final = 3
+_PORT_TAKEN: Final = "EADDRINUSE"
 
 
 def missing() -> str | None:
@@ -90,6 +92,18 @@ class Servers:
         self._processes[name] = process
 
     def _await(self, name: str) -> None:
+        for _ in range(_TRIES):
+            if self._is_up(name):
+                return
+            log = (Path(self._home.name) / f"{name}.log").read_text()
+            if _PORT_TAKEN not in log:
+                break
+            # Between the choice of a port and its use somebody else may take it.
+            self._processes[name].wait()
+            self._start(name)
+        raise RuntimeError(f"{name} does not start: {log[-2000:]}")
+
+    def _is_up(self, name: str) -> bool:
         out = self._processes[name].stdout
         assert out
         until = time.monotonic() + _START_S
@@ -97,11 +111,10 @@ class Servers:
             line = out.readline()
             if line.startswith("port "):
                 self.ports[name] = int(line.split()[1])
-                return
+                return True
             if not line:
-                break
-        log = (Path(self._home.name) / f"{name}.log").read_text()
-        raise RuntimeError(f"{name} does not start: {log[-2000:]}")
+                return False
+        return False
 
     def close(self) -> None:
         for process in self._processes.values():

@@ -35,15 +35,16 @@ async def changes(hz: float) -> AsyncIterator[float]:
 
 
 class ChangingView(LocalView):
-    """A view of nothing but ``count`` values."""
+    """A view of ``count`` values and what the bridge says of itself. ``values`` are their places."""
 
     def __init__(self, count: int) -> None:
         super().__init__(make_plant())
-        self.image = Image(
-            Point(name=f"line/drive/actual/value_{n}", data_type=DataType.FLOAT, description="a value")
-            for n in range(count)
-        )
-        for index in range(count):
+        own = [point for point in self.image.points if point.name.startswith("bridge/")]
+        names = [f"line/drive/actual/value_{n}" for n in range(count)]
+        made = [Point(name=name, data_type=DataType.FLOAT, description="a value") for name in names]
+        self.image = Image([*own, *made])
+        self.values = range(len(own), len(own) + count)
+        for index in self.values:
             self.image.set(index, 0.0, time.monotonic())
 
 
@@ -55,7 +56,7 @@ async def ours(count: int, hz: float) -> None:
         await server.start()
         print(f"serving {server.endpoint_url} {NAMESPACE}", flush=True)
         async for value in changes(hz):
-            view.image.set_values(range(count), [value] * count, time.monotonic())
+            view.image.set_values(view.values, [value] * count, time.monotonic())
 
 
 async def plain_asyncua(count: int, hz: float) -> None:

@@ -78,8 +78,10 @@ class Publisher:
         for index in indices:
             for _, variable in sorted(self._watched.get(index, {}).items()):
                 if variable.watchers:
-                    with self._guard:
+                    try:
                         await self._tell(variable)
+                    except Exception as error:  # noqa: BLE001 - as the guard's, which takes time for each
+                        self._guard.note(error)
         await asyncio.sleep(0)
 
     async def _tell(self, variable: WatchedVariable) -> None:
@@ -94,8 +96,10 @@ class Publisher:
                 now = self._begin_turn()
                 # Who was told a newer one meanwhile must not be told an older one now.
                 value = variable.read()
-            with self._guard:
+            try:
                 watcher.told(value, now)
+            except Exception as error:  # noqa: BLE001 - as above
+                self._guard.note(error)
 
     def _begin_turn(self) -> float:
         now = clock.now()

@@ -147,6 +147,8 @@ class ValueRings:
     def record(self, places: Sequence[int]) -> None:
         """Add the present values of these points, as far as they are chosen."""
         rings, image, epoch_ns = self.rings, self._image, self._epoch_ns
+        # What changes together has the same time.
+        known_at, time_us = -math.inf, 0
         for place in places:
             ring = rings.get(place)
             if ring is None:
@@ -158,8 +160,10 @@ class ValueRings:
             # Before the first value there is nothing, not even a time.
             if quality is not Quality.WAITING or ring.end:
                 ring.taken_at = time
+                if time != known_at:
+                    known_at, time_us = time, epoch_us(epoch_ns(time))
                 try:
-                    ring.append(epoch_us(epoch_ns(time)), value, quality)
+                    ring.append(time_us, value, quality)
                 except (TypeError, OverflowError) as error:
                     self._guard.note(error)
 

@@ -61,7 +61,8 @@ def started(folder: Path, nodes: int, drives: int, mapping: str) -> Start:
     with drivebridge(folder, "run", "run", str(path)) as process:
         operational_s = _said(process, "node operational", nodes) - begin
         opcua_s = _said(process, "OPC UA on", 1) - begin
-        (front,) = children(process.pid)
+        # Beside it there may be a fork of the recorder for a moment.
+        front = max(children(process.pid), key=lambda child: usage(child).memory_mb)
         of_front, of_all = usage(front), usage(process.pid)
     bus = Usage(1, of_all.cpu_s - of_front.cpu_s, of_all.memory_mb - of_front.memory_mb)
     return Start(operational_s, opcua_s, points, bus, of_front)

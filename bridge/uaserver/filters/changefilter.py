@@ -34,7 +34,10 @@ class ChangeFilter:
 
     def reports(self, last: ua.DataValue | None, now: ua.DataValue) -> bool:
         """Whether ``now`` is to be told to a client that was last told ``last``."""
-        if last is None or last.StatusCode != now.StatusCode:
+        if last is None:
+            return True
+        # Nearly always the same object, and asyncua's comparison takes longer than all of the rest.
+        if last.StatusCode is not now.StatusCode and last.StatusCode != now.StatusCode:
             return True
         if self.trigger == ua.DataChangeTrigger.Status:
             return False
@@ -47,7 +50,8 @@ class ChangeFilter:
         stamped = self.trigger == ua.DataChangeTrigger.StatusValueTimestamp
         if stamped and self.deadband is None and last.SourceTimestamp != now.SourceTimestamp:
             return True
-        return last.Value != now.Value and not (_is_nan(before) and _is_nan(after))
+        # The variants differ in their types, too.
+        return (before != after or last.Value != now.Value) and not (_is_nan(before) and _is_nan(after))
 
 
 EVERY_CHANGE: Final = ChangeFilter()

@@ -158,14 +158,15 @@ class Subscription:
     def noticed(self, item: Item, *, is_queued: bool = False) -> None:
         """Look at an item whose value, or queue, may have changed. ``is_queued``: it has queued something,
         which triggers those that are linked to it."""
+        number = item.number
         if is_queued:
-            self.links.fire(item.number)
+            self.links.fire(number)
         if item.lost:
             self._count_lost(item)
         if isinstance(item, ValueItem) and item.is_holding:
-            self._holding[item.number] = item
+            self._holding[number] = item
         if item.has_something:
-            self._ready[item.number] = item
+            self._ready[number] = item
 
     def _count_lost(self, item: Item) -> None:
         if isinstance(item, ValueItem):

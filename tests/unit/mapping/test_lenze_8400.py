@@ -12,6 +12,7 @@ from bridge.mapping import family_names, load_family
 from bridge.mapping.loader import mappings_dir
 from bridge.mapping.match import Found, best_match
 from bridge.mapping.own_places import place_of
+from bridge.text import render
 
 NAME = "lenze/8400-motec"
 LENZE = load_family(NAME)
@@ -60,7 +61,9 @@ def test_the_supervision_is_the_code_of_rpdo1_and_its_reaction():
     assert own.reaction is not None
     time, reaction = place_of(LENZE, own), place_of(LENZE, own.reaction)
     assert (str(time.ref), str(reaction.ref)) == ("5E9A:01", "5DAE:01")
-    assert [reaction.states[value] for value in own.reaction.nothing] == ["no reaction", "warning locked"]
+    harmless = [reaction.states[value] for value in own.reaction.nothing]
+    assert [render(words, "en") for words in harmless] == ["no reaction", "warning locked"]
+    assert [render(words, "de") for words in harmless] == ["Keine Reaktion", "Verriegelte Warnung"]
     assert (own.factory, own.reaction.factory) == (3000, 0)
 
 

@@ -12,6 +12,7 @@ from asyncua.ua.ua_binary import struct_to_binary
 
 from bridge.northbound.opcua.space.nodes import FileNode, MethodNode, ObjectNode, VariableKind, VariableNode
 from bridge.northbound.opcua.space.structures import (
+    VALUE_AS_TEXT,
     point_attributes,
     property_attributes,
     property_nodes,
@@ -35,6 +36,7 @@ _TYPES = {
     VariableKind.PLAIN: Ids.BaseDataVariableType,
     VariableKind.ANALOG: Ids.AnalogUnitType,
     VariableKind.MULTI_STATE: Ids.MultiStateDiscreteType,
+    VariableKind.MULTI_STATE_VALUE: Ids.MultiStateValueDiscreteType,
     VariableKind.TWO_STATE: Ids.TwoStateDiscreteType,
 }
 
@@ -146,9 +148,11 @@ class HeldTree:
     def _properties(self, node: MethodNode | VariableNode, parent: ua.NodeId) -> None:
         for one in property_nodes(node):
             attributes = property_attributes(one.content)
-            self._add(
+            where = self._add(
                 one, ua.NodeClass.Variable, attributes, Ids.PropertyType, parent, Ids.HasProperty, "", 0
             )
+            if one.content is VALUE_AS_TEXT:
+                self.points.add(where)
 
     def _add(
         self,

@@ -40,6 +40,7 @@ def test_a_plant_that_nothing_happens_to_moves(site: Project) -> None:
     assert result.looks > 100
 
 
+@pytest.mark.landing(3)
 @pytest.mark.parametrize("third", [0, 1, 2])
 def test_a_plant_goes_on_whatever_has_happened(site: Project, third: int) -> None:
     kinds = tuple(KINDS)[third::3]
@@ -52,6 +53,7 @@ def test_a_plant_goes_on_whatever_has_happened(site: Project, third: int) -> Non
     assert set(result.counts) == set(kinds)
 
 
+@pytest.mark.landing
 def test_a_seed_gives_the_same_run_whatever_the_hashes_of_texts_are(tmp_path: Path) -> None:
     def run(hash_seed: int) -> str:
         folder = tmp_path / str(hash_seed)

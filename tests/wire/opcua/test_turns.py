@@ -13,7 +13,7 @@ from tests.support.longest_turn import ServerThread
 from tests.support.opcua_raw import ask, item, monitored, published, subscribed
 from tests.support.opcua_site import connected
 
-pytestmark = pytest.mark.asyncio(loop_scope="module")
+pytestmark = [pytest.mark.landing, pytest.mark.asyncio(loop_scope="module")]
 
 Codes, Ids, Mode = ua.StatusCodes, ua.ObjectIds, ua.MonitoringMode
 LONGEST_S = 0.05

@@ -24,7 +24,7 @@ from tests.wire.scenarios.node_steps import STEPS
 
 NODE = REPOSITORY / "tests" / "wire" / "node"
 HAS_NODE = shutil.which("node") is not None and (NODE / "node_modules" / "node-opcua-client").is_dir()
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.landing, pytest.mark.timeout(300)]
 SCRIPTS = {
     "asyncua": [sys.executable, "-m", "tests.wire.scenarios.asyncua_scenario", "a"],
     "o6": [sys.executable, "-m", "tests.wire.scenarios.o6_scenario", "b"],

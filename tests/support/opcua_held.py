@@ -7,7 +7,6 @@ from typing import Any
 
 from asyncua import ua
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData, NodeManagementService
-from asyncua.server.standard_address_space import standard_address_space
 from asyncua.ua.ua_binary import struct_to_binary
 
 from bridge.northbound.opcua.space.nodes import FileNode, MethodNode, ObjectNode, VariableKind, VariableNode
@@ -39,12 +38,6 @@ _TYPES = {
     VariableKind.MULTI_STATE_VALUE: Ids.MultiStateValueDiscreteType,
     VariableKind.TWO_STATE: Ids.TwoStateDiscreteType,
 }
-
-
-def standard_space() -> AddressSpace:
-    made = AddressSpace()
-    standard_address_space.fill_address_space(NodeManagementService(made))
-    return made
 
 
 def copy_of(standard: AddressSpace) -> AddressSpace:

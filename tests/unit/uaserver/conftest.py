@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import pytest
-from asyncua.server.address_space import AddressSpace, NodeManagementService
-from asyncua.server.standard_address_space import standard_address_space
+from asyncua.server.address_space import AddressSpace
 
 from bridge.uaserver.hierarchy import EventTypes
+from tests.support.standard_space import standard_space
 
 
 @pytest.fixture(scope="module")
 def space() -> AddressSpace:
-    made = AddressSpace()
-    standard_address_space.fill_address_space(NodeManagementService(made))
-    return made
+    return standard_space()
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from bridge.uaserver.address_space import is_empty, put_behind
 from bridge.uaserver.hierarchy import related, subtypes, supertypes
 from bridge.uaserver.library import node_id
 from bridge.uaserver.nodesets import Models, NodesetStore, NoInstances, load_models
-from tests.support.opcua_held import standard_space
+from tests.support.standard_space import standard_space
 
 Ids = ua.ObjectIds
 DI, MACHINERY, POWERTRAIN = (

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import pytest
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace, NodeManagementService
-from asyncua.server.standard_address_space import standard_address_space
+from asyncua.server.address_space import AddressSpace
 
 from bridge.uaserver.address_space import is_empty
 from bridge.uaserver.selfdescription import LOCALES, NOT_DONE, VALUES, describe
+from tests.support.standard_space import standard_space
 
 Ids = ua.AttributeIds
 
 
 @pytest.fixture(scope="module")
 def described() -> AddressSpace:
-    made = AddressSpace()
-    standard_address_space.fill_address_space(NodeManagementService(made))
+    made = standard_space()
     describe(made, ("en", "de"))
     return made
 

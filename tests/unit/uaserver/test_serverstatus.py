@@ -9,11 +9,10 @@ from typing import Any
 
 import pytest
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace, NodeManagementService
-from asyncua.server.standard_address_space import standard_address_space
 
 from bridge.uaserver.selfdescription import describe
 from bridge.uaserver.serverstatus import HEALTHY, MAINTENANCE, NO_DATA, UNKNOWN_TIME, ServerStatus
+from tests.support.standard_space import standard_space
 from tests.support.virtual_loop import VirtualLoop
 
 Ids = ua.ObjectIds
@@ -24,8 +23,7 @@ class Rig:
     """The standard's address space, and what a client was told of it."""
 
     def __init__(self) -> None:
-        self.space = AddressSpace()
-        standard_address_space.fill_address_space(NodeManagementService(self.space))
+        self.space = standard_space()
         held = self.space[ua.NodeId(Ids.Server_ServerStatus)].attributes[ua.AttributeIds.Value]
         held.value = ua.DataValue(ua.Variant(ua.ServerStatusDataType(), ua.VariantType.ExtensionObject))
         describe(self.space, ("en",))

@@ -13,8 +13,9 @@ from bridge.config.point_patterns import HISTORY_POINTS
 from bridge.northbound.opcua.history.value_rings import chosen
 from bridge.northbound.opcua.server import OpcUaServer
 from bridge.northbound.opcua.space.nodes import layout
-from tests.support.opcua_held import HeldTree, Seen, as_told, copy_of, standard_space
+from tests.support.opcua_held import HeldTree, Seen, as_told, copy_of
 from tests.support.opcua_site import OPEN, LocalView, connected, namespace
+from tests.support.standard_space import standard_space
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 

@@ -7,14 +7,13 @@ from typing import Any
 
 import pytest
 from asyncua import ua
-from asyncua.server.address_space import AddressSpace, NodeManagementService
-from asyncua.server.standard_address_space import standard_address_space
 
 from bridge.uaserver.counts import RequestCounts, ServerCounts
 from bridge.uaserver.diagnostics.diagnosticnodes import DiagnosticNodes
 from bridge.uaserver.diagnostics.diagnostics import SessionFacts
 from bridge.uaserver.diagnostics.shapes import ALL_SECURITY, ALL_SESSIONS, ALL_SUBSCRIPTIONS
 from bridge.uaserver.subscriptions.subscription import Subscription, Terms
+from tests.support.standard_space import standard_space
 
 Value = ua.AttributeIds.Value
 
@@ -34,8 +33,7 @@ def session(number: int) -> Any:
 
 class Rig:
     def __init__(self) -> None:
-        self.space = AddressSpace()
-        standard_address_space.fill_address_space(NodeManagementService(self.space))
+        self.space = standard_space()
         self.sessions = [session(1), session(2)]
         terms = Terms(100, 30, 10, 1000, 0)
         subscriptions = {7: Subscription(7, self.sessions[0], terms, enabled=True)}

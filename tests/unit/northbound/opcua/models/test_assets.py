@@ -19,7 +19,7 @@ from bridge.northbound.opcua.space.tree import Tree
 from bridge.project import load_project
 from bridge.uaserver.hierarchy import related, supertypes
 from bridge.uaserver.library import node_id
-from tests.support.opcua_held import standard_space
+from tests.support.standard_space import standard_space
 
 Ids, Attribute = ua.ObjectIds, ua.AttributeIds
 DEMO = Path(__file__).parents[5] / "bridge/demo/site.toml"

@@ -10,7 +10,7 @@ from bridge.image import DataType, Point
 from bridge.northbound.opcua.space.kinds import Kinds
 from bridge.northbound.opcua.space.nodes import ObjectNode, VariableNode, layout
 from bridge.uaserver.address_space import is_empty
-from tests.support.opcua_held import standard_space
+from tests.support.standard_space import standard_space
 
 Ids = ua.AttributeIds
 

@@ -22,8 +22,9 @@ from bridge.northbound.opcua.space.tree import Tree
 from bridge.project import load_project
 from tests.support import sites
 from tests.support.families import FamilySite
-from tests.support.opcua_held import HeldTree, copy_of, standard_space
+from tests.support.opcua_held import HeldTree, copy_of
 from tests.support.opcua_site import make_plant
+from tests.support.standard_space import standard_space
 
 NAMESPACE = 2
 DEMO = Path(__file__).parents[5] / "bridge/demo/site.toml"

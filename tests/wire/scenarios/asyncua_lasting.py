@@ -242,5 +242,7 @@ async def end_is_announced(steps: Steps) -> None:
     steps.step("no Bad before the end", {type(one) for one in reads[:-1]}, {int})
     seconds = [value for what, value in seen if what == "seconds"]
     steps.step("counted down", seconds[:2], [2, 1])
+    # asyncua's client says so itself, once it has noticed that its connection is gone.
+    await until(lambda: seen[-1:] == [("status", "BadShutdown")], 10)
     steps.step("the subscription is told", seen[-1:], [("status", "BadShutdown")])
     break_off(client)

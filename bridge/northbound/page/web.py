@@ -16,7 +16,7 @@ from starlette.middleware import Middleware
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import FileResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Scope
 from starlette.websockets import WebSocket
@@ -141,7 +141,17 @@ class Page:
             "samesite": "strict",
             "secure": self._is_encrypted,
         }
-        routes = [
+        served = Starlette(
+            routes=self._routes(catalogue, sources),
+            middleware=[Middleware(GZipMiddleware, minimum_size=1024)],
+            lifespan=self._life,
+        )
+        # Not as middleware: Starlette's own answer to an exception would go round it.
+        self.app: ASGIApp = Guards(served, table.names, is_encrypted=self._is_encrypted)
+
+    def _routes(self, catalogue: Catalogue, sources: PageSources) -> list[BaseRoute]:
+        settings = catalogue.site.opcua
+        return [
             Route("/", _index),
             Route("/api/session", self._session),
             Route("/api/site", self._site),
@@ -149,7 +159,7 @@ class Page:
             Route("/api/texts/{language}", self._texts),
             Route("/api/login", self._login, methods=["POST"]),
             Route("/api/logout", self._logout, methods=["POST"]),
-            *Integration(site, sources.exports, self._has_session).routes,
+            *Integration(catalogue.site, sources.exports, self._has_session).routes,
             *ParameterPage(
                 holders_of(catalogue),
                 sources.counts,
@@ -158,7 +168,7 @@ class Page:
                 self._has_session,
                 self._has_token,
             ).routes,
-            *BusPage(site.site.name, sources.layouts, sources.capture, self._session_of).routes,
+            *BusPage(self._site_name, sources.layouts, sources.capture, self._session_of).routes,
             *System(
                 sources.system,
                 lambda: self.shown,
@@ -169,13 +179,6 @@ class Page:
             WebSocketRoute("/live", self._live),
             Mount("/static", _Files(directory=STATIC)),
         ]
-        served = Starlette(
-            routes=routes,
-            middleware=[Middleware(GZipMiddleware, minimum_size=1024)],
-            lifespan=self._life,
-        )
-        # Not as middleware: Starlette's own answer to an exception would go round it.
-        self.app: ASGIApp = Guards(served, table.names, is_encrypted=self._is_encrypted)
 
     @asynccontextmanager
     async def _life(self, app: Starlette) -> AsyncGenerator[None]:
